@@ -1,0 +1,271 @@
+"""`Component`: equations and their declared interface, without FMI, files or clocks."""
+
+from __future__ import annotations
+
+import difflib
+import math
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from typing import Any, ClassVar
+
+import numpy as np
+
+from .declarations import (
+    Data,
+    Declaration,
+    Memory,
+    Noise,
+    Output,
+    Parameter,
+    ScalarType,
+    Shape,
+    Size,
+    SizeExpression,
+    State,
+    Tape,
+    Variable,
+)
+
+Values = dict[str, Any]
+
+
+class ComponentError(ValueError):
+    """A component was declared, built or used wrongly; the message names it, the variable and the remedy."""
+
+
+@dataclass(frozen=True)
+class Slot:
+    """One declared variable of a built component: shape and unit resolved, start value in place.
+
+    ``name`` is the attribute; ``scalars`` gives the FMI names of its elements, ``name[1]``, ``name[1,2]``, ...
+    """
+
+    name: str
+    declaration: Variable
+    unit: str
+    shape: tuple[int, ...]
+    start: Any
+
+    @property
+    def type(self) -> ScalarType:
+        """The Python type of one element."""
+        return self.declaration.type
+
+    @property
+    def scalars(self) -> tuple[str, ...]:
+        """Names of the elements in row-major order, 1-based; the bare name of a scalar."""
+        if not self.shape:
+            return (self.name,)
+        return tuple(f"{self.name}[{','.join(str(k + 1) for k in index)}]" for index in np.ndindex(*self.shape))
+
+
+class Component:
+    """Base class of everything that becomes an FMU.
+
+    A subclass declares its interface in the class body and fills in the methods it needs. The methods are pure:
+    they read values from ``self`` and return a dict by name; they change nothing. On values use operators, slices,
+    reshaping and `maths`, nothing else: the same lines run on floats, arrays and symbols.
+
+    Keyword arguments give build arguments and values, so that a formula can be read off in one line:
+    ``ComfortCruise(speed=5.0).outputs()["demand"]``.
+
+    Raises:
+        ComponentError: an unknown name, a value of the wrong shape or type, a size below its minimum.
+    """
+
+    source: ClassVar[str] = ""
+    """Where the equations come from: author, year, equation numbers."""
+    note: ClassVar[str] = ""
+    """What a user must know wherever the component is shown (for example that it is reconstructed)."""
+    requires: ClassVar[tuple[str, ...]] = ()
+    """Packages beside NumPy that the equations import; such a component can only become a Python FMU."""
+    recommended_step: ClassVar[float | None] = None
+    """Longest advisable communication step in s, if the equations have one."""
+
+    declarations: ClassVar[Mapping[str, Declaration]] = {}
+
+    # Parameters of the runtime. Each belongs to the interface only where the component has what it governs.
+    sample_time = Parameter("s", 0.0, minimum=0.0, description="sample period; 0 samples once per communication step")
+    max_step = Parameter("s", 0.1, minimum=0.0, description="longest integration step inside a communication step")
+    seed = Parameter("1", 0, type=int, minimum=0, description="seed of this instance's random numbers")
+    tape_file = Parameter("1", "", description="file the tape is read from at the start and written to at the end")
+    tape_duration = Parameter("s", 300.0, minimum=0.0, description="longest trip the tape can hold")
+    tape_cutoff = Parameter("Hz", 0.0, minimum=0.0, description="zero-phase low-pass between trips; 0 is off")
+
+    time: float = 0.0
+    """Simulation time in s, available everywhere."""
+    _step: float | None = None
+
+    def __init_subclass__(cls, **kwargs: Any) -> None:
+        super().__init_subclass__(**kwargs)
+        found: dict[str, Declaration] = {}
+        for base in reversed(cls.__mro__):
+            found.update({k: v for k, v in vars(base).items() if isinstance(v, Declaration)})
+        features = {kind: any(isinstance(d, kind) for d in found.values()) for kind in (State, Memory, Tape, Noise)}
+        sampled = features[Memory] or features[Tape] or features[Noise]
+        runtime = {
+            "sample_time": sampled,
+            "max_step": features[State],
+            "seed": features[Noise],
+            "tape_file": features[Tape],
+            "tape_duration": features[Tape],
+            "tape_cutoff": features[Tape],
+        }
+        own = {name: d for name, d in found.items() if runtime.get(name) is None}
+        cls.declarations = own | {name: found[name] for name, wanted in runtime.items() if wanted}
+        _check_declarations(cls)
+
+    def __init__(self, **values: Any) -> None:
+        cls = type(self)
+        unknown = [name for name in values if name not in cls.declarations and name != "time"]
+        if unknown:
+            raise ComponentError(f"{cls.__name__} has no {_nearest(unknown[0], [*cls.declarations, 'time'])}")
+        place = self.__dict__
+        self.build_arguments: Values = {}
+        for name, declaration in cls.declarations.items():
+            if isinstance(declaration, Size | Data):
+                given = values.pop(name, declaration.default)
+                self.build_arguments[name] = given
+                place[name] = _build_argument(cls, declaration, given)
+        self.slots: dict[str, Slot] = {}
+        for name, declaration in cls.declarations.items():
+            if isinstance(declaration, Variable):
+                slot = self._slot(declaration)
+                self.slots[name] = slot
+                place[name] = slot.start
+            elif isinstance(declaration, Noise):
+                shape = self._shape(declaration.shape)
+                place[name] = np.zeros(shape) if shape else 0.0
+        for name, value in values.items():
+            place[name] = float(value) if name == "time" else convert(self.slots[name], value, cls.__name__)
+
+    # ---------------------------------------------------------------- equations
+
+    def initial(self) -> Values:
+        """Start values of `State` and `Memory` that follow from parameters, starts and inputs."""
+        return {}
+
+    def derivatives(self) -> Values:
+        """Rates of all `State` variables."""
+        return {}
+
+    def outputs(self) -> Values:
+        """All `Output` variables, y = g(x, memory, u, t)."""
+        return {}
+
+    def update(self) -> Values:
+        """Next `Memory`, this sample's `Tape` rows and any re-initialised `State`, from values at the sample's start."""
+        return {}
+
+    def keep(self) -> Any:
+        """Whether the trip that just ended may replace the tape's content."""
+        return True
+
+    # ---------------------------------------------------------------- what the runtime needs to know
+
+    @property
+    def step(self) -> float:
+        """Length of the sample in s; only ``update`` may ask, because elsewhere it is not known."""
+        if self._step is None:
+            raise ComponentError(f"{type(self).__name__}: self.step is known only inside update()")
+        return self._step
+
+    def of(self, *kinds: type[Declaration]) -> Iterator[Slot]:
+        """The slots declared as one of ``kinds``, in order of declaration."""
+        return (slot for slot in self.slots.values() if isinstance(slot.declaration, kinds))
+
+    @property
+    def output_slots(self) -> tuple[Slot, ...]:
+        """Everything another component may connect to: outputs, and states and memory declared as outputs."""
+        return tuple(s for s in self.slots.values() if isinstance(s.declaration, Output) or _shown(s.declaration))
+
+    @property
+    def is_sampled(self) -> bool:
+        """Whether the component has Memory, Tape or Noise, and therefore acts at samples."""
+        return "sample_time" in self.declarations
+
+    @property
+    def noises(self) -> dict[str, Noise]:
+        """The declared random numbers by name."""
+        return {name: d for name, d in self.declarations.items() if isinstance(d, Noise)}
+
+    def _shape(self, shape: Shape) -> tuple[int, ...]:
+        return tuple(_length(self, axis) for axis in shape)
+
+    def _slot(self, declaration: Variable) -> Slot:
+        name = declaration.name
+        shape = self._shape(declaration.shape)
+        unit = declaration.unit if isinstance(declaration.unit, str) else str(getattr(self, declaration.unit.name))
+        blank = Slot(name, declaration, unit, shape, None)
+        return Slot(name, declaration, unit, shape, convert(blank, declaration.start, type(self).__name__))
+
+
+def convert(slot: Slot, value: Any, owner: str) -> Any:
+    """Bring a value to a slot's type and shape; a scalar fills an array.
+
+    Raises:
+        ComponentError: wrong type, wrong shape, or a number that is not finite.
+    """
+    where = f"{owner}.{slot.name}"
+    if slot.shape:
+        array = np.asarray(value, dtype=object if slot.type is str else None)
+        if array.shape not in ((), slot.shape):
+            raise ComponentError(f"{where} has shape {slot.shape}, but the value given has {array.shape}")
+        flat = np.broadcast_to(array, slot.shape).flat
+        elements = [_scalar(slot.type, item.item() if isinstance(item, np.generic) else item, where) for item in flat]
+        return np.array(elements, dtype=object if slot.type is str else slot.type).reshape(slot.shape)
+    if isinstance(value, np.ndarray | np.generic):
+        if value.ndim:
+            raise ComponentError(f"{where} is a scalar, but an array of shape {value.shape} was given")
+        value = value.item()
+    return _scalar(slot.type, value, where)
+
+
+def _scalar(kind: ScalarType, value: Any, where: str) -> Any:
+    accepted: tuple[type, ...] = (float, int) if kind is float else (kind,)
+    if not isinstance(value, accepted) or (kind is not bool and isinstance(value, bool)):
+        raise ComponentError(f"{where} takes a {kind.__name__}, not {value!r}")
+    if kind is float and not math.isfinite(value):
+        raise ComponentError(f"{where} takes a finite number, not {value!r}")
+    return kind(value)
+
+
+def _length(component: Component, axis: int | Size | SizeExpression) -> int:
+    if isinstance(axis, int):
+        return axis
+    if isinstance(axis, Size):
+        return int(getattr(component, axis.name))
+    return int(getattr(component, axis.size.name)) + axis.offset
+
+
+def _build_argument(cls: type, declaration: Size | Data, given: Any) -> Any:
+    where = f"{cls.__name__}: build argument {declaration.name!r}"
+    if isinstance(declaration, Size):
+        if isinstance(given, bool) or not isinstance(given, int) or given < declaration.minimum:
+            raise ComponentError(f"{where} takes a whole number of at least {declaration.minimum}, not {given!r}")
+        return given
+    if declaration.convert is None:
+        return given
+    try:
+        return declaration.convert(given)
+    except (ValueError, TypeError, KeyError, IndexError) as error:
+        raise ComponentError(f"{where} is unusable: {error}") from error
+
+
+def _shown(declaration: Declaration) -> bool:
+    return isinstance(declaration, State | Memory) and declaration.output
+
+
+def _check_declarations(cls: type[Component]) -> None:
+    for name, declaration in cls.declarations.items():
+        if isinstance(declaration, Tape) and not {"trip", "trip_time"} <= set(cls.declarations):
+            raise ComponentError(f"{cls.__name__} has the tape {name!r} but lacks the inputs 'trip' and 'trip_time'")
+        if isinstance(declaration, State | Tape) and declaration.type is not float:
+            raise ComponentError(f"{cls.__name__}.{name}: a {type(declaration).__name__} is a real number")
+        if hasattr(Component, name) and not isinstance(vars(Component).get(name), Declaration):
+            raise ComponentError(f"{cls.__name__}.{name}: the name belongs to Component; choose another")
+
+
+def _nearest(name: str, known: list[str]) -> str:
+    close = difflib.get_close_matches(name, known, 1)
+    return f"{name!r}" + (f"; did you mean {close[0]!r}?" if close else f"; it has {', '.join(sorted(known))}")

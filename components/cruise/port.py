@@ -1,0 +1,35 @@
+"""The cruise port: what every cooperative cruise controller takes and gives, one controller per train."""
+
+from __future__ import annotations
+
+from abc import ABC
+
+from ..declarations import Input, Output, Parameter
+from ..trains.port import DavisResistance
+
+
+class CruiseController(DavisResistance, ABC):
+    """A cruise controller of one train that hears the trains ahead and behind, and the leader.
+
+    A missing neighbour (``has_ahead`` false, and so on) contributes nothing: its position and speed are not read.
+    """
+
+    position = Input("m", description="position of the own train")
+    speed = Input("m/s", description="speed of the own train")
+    target_speed = Input("m/s", description="speed the trains are asked to run at")
+    ahead_position = Input("m", optional=True, description="position of the train ahead")
+    ahead_speed = Input("m/s", optional=True, description="speed of the train ahead")
+    behind_position = Input("m", optional=True, description="position of the train behind")
+    behind_speed = Input("m/s", optional=True, description="speed of the train behind")
+    leader_position = Input("m", optional=True, description="position of the first train")
+    leader_speed = Input("m/s", optional=True, description="speed of the first train")
+    line_resistance = Input("N/kg", optional=True, description="resistance of slope, curve and tunnel per mass")
+    has_ahead = Input("1", False, optional=True, description="whether there is a train ahead")
+    has_behind = Input("1", False, optional=True, description="whether there is a train behind")
+    has_leader = Input("1", False, optional=True, description="whether the leader is heard")
+
+    mass = Parameter("kg", 400e3, minimum=1.0, description="mass of the own train")
+
+    demand = Output("m/s2", description="demanded acceleration, before resistance is compensated")
+    force = Output("N", description="force for the own train")
+    range_violated = Output("1", bool, description="whether a gap is outside the range the controller is made for")

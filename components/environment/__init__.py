@@ -1,0 +1,1 @@
+"""What surrounds the trains: schedules, wind, line, radio, sensors."""

@@ -1,0 +1,160 @@
+"""The functions equations may use, on floats, arrays and symbols alike.
+
+Scalars go through Python's ``math``, as compiled C goes through its ``libm``; arrays element by element through the
+same functions, so that a number does not depend on whether it stood in an array. Anything else is a symbol (a tracer that
+follows dependencies, or one that records an expression) and is asked to apply the function itself.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Sequence
+from typing import Any
+
+import numpy as np
+
+pi = math.pi
+
+
+class SymbolArray(np.ndarray[Any, Any]):
+    """An object array of symbols: a comparison gives an array of symbols, where NumPy would ask each for its truth."""
+
+    def __lt__(self, other: Any) -> Any:
+        return np.less(self, other, dtype=object)
+
+    def __le__(self, other: Any) -> Any:
+        return np.less_equal(self, other, dtype=object)
+
+    def __gt__(self, other: Any) -> Any:
+        return np.greater(self, other, dtype=object)
+
+    def __ge__(self, other: Any) -> Any:
+        return np.greater_equal(self, other, dtype=object)
+
+    def __eq__(self, other: Any) -> Any:
+        return np.equal(self, other, dtype=object)
+
+    def __ne__(self, other: Any) -> Any:
+        return np.not_equal(self, other, dtype=object)
+
+    __hash__ = None  # type: ignore[assignment]
+
+
+def _map(function: Callable[..., Any], *arguments: Any) -> Any:
+    arrays = np.broadcast_arrays(*(np.asarray(a, dtype=object) for a in arguments))
+    results = [function(*elements) for elements in zip(*(a.flat for a in arrays), strict=True)]
+    plain = all(isinstance(r, bool | int | float | np.generic) for r in results)
+    if plain:
+        return np.array(results).reshape(arrays[0].shape)
+    cells = np.empty(len(results), dtype=object)
+    cells[:] = results
+    return cells.reshape(arrays[0].shape).view(SymbolArray)
+
+
+def _unary(name: str, function: Callable[[float], float], doc: str) -> Callable[[Any], Any]:
+    def apply(x: Any) -> Any:
+        if isinstance(x, float | int):
+            return function(x)
+        if isinstance(x, np.ndarray):
+            return _map(apply, x)
+        return x.apply(name)
+
+    apply.__name__ = name
+    apply.__doc__ = doc
+    return apply
+
+
+sqrt = _unary("sqrt", math.sqrt, "Square root; guard the argument against negative values.")
+exp = _unary("exp", math.exp, "Exponential; guard the argument against overflow (above 709).")
+log = _unary("log", math.log, "Natural logarithm; guard the argument against values <= 0.")
+sin = _unary("sin", math.sin, "Sine of an angle in rad.")
+cos = _unary("cos", math.cos, "Cosine of an angle in rad.")
+tan = _unary("tan", math.tan, "Tangent of an angle in rad.")
+tanh = _unary("tanh", math.tanh, "Hyperbolic tangent.")
+floor = _unary("floor", lambda x: float(math.floor(x)), "Largest whole number not above x, as a real.")
+absolute = _unary("abs", abs, "Absolute value; ``abs(x)`` does the same.")
+
+
+def where(condition: Any, then: Any, otherwise: Any) -> Any:
+    """``then`` where the condition holds, else ``otherwise``. Both are evaluated: guard their arguments."""
+    if isinstance(condition, bool | np.bool_):
+        return then if condition else otherwise
+    if isinstance(condition, np.ndarray):
+        return _map(where, condition, then, otherwise)
+    if any(isinstance(branch, np.ndarray) for branch in (then, otherwise)):
+        return _map(where, condition, then, otherwise)
+    return condition.where(then, otherwise)
+
+
+def minimum(a: Any, b: Any) -> Any:
+    """The smaller of two values, element by element."""
+    return where(b < a, b, a)
+
+
+def maximum(a: Any, b: Any) -> Any:
+    """The larger of two values, element by element."""
+    return where(b > a, b, a)
+
+
+def clip(x: Any, low: Any, high: Any) -> Any:
+    """``x`` held between ``low`` and ``high``."""
+    return minimum(maximum(x, low), high)
+
+
+def sign(x: Any) -> Any:
+    """-1, 0 or 1."""
+    return where(x > 0.0, 1.0, where(x < 0.0, -1.0, 0.0))
+
+
+def logical_and(a: Any, b: Any) -> Any:
+    """Both conditions; ``and`` cannot serve because it asks a symbol for its truth."""
+    return where(a, b, False)
+
+
+def logical_or(a: Any, b: Any) -> Any:
+    """Either condition."""
+    return where(a, True, b)
+
+
+def logical_not(a: Any) -> Any:
+    """The opposite of a condition."""
+    return where(a, False, True)
+
+
+def total(x: Any) -> Any:
+    """Sum of an array's elements from first to last, in that order (NumPy's own sum adds pairwise)."""
+    result: Any = 0.0
+    for element in np.asarray(x).flat:
+        result = result + element
+    return result
+
+
+def piecewise_constant(x: Any, breakpoints: Sequence[Any] | np.ndarray, values: Sequence[Any] | np.ndarray) -> Any:
+    """The value of the last breakpoint not above ``x``; ``values[0]`` before the first one.
+
+    Args:
+        x: where to look up.
+        breakpoints: rising positions, shape (n,).
+        values: value from each breakpoint on, shape (n,).
+    """
+    result = values[0]
+    for position, value in zip(breakpoints[1:], values[1:], strict=True):
+        result = where(x >= position, value, result)
+    return result
+
+
+def piecewise_linear(x: Any, breakpoints: Sequence[Any] | np.ndarray, values: Sequence[Any] | np.ndarray) -> Any:
+    """Linear interpolation between breakpoints, constant outside them.
+
+    Args:
+        x: where to look up.
+        breakpoints: strictly rising positions, shape (n,).
+        values: value at each breakpoint, shape (n,).
+    """
+    result = values[0]
+    for k in range(len(breakpoints) - 1):
+        width = breakpoints[k + 1] - breakpoints[k]
+        width = where(width > 0.0, width, 1.0)
+        fraction = clip((x - breakpoints[k]) / width, 0.0, 1.0)
+        result = where(x >= breakpoints[k], values[k] + fraction * (values[k + 1] - values[k]), result)
+    return result

@@ -1,0 +1,191 @@
+"""The tape: memory along one trip that the next trip reads at the same sample (what iterative learning needs).
+
+Two buffers, one read and one recorded, exchanged when the trip number changes. The file format is plain text, so that
+the same file serves every tool and language: a header line that names the component, the grid and the columns, one
+line per sample with numbers that survive the round trip, and a last line ``end``.
+"""
+
+from __future__ import annotations
+
+import math
+import os
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .component import ComponentError
+
+Rows = NDArray[np.float64]
+_HEADER = "railcosim tape 1"
+
+
+class TapeDeck:
+    """The two buffers of one instance.
+
+    Args:
+        owner: the component's name, for messages and the file's header.
+        start: a row before anything was learned, shape (columns,).
+        sample_time: distance of the samples in s.
+        duration: longest trip in s.
+        cutoff: corner frequency of the low-pass between trips in Hz; 0 is off.
+    """
+
+    def __init__(self, owner: str, start: Rows, sample_time: float, duration: float, cutoff: float) -> None:
+        if sample_time <= 0.0:
+            raise ComponentError(f"{owner}.sample_time must be set: a tape is recorded on a fixed grid")
+        self.owner = owner
+        self.start = start
+        self.sample_time = sample_time
+        self.cutoff = cutoff
+        self.length = round(duration / sample_time) + 1
+        self.committed: Rows = np.tile(start, (self.length, 1))
+        self.recording: Rows = self.committed.copy()
+        self.recorded = False
+        self.trip: int | None = None
+
+    def index(self, trip_time: float) -> int | None:
+        """The sample along the trip; None while waiting (negative trip time).
+
+        Raises:
+            ComponentError: off the sample grid by more than 1 % of a sample, or past the end of the tape.
+        """
+        if trip_time < -0.01 * self.sample_time:
+            return None
+        n = round(trip_time / self.sample_time)
+        if abs(trip_time - n * self.sample_time) > 0.01 * self.sample_time:
+            raise ComponentError(
+                f"{self.owner}: trip_time = {trip_time!r} s is not a multiple of sample_time = {self.sample_time!r} s"
+            )
+        if n >= self.length:
+            raise ComponentError(
+                f"{self.owner}: trip_time = {trip_time!r} s is past the end of the tape; raise tape_duration"
+            )
+        return n
+
+    def read(self, trip_time: float) -> Rows:
+        """What the last committed trip recorded here, shape (columns,); the start row while waiting."""
+        n = self.index(trip_time)
+        return self.start if n is None else self.committed[n]
+
+    def record(self, trip_time: float, row: Rows) -> None:
+        """Store this trip's row; nothing is recorded while waiting."""
+        n = self.index(trip_time)
+        if n is not None:
+            self.recording[n] = row
+            self.recorded = True
+
+    def follow(self, trip: int, trip_time: float, keep: Callable[[], Any]) -> None:
+        """Notice a new trip: commit what was recorded if it is to be kept, drop it otherwise.
+
+        Raises:
+            ComponentError: the trip number changed while the train was under way.
+        """
+        if self.trip is None:
+            self.trip = trip
+        if trip == self.trip:
+            return
+        if trip_time >= 0.0:
+            raise ComponentError(
+                f"{self.owner}: the trip number changed from {self.trip} to {trip} at trip_time = {trip_time!r} s; "
+                "it may change only while trip_time is negative (the wait before a departure)"
+            )
+        self.trip = trip
+        self.commit(keep)
+
+    def commit(self, keep: Callable[[], Any]) -> None:
+        """End a trip: if anything was recorded and is to be kept, the filtered rows become the ones that are read."""
+        if self.recorded and keep():
+            self.committed = smooth(self.recording, self.cutoff, self.sample_time)
+        self.recording = self.committed.copy()
+        self.recorded = False
+
+    def state(self) -> dict[str, Any]:
+        """Everything a restore needs, as JSON-ready values."""
+        return {
+            "trip": self.trip,
+            "recorded": self.recorded,
+            "committed": self.committed.tolist(),
+            "recording": self.recording.tolist(),
+        }
+
+    def restore(self, state: dict[str, Any]) -> None:
+        """Take back what `state` gave."""
+        self.trip, self.recorded = state["trip"], state["recorded"]
+        self.committed = np.array(state["committed"], dtype=np.float64).reshape(self.committed.shape)
+        self.recording = np.array(state["recording"], dtype=np.float64).reshape(self.committed.shape)
+
+    def load(self, path: Path) -> None:
+        """Read a tape file.
+
+        Raises:
+            ComponentError: corrupt, or recorded by another component or on another grid; the message says which.
+        """
+        try:
+            lines = path.read_text(encoding="utf-8").splitlines()
+        except (OSError, UnicodeDecodeError) as error:
+            raise ComponentError(f"{self.owner}.tape_file: {path} cannot be read: {error}") from error
+        expected = self._header()
+        if not lines or not lines[0].startswith(_HEADER):
+            raise ComponentError(f"{self.owner}.tape_file: {path} is not a tape file; remove it to start anew")
+        if lines[0] != expected:
+            raise ComponentError(
+                f"{self.owner}.tape_file: {path} does not fit this instance: it says '{lines[0]}', "
+                f"expected '{expected}'"
+            )
+        try:
+            if lines[-1] != "end" or len(lines) != self.length + 2:
+                raise ValueError("it is cut short")
+            rows = np.array([[float(word) for word in line.split()] for line in lines[1:-1]], dtype=np.float64)
+            if rows.shape != self.committed.shape or not np.isfinite(rows).all():
+                raise ValueError("a row is incomplete or not finite")
+        except ValueError as error:
+            raise ComponentError(f"{self.owner}.tape_file: {path} is corrupt: {error}") from error
+        self.committed, self.recording = rows, rows.copy()
+
+    def save(self, path: Path) -> None:
+        """Write the tape file, whole or not at all."""
+        rows = (" ".join(map(repr, row)) for row in self.committed.tolist())
+        text = "\n".join([self._header(), *rows, "end", ""])
+        part = path.with_name(path.name + ".part")
+        try:
+            part.write_text(text, encoding="utf-8")
+            os.replace(part, path)
+        except OSError as error:
+            raise ComponentError(f"{self.owner}.tape_file: {path} cannot be written: {error}") from error
+
+    def _header(self) -> str:
+        return (
+            f"{_HEADER} component={self.owner} sample_time={self.sample_time!r} "
+            f"rows={self.length} columns={self.start.size}"
+        )
+
+
+def smooth(rows: Rows, cutoff: float, sample_time: float) -> Rows:
+    """First-order low-pass run forward and backward over each column, the ends mirrored (odd reflection).
+
+    Args:
+        rows: shape (samples, columns).
+        cutoff: corner frequency in Hz; 0 returns a copy.
+        sample_time: distance of the samples in s.
+    """
+    if cutoff <= 0.0:
+        return rows.copy()
+    gain = 1.0 - math.exp(-2.0 * math.pi * cutoff * sample_time)
+    # Ten time constants of run-in leave less than 5e-5 of the start value in the result.
+    pad = min(len(rows) - 1, math.ceil(10.0 / gain))
+    padded = np.concatenate([2.0 * rows[0] - rows[pad:0:-1], rows, 2.0 * rows[-1] - rows[-2 : -pad - 2 : -1]])
+    for direction in (1, -1):
+        padded = _low_pass(padded[::direction], gain)[::direction]
+    return np.array(padded[pad : pad + len(rows)])
+
+
+def _low_pass(rows: Rows, gain: float) -> Rows:
+    smoothed = np.empty_like(rows)
+    value = rows[0]
+    for k, row in enumerate(rows):
+        value = value + gain * (row - value)
+        smoothed[k] = value
+    return smoothed

@@ -1,0 +1,123 @@
+"""Which outputs depend on which inputs, found by running the equations on values that remember where they came from."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+
+from .component import Component, ComponentError
+from .declarations import Input, Memory, Output, Parameter, State, Tape
+from .maths import SymbolArray
+
+Names = frozenset[str]
+
+
+class TracingError(ComponentError):
+    """An equation did something with a value that only works on plain numbers."""
+
+
+class Traced:
+    """A value that carries the names it was computed from, and stands in for a number in the equations."""
+
+    __slots__ = ("names",)
+    __array_priority__ = 1000.0
+    __hash__ = None  # type: ignore[assignment]
+
+    def __init__(self, names: Names) -> None:
+        self.names = names
+
+    def _join(self, *others: Any) -> Any:
+        if any(isinstance(other, np.ndarray) for other in others):
+            return NotImplemented
+        return Traced(self.names.union(*(other.names for other in others if isinstance(other, Traced))))
+
+    def apply(self, function: str) -> Traced:
+        """The result of a unary function of `maths`."""
+        return self
+
+    def where(self, then: Any, otherwise: Any) -> Any:
+        """The result of a choice on this value."""
+        return self._join(then, otherwise)
+
+    def _refuse(self, *_: Any) -> Any:
+        raise TracingError(
+            "a value was asked for its truth or turned into a plain number: use railcosim.components.maths "
+            "(where, tanh, clip, logical_and, ...) instead of if, and, or, float() or the math module"
+        )
+
+    __add__ = __radd__ = __sub__ = __rsub__ = __mul__ = __rmul__ = __truediv__ = __rtruediv__ = _join
+    __pow__ = __rpow__ = __mod__ = __rmod__ = __floordiv__ = __rfloordiv__ = _join
+    __lt__ = __le__ = __gt__ = __ge__ = _join
+    __eq__ = __ne__ = _join
+    __neg__ = __pos__ = __abs__ = _join
+    __bool__ = __float__ = __int__ = __index__ = _refuse
+
+
+def dependencies(component: Component) -> dict[str, Names]:
+    """For each scalar of ``outputs``: the inputs, states, memory and parameters (and ``"time"``) it is computed from.
+
+    Raises:
+        TracingError: the equations treat values as plain numbers; the message names component, method and remedy.
+    """
+    probe = _traced_copy(component)
+    return _collect(component, "outputs", probe.outputs, Output)
+
+
+def initial_dependencies(component: Component) -> tuple[dict[str, Names], dict[str, Names]]:
+    """The same for the initial state: of what ``initial`` computes, and of the outputs that follow from it."""
+    probe = _traced_copy(component)
+    computed = _collect(component, "initial", probe.initial, State, Memory)
+    for slot in probe.of(State, Memory):
+        if slot.scalars[0] in computed:
+            cells = [Traced(computed[name]) for name in slot.scalars]
+            probe.__dict__[slot.name] = _cells(cells, slot.shape)
+    return computed, _collect(component, "outputs", probe.outputs, Output)
+
+
+def feedthrough(component: Component) -> dict[str, Names]:
+    """For each scalar output: the scalar inputs it depends on directly; none for a state or memory shown as output."""
+    inputs = {name for slot in component.of(Input) for name in slot.scalars}
+    direct = {name: sources & inputs for name, sources in dependencies(component).items()}
+    return {name: direct.get(name, frozenset()) for slot in component.output_slots for name in slot.scalars}
+
+
+def _traced_copy(component: Component) -> Component:
+    probe = type(component)(**component.build_arguments)
+    for slot in probe.of(Input, Parameter, State, Memory, Tape):
+        if slot.type is str:
+            continue
+        if isinstance(slot.declaration, Tape):
+            # What a tape reads depends on where along the trip the component is.
+            cells = [Traced(frozenset({"trip_time"})) for _ in slot.scalars]
+        else:
+            cells = [Traced(frozenset({name})) for name in slot.scalars]
+        probe.__dict__[slot.name] = _cells(cells, slot.shape)
+    probe.__dict__["time"] = Traced(frozenset({"time"}))
+    return probe
+
+
+def _cells(cells: list[Traced], shape: tuple[int, ...]) -> Any:
+    if not shape:
+        return cells[0]
+    array = np.empty(len(cells), dtype=object)
+    array[:] = cells
+    return array.reshape(shape).view(SymbolArray)
+
+
+def _collect(
+    component: Component, method: str, call: Callable[[], dict[str, Any]], *kinds: type[Output | State | Memory]
+) -> dict[str, Names]:
+    try:
+        returned = call()
+    except TracingError as error:
+        raise TracingError(f"{type(component).__name__}.{method}: {error}") from error
+    slots = {slot.name: slot for slot in component.of(*kinds)}
+    found: dict[str, Names] = {}
+    for name, value in returned.items():
+        if name in slots:
+            flat = np.broadcast_to(np.asarray(value, dtype=object), slots[name].shape).flat
+            for scalar, cell in zip(slots[name].scalars, flat, strict=True):
+                found[scalar] = cell.names if isinstance(cell, Traced) else frozenset()
+    return found

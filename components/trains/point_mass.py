@@ -1,0 +1,43 @@
+"""A train as one rigid mass."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from ..component import Values
+from ..declarations import Output, Parameter, State
+from ..maths import clip, where
+from .port import DavisResistance, Train
+
+
+class PointMassTrain(DavisResistance, Train):
+    """A train as a point mass with Davis resistance on a straight, level line (Wang et al. 2020, eqs. 1-2).
+
+    m dv/dt = F - m R(v) - m r_line + m a_disturbance, with R(v) = c0 + c1 v + c2 v^2. As in the source, the
+    resistance formula is used at every speed: a train that is pushed backwards is not modelled beyond that.
+    """
+
+    source = "Wang et al. 2020, eqs. 1-2, Tables 2-3"
+
+    mass = Parameter("kg", 400e3, minimum=1.0, description="mass of the train")
+    limit_force = Parameter("1", False, description="whether the two force limits act")
+    traction_limit = Parameter("N", 600e3, minimum=0.0, description="largest traction force, where limits act")
+    braking_limit = Parameter("N", 600e3, minimum=0.0, description="largest braking force, where limits act")
+
+    position = State("m", 0.0, output=True, description="position of the front, growing in the running direction")
+    speed = State("m/s", 0.0, output=True, description="speed")
+    acceleration = Output("m/s2", description="net acceleration")
+    applied_force = Output("N", description="force at the wheels after the limits")
+
+    def derivatives(self) -> Values:
+        return {"position": self.speed, "speed": self._acceleration()}
+
+    def outputs(self) -> Values:
+        return {"acceleration": self._acceleration(), "applied_force": self._applied_force()}
+
+    def _applied_force(self) -> Any:
+        return where(self.limit_force, clip(self.force, -self.braking_limit, self.traction_limit), self.force)
+
+    def _acceleration(self) -> Any:
+        resistance = self._davis(self.speed) + self.line_resistance
+        return self._applied_force() / self.mass - resistance + self.disturbance

@@ -1,0 +1,1 @@
+"""How a component becomes an FMU."""

@@ -1,0 +1,1 @@
+"""Scenarios, lines and rolling stock: data, no code."""

@@ -1,0 +1,114 @@
+"""`System`: instances of FMUs, connections and start values, the one in-memory description of what is simulated."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import Any, Literal
+
+Algorithm = Literal["gauss-seidel", "jacobi"]
+ALGORITHMS: tuple[Algorithm, ...] = ("gauss-seidel", "jacobi")
+
+
+@dataclass
+class Instance:
+    """One FMU in the system.
+
+    Attributes:
+        name: ``"gust"``, or ``"train[2]"`` where the scenario gives a count.
+        model: a catalogue name, ``"path/to/any.fmu"``, or ``"my_file.py:MyClass"``.
+        build: build arguments by name.
+        start: parameters and start values by variable name (``"alpha"``, ``"force"`` for a whole array, ``"force[2]"``).
+            Text is an expression of ``i`` and ``count`` unless the variable is a string.
+        index: 1-based place among its siblings; None where there is no count.
+        count: how many siblings, itself included.
+        swapped: whether another model stands here than the scenario wrote; start values it lacks are then dropped.
+        origin: where it was written, for messages.
+    """
+
+    name: str
+    model: str
+    build: dict[str, Any] = field(default_factory=dict)
+    start: dict[str, Any] = field(default_factory=dict)
+    index: int | None = None
+    count: int = 1
+    swapped: bool = False
+    origin: str = ""
+
+
+@dataclass
+class Connection:
+    """``target`` (an input) follows ``source`` (an output): ``scale * value + offset``, after converting units.
+
+    Attributes:
+        source: ``"cruise[1].force"``; a whole array by its bare name.
+        target: ``"train[1].force"``.
+        delay: how many communication points older the value is than it would be without.
+        origin: where it was written, for messages.
+    """
+
+    source: str
+    target: str
+    delay: int = 0
+    scale: float = 1.0
+    offset: float = 0.0
+    origin: str = ""
+
+
+@dataclass
+class System:
+    """What is simulated and how.
+
+    Attributes:
+        stop_time: end in s.
+        step: communication step in s.
+        record: distance of recorded points in s; None records every step.
+        order: instance names in the order they step; empty derives it from direct feed-through.
+        requirements, metrics: texts by name. published, figures: tables as the scenario has them.
+        preset: the preset in force; None for the file as it stands.
+        modified: whether anything was changed beyond file and preset, so that published values are not judged.
+        text: the scenario as read, for the record of the run.
+    """
+
+    title: str = ""
+    source: str = ""
+    stop_time: float = 1.0
+    step: float = 0.1
+    start_time: float = 0.0
+    record: float | None = None
+    algorithm: Algorithm = "gauss-seidel"
+    seed: int = 0
+    order: list[str] = field(default_factory=list)
+    instances: dict[str, Instance] = field(default_factory=dict)
+    connections: list[Connection] = field(default_factory=list)
+    requirements: dict[str, str] = field(default_factory=dict)
+    metrics: dict[str, str] = field(default_factory=dict)
+    published: list[dict[str, Any]] = field(default_factory=list)
+    figures: list[dict[str, Any]] = field(default_factory=list)
+    preset: str | None = None
+    modified: bool = False
+    name: str = "system"
+    path: str = ""
+    text: str = ""
+
+    def add(self, name: str, model: str, build: dict[str, Any] | None = None, **start: Any) -> Instance:
+        """Add one instance; keyword arguments are parameters and start values.
+
+        Args:
+            name: its name in connections and results.
+            model: a catalogue name, a path ending in ``.fmu``, or ``"file.py:Class"``.
+            build: build arguments.
+        """
+        if name in self.instances:
+            raise ValueError(f"the system already has an instance {name!r}")
+        self.instances[name] = Instance(name, model, dict(build or {}), dict(start))
+        return self.instances[name]
+
+    def connect(self, source: str, target: str, delay: int = 0, scale: float = 1.0, offset: float = 0.0) -> None:
+        """Let an input follow an output; both are written ``"instance.variable"``."""
+        self.connections.append(Connection(source, target, delay, scale, offset))
+
+
+def split(reference: str) -> tuple[str, str]:
+    """``"train[1].force"`` -> ``("train[1]", "force")``; the variable part is empty where there is no dot."""
+    instance, _, variable = reference.partition(".")
+    return instance, variable
