@@ -1,0 +1,170 @@
+"""Building FMUs: what the command line and the orchestrator call. Built once, then taken from a cache by content."""
+
+from __future__ import annotations
+
+import difflib
+import hashlib
+import importlib.util
+import os
+import sys
+import tempfile
+import zipfile
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from types import ModuleType
+from typing import Any
+
+import platformdirs
+
+from ..components import CATALOGUE, Component, ComponentError, Simulation
+from . import python_fmu
+from .description import Kind
+
+_EPOCH = (1980, 1, 1, 0, 0, 0)
+"""The earliest time a zip can hold: archives of equal content are equal files."""
+
+
+@dataclass(frozen=True)
+class Plain:
+    """A component in this process, without packaging: its description, and a `Simulation` for each instance."""
+
+    component: type[Component]
+    arguments: Mapping[str, Any]
+    description: bytes
+
+    def instantiate(self) -> Simulation:
+        """A new instance."""
+        return Simulation(self.component(**self.arguments))
+
+
+def resolve(reference: str, folder: Path | None = None) -> type[Component]:
+    """The component behind a catalogue name or ``"file.py:Class"``.
+
+    Args:
+        reference: what a scenario or the command line says.
+        folder: where a relative file path starts; the current folder by default.
+
+    Raises:
+        ComponentError: no such name, file or class; the message suggests the nearest one.
+    """
+    path, colon, name = reference.rpartition(":")
+    if not colon or not path.endswith(".py"):
+        if reference in CATALOGUE:
+            return CATALOGUE[reference]
+        raise ComponentError(
+            f"there is no component {_nearest(reference, CATALOGUE)}; a component of your own is written file.py:Class"
+        )
+    module = _load_file((folder or Path()) / path)
+    found = {k: v for k, v in vars(module).items() if isinstance(v, type) and issubclass(v, Component)}
+    own = {k: v for k, v in found.items() if v.__module__ == module.__name__}
+    if name not in own:
+        raise ComponentError(f"{path} has no component {_nearest(name, own)}")
+    return own[name]
+
+
+def build(
+    reference: str,
+    arguments: Mapping[str, Any] | None = None,
+    *,
+    kind: Kind = "python",
+    folder: Path | None = None,
+) -> Path:
+    """The FMU of a component, built if the cache does not have it.
+
+    Args:
+        reference: catalogue name or ``"file.py:Class"``.
+        arguments: build arguments (`Size`, `Data`) by name.
+        kind: ``"python"``.
+        folder: where a relative file path starts.
+
+    Returns:
+        Path of the FMU in the user's cache; copy it to keep it.
+
+    Raises:
+        ComponentError: the component or its arguments are unusable.
+    """
+    component = resolve(reference, folder)(**(arguments or {}))
+    return build_component(component, kind)
+
+
+def build_component(component: Component, kind: Kind = "python") -> Path:
+    """The same for a component at hand; its values become the FMU's start values."""
+    archive, digest = python_fmu.contents(component)
+    target = cache_folder() / digest[:32] / f"{type(component).__name__}.fmu"
+    if not target.exists():
+        write_archive(archive, target)
+    return target
+
+
+def plain(reference: str, arguments: Mapping[str, Any] | None = None, *, folder: Path | None = None) -> Plain:
+    """A component to run in this process as Python objects, for a debugger."""
+    cls = resolve(reference, folder)
+    archive, _ = python_fmu.contents(cls(**(arguments or {})))
+    return Plain(cls, dict(arguments or {}), archive["modelDescription.xml"])
+
+
+def cache_folder() -> Path:
+    """Where built FMUs are kept: ``RAILCOSIM_CACHE``, or the user's cache directory."""
+    chosen = os.environ.get("RAILCOSIM_CACHE")
+    return (Path(chosen) if chosen else Path(platformdirs.user_cache_dir("railcosim", appauthor=False))) / "fmus"
+
+
+def write_archive(archive: Mapping[str, bytes], target: Path) -> None:
+    """Write an FMU, whole or not at all; the same content gives the same bytes."""
+    target.parent.mkdir(parents=True, exist_ok=True)
+    handle, name = tempfile.mkstemp(suffix=".part", dir=target.parent)
+    try:
+        with os.fdopen(handle, "wb") as stream, zipfile.ZipFile(stream, "w", zipfile.ZIP_DEFLATED) as fmu:
+            for path in sorted(archive):
+                entry = zipfile.ZipInfo(path, _EPOCH)
+                entry.compress_type = zipfile.ZIP_DEFLATED
+                entry.external_attr = 0o644 << 16
+                fmu.writestr(entry, archive[path])
+        os.chmod(name, 0o644)
+        os.replace(name, target)
+    except BaseException:
+        Path(name).unlink(missing_ok=True)
+        raise
+
+
+def _load_file(path: Path) -> ModuleType:
+    """Run a user's component file as a module of its own; its neighbours import as they would from its folder."""
+    path = path.resolve()
+    if not path.is_file():
+        raise ComponentError(f"there is no file {path}")
+    content = path.read_bytes()
+    name = f"railcosim_user_{hashlib.sha256(str(path).encode() + b':' + content).hexdigest()[:16]}"
+    if name in sys.modules:
+        return sys.modules[name]
+    spec = importlib.util.spec_from_file_location(name, path)
+    if spec is None or spec.loader is None:
+        raise ComponentError(f"{path} cannot be read as Python")
+    module = importlib.util.module_from_spec(spec)
+    sys.modules[name] = module
+    sys.path.insert(0, str(path.parent))
+    try:
+        spec.loader.exec_module(module)
+    except Exception as error:
+        del sys.modules[name]
+        line = getattr(error, "lineno", None) or _line_in(error, path)
+        raise ComponentError(f"{path}{f':{line}' if line else ''}: {type(error).__name__}: {error}") from error
+    finally:
+        sys.path.remove(str(path.parent))
+    return module
+
+
+def _line_in(error: BaseException, path: Path) -> int | None:
+    line, trace = None, error.__traceback__
+    while trace is not None:
+        if trace.tb_frame.f_code.co_filename == str(path):
+            line = trace.tb_lineno
+        trace = trace.tb_next
+    return line
+
+
+def _nearest(name: str, known: Mapping[str, Any]) -> str:
+    close = difflib.get_close_matches(name, known, 1)
+    if close:
+        return f"{name!r}; did you mean {close[0]!r}?"
+    return f"{name!r}; there is {', '.join(sorted(known)) or 'none'}"
