@@ -32,7 +32,7 @@ class Instance:
     index: int | None = None
     count: int = 1
     swapped: bool = False
-    origin: str = ""
+    origin: str = field(default="", compare=False)
 
 
 @dataclass
@@ -51,7 +51,7 @@ class Connection:
     delay: int = 0
     scale: float = 1.0
     offset: float = 0.0
-    origin: str = ""
+    origin: str = field(default="", compare=False)
 
 
 @dataclass
@@ -64,13 +64,18 @@ class System:
         record: distance of recorded points in s; None records every step.
         order: instance names in the order they step; empty derives it from direct feed-through.
         requirements, metrics: texts by name. published, figures: tables as the scenario has them.
-        preset: the preset in force; None for the file as it stands.
+        preset: the preset in force (``default_preset`` for the file as it stands); None where that has no name.
+        presets: every name a preset may be asked for by. default_preset: the one that means the file as it stands.
         modified: whether anything was changed beyond file and preset, so that published values are not judged.
-        text: the scenario as read, for the record of the run.
+        rescaled_from: the step in s before `--step` changed it: every sample time equal to it follows the step.
+        name, path: of the scenario file. text: the scenario as read, for the record of the run.
+        origins: where things were written, for messages: by ``"train[1]"``, ``"train[1].speed"`` (a start value),
+            ``"simulation.step"``, ``"require.comfort"``, ``"metrics.settling"``, ``"published[1]"``, ``"figures[1]"``.
     """
 
     title: str = ""
     source: str = ""
+    description: str = ""
     stop_time: float = 1.0
     step: float = 0.1
     start_time: float = 0.0
@@ -85,10 +90,14 @@ class System:
     published: list[dict[str, Any]] = field(default_factory=list)
     figures: list[dict[str, Any]] = field(default_factory=list)
     preset: str | None = None
-    modified: bool = False
-    name: str = "system"
-    path: str = ""
-    text: str = ""
+    presets: tuple[str, ...] = field(default=(), compare=False)
+    default_preset: str | None = field(default=None, compare=False)
+    modified: bool = field(default=False, compare=False)
+    rescaled_from: float | None = field(default=None, compare=False)
+    name: str = field(default="system", compare=False)
+    path: str = field(default="", compare=False)
+    text: str = field(default="", compare=False, repr=False)
+    origins: dict[str, str] = field(default_factory=dict, compare=False, repr=False)
 
     def add(self, name: str, model: str, build: dict[str, Any] | None = None, **start: Any) -> Instance:
         """Add one instance; keyword arguments are parameters and start values.

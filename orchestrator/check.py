@@ -1,0 +1,127 @@
+"""Everything that can be known to be wrong, or worth knowing, before a step is taken."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+from .archive import Workspace
+from .errors import ScenarioError, did_you_mean
+from .interface import Interface
+from .loading import Kind, Model, load_models
+from .metrics import check_metrics, metric_indices
+from .order import Order, derive
+from .plots import check_figures
+from .published import check_published
+from .requirements import check_requirements
+from .system import ALGORITHMS, System
+from .wiring import Wiring, wire
+
+
+@dataclass(frozen=True)
+class Checked:
+    """A system found fit to run.
+
+    Attributes:
+        models: by instance name. wiring: start values and scalar connections. order: how a sweep steps.
+        notes: what a user should know though it is not an error.
+    """
+
+    models: Mapping[str, Model]
+    wiring: Wiring
+    order: Order
+    notes: tuple[str, ...]
+
+
+def check(system: System, workspace: Workspace, kind: Kind = "python") -> Checked:
+    """Check a system as a whole.
+
+    Raises:
+        ScenarioError: with every problem found, each naming its place and the remedy.
+    """
+    problems = _check_simulation(system)
+    try:
+        models = load_models(system, workspace, kind)
+    except ScenarioError as error:
+        raise ScenarioError([*problems, *error.problems]) from error
+    interfaces = {name: model.interface for name, model in models.items()}
+    wiring = wire(system, interfaces)
+    problems += wiring.problems
+    problems += _check_once_per_process(interfaces)
+    names = signal_names(interfaces, wiring)
+    every_step = system.record is None or abs(system.record - system.step) < 1e-9 * system.step
+    problems += check_requirements(system.requirements, names, every_step)
+    found = check_metrics(system.metrics, names, every_step)
+    problems += found
+    if not found:
+        problems += check_published(system.published, metric_indices(system.metrics, names), system.presets)
+    problems += check_figures(system.figures, names, every_step)
+    if problems:
+        raise ScenarioError(problems)
+    order = derive(list(system.instances), wiring.links, system.order)
+    return Checked(models, wiring, order, tuple(_notes(system, interfaces, wiring, order)))
+
+
+def signal_names(interfaces: Mapping[str, Interface], wiring: Wiring) -> list[str]:
+    """What expressions may speak of: everything that will be recorded, and every parameter."""
+    sources = {link.source for link in wiring.links}
+    return [
+        f"{instance}.{variable.name}"
+        for instance, interface in interfaces.items()
+        for variable in interface.variables.values()
+        if variable.causality in ("output", "parameter") or (instance, variable.name) in sources
+    ]
+
+
+def _check_simulation(system: System) -> list[str]:
+    problems = []
+    if not system.instances:
+        problems.append("the system has no instances")
+    if system.algorithm not in ALGORITHMS:
+        problems.append(f"algorithm {system.algorithm!r} is unknown{did_you_mean(system.algorithm, ALGORITHMS)}")
+    if not system.step > 0.0:
+        problems.append(f"step must be positive, not {system.step!r} s")
+        return problems
+    if not system.stop_time > system.start_time:
+        problems.append(f"stop_time {system.stop_time!r} s must lie after start_time {system.start_time!r} s")
+    for name, length in (("stop_time", system.stop_time - system.start_time), ("record", system.record or system.step)):
+        count = length / system.step
+        if round(count) < 1 or abs(count - round(count)) > 1e-6:
+            problems.append(f"{name} is not a whole multiple of step = {system.step:g} s")
+    if system.order:
+        missing = [name for name in system.instances if name not in system.order]
+        unknown = [name for name in system.order if name not in system.instances]
+        problems += [f"order: there is no instance {n!r}{did_you_mean(n, system.instances)}" for n in unknown]
+        problems += [f"order: {n!r} is missing" for n in missing]
+        problems += [f"order: {n!r} stands twice" for n in dict.fromkeys(system.order) if system.order.count(n) > 1]
+    return problems
+
+
+def _check_once_per_process(interfaces: Mapping[str, Interface]) -> list[str]:
+    users: dict[str, list[str]] = {}
+    for name, interface in interfaces.items():
+        if interface.single_instance:
+            users.setdefault(interface.guid, []).append(name)
+    return [
+        f"{', '.join(names)}: this FMU can be instantiated only once per process"
+        for names in users.values()
+        if len(names) > 1
+    ]
+
+
+def _notes(system: System, interfaces: Mapping[str, Interface], wiring: Wiring, order: Order) -> list[str]:
+    notes: dict[str, None] = dict.fromkeys(wiring.notes)
+    seen = {interface.model: interface for interface in interfaces.values()}
+    for model, interface in seen.items():
+        notes.update(dict.fromkeys(interface.warnings))
+        silent = [v.name for v in interface.of("output") if v.dependencies is None]
+        if silent and interface.of("input"):
+            taken = "all" if interface.vendor else "no"
+            notes[
+                f"{model} lists no dependencies of {', '.join(silent[:4])}; {taken} direct feed-through is assumed"
+            ] = None
+        if interface.needs_tool and not interface.vendor:
+            notes[f"{model} says that it needs the tool it was made with ({interface.generator or 'unnamed'})"] = None
+    if system.algorithm == "gauss-seidel":
+        notes.update(dict.fromkeys(order.late))
+    return list(notes)

@@ -1,0 +1,62 @@
+"""The errors of this package: one small family, each also the builtin a caller would catch."""
+
+import difflib
+from collections.abc import Iterable, Sequence
+
+
+class RailcosimError(Exception):
+    """Root of every error this project raises on purpose."""
+
+
+class ScenarioError(RailcosimError, ValueError):
+    """The user's input is wrong. `problems` holds one sentence per mistake; `str()` lists them all."""
+
+    def __init__(self, problems: str | Sequence[str]) -> None:
+        self.problems: list[str] = [problems] if isinstance(problems, str) else list(problems)
+        super().__init__(self.problems)
+
+    def __str__(self) -> str:
+        return "\n".join(self.problems)
+
+
+class ExpressionError(ScenarioError):
+    """An expression cannot be read, or not be evaluated with the signals at hand."""
+
+
+class WindowError(ExpressionError):
+    """A time window that the recorded points do not cover: a value for it would be a guess."""
+
+
+class UnitError(ScenarioError):
+    """Two units that cannot be converted into one another, or a unit nobody defined."""
+
+
+class FmuFileError(RailcosimError, ValueError):
+    """An archive that cannot be used as an FMU."""
+
+
+class FmuError(RailcosimError, RuntimeError):
+    """An FMU failed while it ran.
+
+    Attributes: `instance` (its name in the scenario), `time` [s] or None when before the start, `status`
+    (the FMI status in words), `log` (what it said, oldest line first).
+    """
+
+    def __init__(
+        self, message: str, *, instance: str = "", time: float | None = None, status: str = "", log: Sequence[str] = ()
+    ) -> None:
+        super().__init__(message)
+        self.instance, self.time, self.status, self.log = instance, time, status, list(log)
+
+    def __str__(self) -> str:
+        where = [self.instance] if self.instance else []
+        where += [f"t = {self.time:g} s"] if self.time is not None else []
+        where += [f"status {self.status}"] if self.status else []
+        head = f"{', '.join(where)}: " if where else ""
+        return "\n".join([f"{head}{super().__str__()}", *(f"    {line}" for line in self.log)])
+
+
+def did_you_mean(word: str, valid: Iterable[str], *, cutoff: float = 0.6) -> str:
+    """A clause to append to an error: `"; did you mean 'x'?"` with the nearest valid name, or nothing."""
+    nearest = difflib.get_close_matches(word, list(valid), n=1, cutoff=cutoff)
+    return f"; did you mean '{nearest[0]}'?" if nearest else ""

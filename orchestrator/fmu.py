@@ -1,0 +1,303 @@
+"""One model instance behind a small face: set, step, get. An FMU (FMPy underneath), or a component in this process."""
+
+from __future__ import annotations
+
+import ctypes
+import os
+import sys
+from collections import deque
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any, Protocol
+
+import fmpy
+from fmpy.fmi2 import FMU2Slave, fmi2CallbackFunctions, fmi2CallbackLoggerTYPE
+from fmpy.fmi2 import defaultCallbacks as _default_callbacks
+from fmpy.logging import addLoggerProxy
+
+from ..components.component import ComponentError
+from ..components.simulate import Simulation
+from .errors import FmuError
+from .interface import Interface, Type
+
+STATUS = ("ok", "warning", "discard", "error", "fatal", "pending")
+_WARNING, _FATAL = 1, 4
+_LOG_LINES = 50
+_C_TYPES: dict[str, Any] = {
+    "Real": ctypes.c_double,
+    "Integer": ctypes.c_int,
+    "Enumeration": ctypes.c_int,
+    "Boolean": ctypes.c_int,
+    "String": ctypes.c_char_p,
+}
+_SUFFIX = {"Enumeration": "Integer"}
+
+
+class Channel(Protocol):
+    """Some variables of one type of one instance, prepared for being set or read together."""
+
+    def set(self, values: Sequence[Any]) -> None:
+        """Set all of them."""
+
+    def get(self) -> list[Any]:
+        """Read all of them."""
+
+
+class Slave(Protocol):
+    """One instance. Every method raises `FmuError` with instance, time, status and log when the model fails."""
+
+    name: str
+    interface: Interface
+    time: float
+
+    def setup(self, start_time: float, stop_time: float) -> None:
+        """Announce the experiment and enter nothing yet."""
+
+    def enter_initialization(self) -> None:
+        """Enter initialization mode."""
+
+    def exit_initialization(self) -> None:
+        """Leave initialization mode: the first step may follow."""
+
+    def channel(self, kind: Type, names: Sequence[str]) -> Channel:
+        """Prepare variables of one type for being set or read together."""
+
+    def step(self, time: float, length: float) -> None:
+        """Advance from ``time`` by ``length``."""
+
+    def terminate(self) -> None:
+        """End the run."""
+
+    def free(self) -> None:
+        """Give everything back; nothing may follow. Never raises."""
+
+
+class FmuSlave:
+    """An FMU loaded into this process.
+
+    Args:
+        name: the instance's name in the system.
+        interface: its interface.
+        folder: where the FMU was unpacked.
+    """
+
+    def __init__(self, name: str, interface: Interface, folder: Path) -> None:
+        self.name = name
+        self.interface = interface
+        self.time = 0.0
+        self.log: deque[str] = deque(maxlen=_LOG_LINES)
+        self._dead = False
+        here = os.getcwd()
+        try:
+            self._fmu = FMU2Slave(
+                guid=interface.guid,
+                unzipDirectory=str(folder),
+                modelIdentifier=interface.identifier,
+                instanceName=name,
+                libraryPath=str(library(folder, interface, name)),
+            )
+            self._callbacks = self._make_callbacks()
+            self._fmu.instantiate(callbacks=self._callbacks)
+        except FmuError:
+            raise
+        except Exception as error:
+            raise FmuError(f"cannot be instantiated: {error}", instance=name, log=list(self.log)) from error
+        finally:
+            os.chdir(here)
+        self._component = self._fmu.component
+        self._do_step = self._function("fmi2DoStep", [ctypes.c_void_p, ctypes.c_double, ctypes.c_double, ctypes.c_int])
+
+    def _make_callbacks(self) -> Any:
+        def logger(_: Any, instance: bytes, status: int, category: bytes, message: bytes) -> None:
+            label = STATUS[status] if 0 <= status < len(STATUS) else str(status)
+            self.log.append(f"[{label}] {(message or b'').decode(errors='replace')}")
+
+        callbacks = fmi2CallbackFunctions()
+        callbacks.logger = fmi2CallbackLoggerTYPE(logger)
+        callbacks.allocateMemory = _default_callbacks.allocateMemory
+        callbacks.freeMemory = _default_callbacks.freeMemory
+        addLoggerProxy(ctypes.byref(callbacks))
+        return callbacks
+
+    def _function(self, name: str, argtypes: list[Any]) -> Any:
+        # FMPy's own methods check and log in Python at every call; in the step loop we call the library directly.
+        function = getattr(self._fmu.dll, name)
+        function.argtypes, function.restype = argtypes, ctypes.c_int
+        return function
+
+    def check(self, call: str, status: int) -> None:
+        """Raise unless the status of a call is ok or warning."""
+        if status <= _WARNING:
+            return
+        self._dead = True
+        what = "discarded the step" if (call, status) == ("fmi2DoStep", 2) else f"{call} failed"
+        if status == len(STATUS) - 1:
+            what = f"{call} is pending: asynchronous FMUs are not supported"
+        label = STATUS[status] if 0 <= status < len(STATUS) else f"{status} (unknown)"
+        raise FmuError(what, instance=self.name, time=self.time, status=label, log=list(self.log))
+
+    def _call(self, name: str, *arguments: Any) -> None:
+        try:
+            getattr(self._fmu, name)(self._component, *arguments)
+        except Exception as error:
+            self.check(name, getattr(error, "status", _FATAL))
+
+    def setup(self, start_time: float, stop_time: float) -> None:
+        self.time = start_time
+        self._call("fmi2SetupExperiment", 0, 0.0, start_time, 1, stop_time)
+
+    def enter_initialization(self) -> None:
+        self._call("fmi2EnterInitializationMode")
+
+    def exit_initialization(self) -> None:
+        self._call("fmi2ExitInitializationMode")
+
+    def channel(self, kind: Type, names: Sequence[str]) -> Channel:
+        return _FmuChannel(self, kind, [self.interface.variables[name].reference for name in names])
+
+    def step(self, time: float, length: float) -> None:
+        self.time = time
+        status = self._do_step(self._component, time, length, 1)
+        if status:
+            self.check("fmi2DoStep", status)
+
+    def terminate(self) -> None:
+        self._call("fmi2Terminate")
+
+    def free(self) -> None:
+        self._fmu.freeInstance()
+
+
+class _FmuChannel:
+    def __init__(self, slave: FmuSlave, kind: Type, references: Sequence[int]) -> None:
+        count = len(references)
+        suffix = _SUFFIX.get(kind, kind)
+        signature = [ctypes.c_void_p, ctypes.c_void_p, ctypes.c_size_t, ctypes.c_void_p]
+        self._slave = slave
+        self._component = slave._component
+        self._names = f"fmi2Set{suffix}", f"fmi2Get{suffix}"
+        self._set = slave._function(self._names[0], signature)
+        self._get = slave._function(self._names[1], signature)
+        self._references = (ctypes.c_uint * count)(*references)
+        self._values = (_C_TYPES[kind] * count)()
+        self._count = count
+        self._text = kind == "String"
+
+    def set(self, values: Sequence[Any]) -> None:
+        self._values[:] = [v.encode() for v in values] if self._text else values
+        status = self._set(self._component, self._references, self._count, self._values)
+        if status:
+            self._slave.check(self._names[0], status)
+
+    def get(self) -> list[Any]:
+        status = self._get(self._component, self._references, self._count, self._values)
+        if status:
+            self._slave.check(self._names[1], status)
+        if self._text:
+            return [(v or b"").decode(errors="replace") for v in self._values]
+        return list(self._values)
+
+
+def library(folder: Path, interface: Interface, name: str) -> Path:
+    """The shared library of an unpacked FMU for this platform, even if it is not named after the model.
+
+    Raises:
+        FmuError: there is none; the message says for which platforms there are.
+    """
+    binaries = folder / "binaries"
+    place = binaries / fmpy.platform
+    expected = place / f"{interface.identifier}{fmpy.sharedLibraryExtension}"
+    if expected.is_file():
+        return expected
+    others = sorted(place.glob(f"*{fmpy.sharedLibraryExtension}")) if place.is_dir() else []
+    if len(others) == 1:
+        return others[0]
+    found = sorted(p.name for p in binaries.iterdir() if any(p.iterdir())) if binaries.is_dir() else []
+    raise FmuError(
+        f"has no binary for {fmpy.platform}; the FMU brings {', '.join(found) or 'none at all'}", instance=name
+    )
+
+
+class PlainSlave:
+    """A component as Python objects in this process: slower to fail, easy to debug, the same numbers."""
+
+    def __init__(self, name: str, interface: Interface, simulation: Simulation) -> None:
+        self.name = name
+        self.interface = interface
+        self.time = 0.0
+        self.simulation = simulation
+
+    def _fail(self, error: ComponentError | ArithmeticError | ValueError) -> FmuError:
+        return FmuError(str(error), instance=self.name, time=self.time, status="error")
+
+    def setup(self, start_time: float, stop_time: float) -> None:
+        self.time = start_time
+
+    def enter_initialization(self) -> None:
+        self.simulation.initialize(self.time)
+
+    def exit_initialization(self) -> None:
+        try:
+            self.simulation.start()
+        except (ComponentError, ArithmeticError, ValueError) as error:
+            raise self._fail(error) from error
+
+    def channel(self, kind: Type, names: Sequence[str]) -> Channel:
+        return _PlainChannel(self, names)
+
+    def step(self, time: float, length: float) -> None:
+        self.time = time
+        try:
+            if self.simulation.time != time:
+                self.simulation.time = time
+            self.simulation.step(length)
+        except (ComponentError, ArithmeticError, ValueError) as error:
+            raise self._fail(error) from error
+
+    def terminate(self) -> None:
+        self.simulation.terminate()
+
+    def free(self) -> None:
+        pass
+
+
+class _PlainChannel:
+    def __init__(self, slave: PlainSlave, names: Sequence[str]) -> None:
+        self._slave = slave
+        self._places = [_place(slave.simulation, name) for name in names]
+
+    def set(self, values: Sequence[Any]) -> None:
+        simulation = self._slave.simulation
+        arrays: dict[str, Any] = {}
+        try:
+            for (name, element, kind), value in zip(self._places, values, strict=True):
+                if element is None:
+                    simulation.set(name, kind(value))
+                else:
+                    if name not in arrays:
+                        arrays[name] = simulation.get(name).copy()
+                    arrays[name].flat[element] = kind(value)
+            for name, array in arrays.items():
+                simulation.set(name, array)
+        except (ComponentError, ArithmeticError, ValueError) as error:
+            raise self._slave._fail(error) from error
+
+    def get(self) -> list[Any]:
+        simulation = self._slave.simulation
+        try:
+            found = [(simulation.get(name), element, kind) for name, element, kind in self._places]
+        except (ComponentError, ArithmeticError, ValueError) as error:
+            raise self._slave._fail(error) from error
+        return [kind(value if element is None else value.flat[element]) for value, element, kind in found]
+
+
+def _place(simulation: Simulation, scalar: str) -> tuple[str, int | None, Any]:
+    for slot in simulation.component.slots.values():
+        if scalar in slot.scalars:
+            return slot.name, slot.scalars.index(scalar) if slot.shape else None, slot.type
+    raise KeyError(scalar)
+
+
+def forget_paths(folder: Path) -> None:
+    """Take an unpack folder's entries off ``sys.path``, where Python FMUs put them at every instantiation."""
+    sys.path[:] = [entry for entry in sys.path if not entry.startswith(str(folder))]

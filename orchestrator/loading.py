@@ -1,0 +1,97 @@
+"""From the instances of a system to models that can be instantiated: FMU files read, components built."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Literal
+
+from ..components.component import ComponentError
+from ..fmus.build import Plain, build, plain
+from .archive import Workspace
+from .errors import FmuFileError, ScenarioError
+from .fmu import FmuSlave, PlainSlave, Slave
+from .interface import Interface
+from .reader import read
+from .system import Instance, System
+
+Kind = Literal["python", "plain"]
+KINDS: tuple[Kind, ...] = ("python", "plain")
+
+
+@dataclass(frozen=True)
+class Model:
+    """What an instance is made of.
+
+    Attributes:
+        interface: what it shows.
+        kind: ``"fmu"`` for a file of the user's, ``"python"`` for a component packaged here, ``"plain"`` for one in
+            this process.
+        path: the FMU file; None for a plain component.
+        digest: SHA-256 of the file, or the component's own digest.
+    """
+
+    interface: Interface
+    kind: str
+    folder: Path
+    path: Path | None
+    digest: str
+    plain: Plain | None = None
+
+    def instantiate(self, name: str) -> Slave:
+        """One instance.
+
+        Raises:
+            FmuError: it cannot be loaded or instantiated.
+        """
+        if self.plain is not None:
+            return PlainSlave(name, self.interface, self.plain.instantiate())
+        return FmuSlave(name, self.interface, self.folder)
+
+
+def load_models(system: System, workspace: Workspace, kind: Kind = "python") -> dict[str, Model]:
+    """The model of every instance; instances of the same file or component share one.
+
+    Raises:
+        ScenarioError: all instances whose model is missing or unusable, together.
+    """
+    shared: dict[str, Model] = {}
+    models: dict[str, Model] = {}
+    problems: dict[str, None] = {}
+    for instance in system.instances.values():
+        key = f"{instance.model} {sorted(instance.build.items())}"
+        try:
+            if key not in shared:
+                shared[key] = _load(instance, workspace, kind)
+            models[instance.name] = shared[key]
+        except (ComponentError, FmuFileError) as error:
+            family = instance.name.partition("[")[0]
+            problems[f"{instance.origin + ': ' if instance.origin else ''}instance {family!r}: {error}"] = None
+    if problems:
+        raise ScenarioError(list(problems))
+    return models
+
+
+def _load(instance: Instance, workspace: Workspace, kind: Kind) -> Model:
+    if instance.model.endswith(".fmu"):
+        if instance.build:
+            raise FmuFileError(
+                f"{instance.model} is built already; it takes no build arguments {sorted(instance.build)}"
+            )
+        return load_fmu(Path(instance.model), workspace, "fmu")
+    if kind == "plain":
+        component = plain(instance.model, instance.build)
+        folder = workspace.write_description(component.description)
+        interface = read(folder, instance.model)
+        return Model(interface, kind, folder, None, str(interface.vendor.get("digest", "")), component)
+    return load_fmu(build(instance.model, instance.build, kind=kind), workspace, kind)
+
+
+def load_fmu(path: Path, workspace: Workspace, kind: str = "fmu") -> Model:
+    """Unpack and read one FMU file.
+
+    Raises:
+        FmuFileError: missing, hostile or unusable.
+    """
+    folder, digest = workspace.unpack(path)
+    return Model(read(folder, str(path)), kind, folder, path, digest)

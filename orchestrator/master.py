@@ -1,0 +1,306 @@
+"""How time advances: initialization until connected values agree, then communication steps.
+
+`Master` is built from a flat plan (which values go where, in which order); the step loop touches nothing else. The
+point in time is always ``start + k * step``, never a running sum.
+"""
+
+from __future__ import annotations
+
+import math
+from collections import deque
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+from .errors import FmuError, ScenarioError
+from .fmu import Channel, Slave
+from .interface import Type
+from .system import Algorithm
+from .wiring import Link
+
+_SWEEPS = 100
+_AGREE = 1e-12
+"""Relative change below which a connected value counts as settled; acyclic systems settle exactly."""
+
+Observer = Callable[[int, float, Sequence[Any]], bool]
+"""Called with the step number, the time and all values after every step; returns False to stop the run."""
+
+
+@dataclass(frozen=True)
+class _Feed:
+    """Inputs of one type of one instance: where each value comes from, and how it is changed on the way.
+
+    ``sources`` are indices into the values; ``ages`` say how many recorded points back to look (None: the live value).
+    """
+
+    channel: Channel
+    sources: tuple[int, ...]
+    plain: bool
+    scales: tuple[float, ...]
+    offsets: tuple[float, ...]
+    ages: tuple[int | None, ...]
+    is_real: bool
+
+
+@dataclass(frozen=True)
+class _Yield:
+    """Outputs of one type of one instance, and where they stand among the values."""
+
+    channel: Channel
+    begin: int
+    end: int
+    is_real: bool
+
+
+class Master:
+    """Runs instantiated models.
+
+    Args:
+        slaves: the instances by name, instantiated, in the sequence in which they are recorded.
+        sequence: their names in the order in which a Gauss-Seidel sweep steps them.
+        links: scalar connections.
+        starts: start values by instance and scalar name.
+        algorithm: ``"gauss-seidel"`` (set, step, get per instance) or ``"jacobi"`` (all set, all step, all get).
+    """
+
+    def __init__(
+        self,
+        slaves: Mapping[str, Slave],
+        sequence: Sequence[str],
+        links: Sequence[Link],
+        starts: Mapping[str, Mapping[str, Any]],
+        algorithm: Algorithm,
+    ) -> None:
+        self.slaves = slaves
+        self.algorithm = algorithm
+        self.signals: list[str] = []
+        """Names of the values, in the order in which they are recorded."""
+        self.values: list[Any] = []
+        self._starts = starts
+        self._links = links
+        index: dict[tuple[str, str], int] = {}
+        self._yields = {name: self._plan_outputs(slave, index) for name, slave in slaves.items()}
+        deepest = max((link.delay for link in links), default=0)
+        self._history: deque[list[Any]] = deque(maxlen=deepest + 1)
+        self._feeds = {name: self._plan_inputs(slave, index) for name, slave in slaves.items()}
+        self._sequence = [slaves[name] for name in sequence]
+
+    # ---------------------------------------------------------------- plan
+
+    def _plan_outputs(self, slave: Slave, index: dict[tuple[str, str], int]) -> list[_Yield]:
+        wanted = {link.source[1] for link in self._links if link.source[0] == slave.name}
+        shown = [v for v in slave.interface.variables.values() if v.causality == "output" or v.name in wanted]
+        plan = []
+        for kind in _types(v.type for v in shown):
+            names = [v.name for v in shown if v.type == kind]
+            begin = len(self.signals)
+            for name in names:
+                index[slave.name, name] = len(self.signals)
+                self.signals.append(f"{slave.name}.{name}")
+            plan.append(_Yield(slave.channel(kind, names), begin, len(self.signals), kind == "Real"))
+        self.values.extend([0.0] * (len(self.signals) - len(self.values)))
+        return plan
+
+    def _plan_inputs(self, slave: Slave, index: dict[tuple[str, str], int]) -> list[_Feed]:
+        mine = [link for link in self._links if link.target[0] == slave.name]
+        variables = slave.interface.variables
+        plan = []
+        for kind in _types(variables[link.target[1]].type for link in mine):
+            links = [link for link in mine if variables[link.target[1]].type == kind]
+            plan.append(
+                _Feed(
+                    channel=slave.channel(kind, [link.target[1] for link in links]),
+                    sources=tuple(index[link.source] for link in links),
+                    plain=all((x.scale, x.offset, x.delay) == (1.0, 0.0, 0) for x in links),
+                    scales=tuple(link.scale for link in links),
+                    offsets=tuple(link.offset for link in links),
+                    ages=tuple(self._age(link) for link in links),
+                    is_real=kind == "Real",
+                )
+            )
+        return plan
+
+    def _age(self, link: Link) -> int | None:
+        """How many recorded points back a delayed connection reads; 0 is the point at the begin of the step.
+
+        A feed-through output recorded at a point was computed from the inputs of the point before: read there, it is
+        already one communication point older than the live value of a Gauss-Seidel sweep.
+        """
+        if not link.delay:
+            return None
+        return link.delay - 1 if link.direct and self.algorithm == "gauss-seidel" else link.delay
+
+    # ---------------------------------------------------------------- initialization
+
+    def initialize(self, start_time: float, stop_time: float) -> None:
+        """Set start values and let connected values settle; time zero is that consistent state.
+
+        Raises:
+            FmuError: a model failed.
+            ScenarioError: the connected values do not settle.
+        """
+        for slave in self.slaves.values():
+            slave.setup(start_time, stop_time)
+            self._set_starts(slave)
+        for slave in self.slaves.values():
+            slave.enter_initialization()
+        for slave in self.slaves.values():
+            self._read(slave)
+        self._settle()
+        for slave in self.slaves.values():
+            slave.exit_initialization()
+        self._check_finite(start_time)
+        self._history.append(list(self.values))
+
+    def _set_starts(self, slave: Slave) -> None:
+        given = self._starts.get(slave.name, {})
+        variables = slave.interface.variables
+        for kind in _types(variables[name].type for name in given):
+            names = [name for name in given if variables[name].type == kind]
+            slave.channel(kind, names).set([given[name] for name in names])
+
+    def _settle(self) -> None:
+        change = math.inf
+        for _ in range(_SWEEPS):
+            before = list(self.values)
+            self._sweep()
+            change = _largest_change(before, self.values)
+            if change <= _AGREE:
+                return
+            if not math.isfinite(change):
+                break
+        solve_loops(self, change)
+
+    def _sweep(self) -> None:
+        for slave in self._sequence:
+            if self._feeds[slave.name]:
+                self._write(slave.name)
+                self._read(slave)
+
+    # ---------------------------------------------------------------- stepping
+
+    def run(self, start_time: float, step: float, count: int, observe: Observer) -> bool:
+        """Take ``count`` communication steps; True unless the observer stopped the run.
+
+        Raises:
+            FmuError: a model failed, or a value is not finite; instance, variable and time are named.
+        """
+        advance = self._gauss_seidel if self.algorithm == "gauss-seidel" else self._jacobi
+        for k in range(count):
+            advance(start_time + k * step, step)
+            now = start_time + (k + 1) * step
+            self._check_finite(now)
+            self._history.append(list(self.values))
+            if not observe(k + 1, now, self.values):
+                return False
+        return True
+
+    def terminate(self) -> None:
+        """End the run properly: every model may write what it keeps."""
+        for slave in self.slaves.values():
+            slave.terminate()
+
+    def _gauss_seidel(self, time: float, step: float) -> None:
+        for slave in self._sequence:
+            self._write(slave.name)
+            slave.step(time, step)
+            self._read(slave)
+
+    def _jacobi(self, time: float, step: float) -> None:
+        for name in self.slaves:
+            self._write(name)
+        for slave in self.slaves.values():
+            slave.step(time, step)
+        for slave in self.slaves.values():
+            self._read(slave)
+
+    def _write(self, name: str) -> None:
+        values = self.values
+        for feed in self._feeds[name]:
+            if feed.plain:
+                feed.channel.set([values[k] for k in feed.sources])
+            else:
+                feed.channel.set(self._changed(feed))
+
+    def _changed(self, feed: _Feed) -> list[Any]:
+        """Input values with delay, scale and offset applied."""
+        result = []
+        for k, scale, offset, age in zip(feed.sources, feed.scales, feed.offsets, feed.ages, strict=True):
+            value = self.values[k] if age is None else self._aged(age, k)
+            result.append(scale * value + offset if feed.is_real and (scale, offset) != (1.0, 0.0) else value)
+        return result
+
+    def _aged(self, age: int, k: int) -> Any:
+        if not self._history:  # still initializing
+            return self.values[k]
+        return self._history[max(0, len(self._history) - 1 - age)][k]
+
+    def _read(self, slave: Slave) -> None:
+        for part in self._yields[slave.name]:
+            self.values[part.begin : part.end] = part.channel.get()
+
+    def _check_finite(self, time: float) -> None:
+        for name, parts in self._yields.items():
+            for part in parts:
+                # One sum instead of one test per value: it is finite unless a value is not (or all are astronomic).
+                if part.is_real and not math.isfinite(sum(self.values[part.begin : part.end])):
+                    self._name_culprit(name, part, time)
+
+    def _name_culprit(self, name: str, part: _Yield, time: float) -> None:
+        for k in range(part.begin, part.end):
+            if not math.isfinite(self.values[k]):
+                variable = self.signals[k].removeprefix(f"{name}.")
+                raise FmuError(f"output {variable!r} is {self.values[k]!r}", instance=name, time=time)
+
+
+def _types(kinds: Any) -> tuple[Type, ...]:
+    return tuple(dict.fromkeys(kinds))
+
+
+def _largest_change(before: Sequence[Any], after: Sequence[Any]) -> float:
+    change = 0.0
+    for a, b in zip(before, after, strict=True):
+        if a == b:
+            continue
+        if isinstance(a, str) or isinstance(b, str):
+            change = max(change, 1.0)
+        else:
+            change = max(change, abs(b - a) / max(1.0, abs(a), abs(b)))
+        if change != change:
+            return math.nan
+    return change
+
+
+def solve_loops(master: Master, change: float) -> None:
+    """Newton's method (SciPy) on the connected real values, where repeated exchange does not settle.
+
+    Raises:
+        ScenarioError: no consistent initial values were found; the residual and the connections involved are named.
+    """
+    from scipy import optimize  # noqa: PLC0415 (a heavy import for a rare case)
+
+    before = list(master.values)
+    master._sweep()
+    moving = [
+        k for k, (a, b) in enumerate(zip(before, master.values, strict=True)) if a != b and not isinstance(a, str)
+    ]
+    start = [before[k] if math.isfinite(before[k]) else 0.0 for k in moving]
+
+    def residual(candidate: Any) -> list[float]:
+        for k, value in zip(moving, candidate, strict=True):
+            master.values[k] = float(value)
+        master._sweep()
+        return [master.values[k] - float(value) for k, value in zip(moving, candidate, strict=True)]
+
+    names = ", ".join(master.signals[k] for k in moving[:6])
+    try:
+        solution = optimize.root(residual, [min(max(v, -1e12), 1e12) for v in start], method="hybr", tol=1e-13)
+        final = residual(solution.x)
+    except (FmuError, ValueError, OverflowError) as error:
+        raise ScenarioError(f"the initial values of {names} do not settle: {error}") from error
+    worst = max((abs(r) / max(1.0, abs(x)) for r, x in zip(final, solution.x, strict=True)), default=0.0)
+    if not worst <= 1e-9:
+        raise ScenarioError(
+            f"the initial values of {names} do not settle: they form an algebraic loop for which no solution was found "
+            f"(residual {worst:.3g}); break it with delay = 1 on one connection, or give other start values"
+        )

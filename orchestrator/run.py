@@ -1,0 +1,269 @@
+"""One run, from a system to results, metrics, verdicts and files."""
+
+from __future__ import annotations
+
+import signal
+import threading
+import time as clock
+from collections.abc import Callable, Collection, Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+from typing import Any, Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from . import record as record_file
+from .archive import Workspace
+from .check import Checked, check
+from .errors import FmuError, RailcosimError
+from .fmu import Slave, forget_paths
+from .loading import Kind
+from .master import Master
+from .metrics import Metric, evaluate_metrics
+from .plots import draw
+from .published import PublishedRow, judge
+from .requirements import Verdict, judge_requirements
+from .results import Recorder, Results
+from .system import Algorithm, System
+
+Status = Literal["completed", "interrupted", "failed"]
+Progress = Callable[[float, float], None]
+"""Called now and then with the time reached and the stop time, both in s."""
+
+
+@dataclass
+class Run:
+    """What came out of a run; ``run["train[1].speed"]`` is a recorded signal over ``run.time``.
+
+    Attributes:
+        results: recorded signals. metrics, requirements, published: evaluated tables.
+        status: ``"completed"``, ``"interrupted"`` or ``"failed"``; error: why it failed.
+        notes: what a user should know about the system. directory: where the files are, if there are any.
+        seconds: wall time of ``setup`` and ``stepping``, and the number of communication ``steps``.
+    """
+
+    system: System
+    results: Results
+    status: Status
+    checked: Checked
+    metrics: list[Metric] = field(default_factory=list)
+    requirements: list[Verdict] = field(default_factory=list)
+    published: list[PublishedRow] = field(default_factory=list)
+    figures: list[Path] = field(default_factory=list)
+    error: FmuError | None = None
+    directory: Path | None = None
+    seconds: dict[str, float] = field(default_factory=dict)
+
+    @property
+    def time(self) -> NDArray[np.float64]:
+        """Recorded points in s."""
+        return self.results.time
+
+    def __getitem__(self, name: str) -> NDArray[Any]:
+        return self.results[name]
+
+    def names(self) -> Collection[str]:
+        """All recorded signals."""
+        return self.results.names()
+
+    @property
+    def passed(self) -> bool:
+        """Whether no requirement failed and no published value was missed."""
+        return all(v.verdict == "pass" for v in self.requirements) and all(
+            p.verdict != "missed" for p in self.published
+        )
+
+
+def run(
+    system: System,
+    *,
+    stop_time: float | None = None,
+    step: float | None = None,
+    algorithm: Algorithm | None = None,
+    kind: Kind = "python",
+    output: str | Path | None = None,
+    figures: bool = True,
+    progress: Progress | None = None,
+) -> Run:
+    """Run a system.
+
+    Args:
+        system: from `load`, or built by hand.
+        stop_time, step: override the system's, in s.
+        algorithm: override the system's.
+        kind: how components become models: ``"python"`` FMUs, or ``"plain"`` Python objects in this process.
+        output: directory for results, metrics and figures; without one everything stays in memory.
+        figures: whether to draw the system's figures (only with an output directory).
+        progress: called about ten times a second.
+
+    Raises:
+        ScenarioError: the system cannot run; all problems are listed.
+        FmuError: a model failed. What was computed until then is on disk, and in the error's ``run``.
+    """
+    system = _override(system, stop_time, step, algorithm)
+    outcome = execute(system, kind=kind, output=output, figures=figures, progress=progress)
+    if outcome.error is not None:
+        outcome.error.run = outcome  # type: ignore[attr-defined]
+        raise outcome.error
+    return outcome
+
+
+def execute(
+    system: System,
+    *,
+    kind: Kind = "python",
+    output: str | Path | None = None,
+    figures: bool = True,
+    progress: Progress | None = None,
+) -> Run:
+    """As `run`, but a model that fails ends the run with ``status = "failed"`` instead of raising."""
+    directory = Path(output) if output is not None else None
+    begin = clock.perf_counter()
+    with Workspace() as workspace:
+        try:
+            checked = check(system, workspace, kind)
+            if directory is not None:
+                _make_directory(directory)
+                record_file.write(directory, system, checked, kind)
+            outcome = _simulate(system, checked, directory, progress, begin)
+        finally:
+            forget_paths(workspace.folder)
+    outcome.directory = directory
+    evaluate(outcome)
+    if directory is not None:
+        if figures and len(outcome.results):
+            outcome.figures = draw(system.figures, outcome.results, directory)
+        record_file.finish(directory, outcome, kind)
+    return outcome
+
+
+def evaluate(outcome: Run) -> None:
+    """Fill in metrics, verdicts and published values from what was recorded."""
+    system, results = outcome.system, outcome.results
+    if not len(results):
+        return
+    outcome.metrics = evaluate_metrics(system.metrics, results)
+    outcome.requirements = judge_requirements(system.requirements, results)
+    outcome.published = judge(
+        system.published,
+        outcome.metrics,
+        system.preset,
+        system.modified,
+        default_preset=system.default_preset,
+        completed=outcome.status == "completed",
+    )
+
+
+def _override(system: System, stop_time: float | None, step: float | None, algorithm: Algorithm | None) -> System:
+    changes: dict[str, Any] = {}
+    if stop_time is not None and stop_time != system.stop_time:
+        changes["stop_time"] = stop_time
+    if step is not None and step != system.step:
+        changes.update(step=step, rescaled_from=system.step)
+        if system.record is not None and system.record < step:
+            changes["record"] = None
+    if algorithm is not None and algorithm != system.algorithm:
+        changes["algorithm"] = algorithm
+    return replace(system, **changes, modified=True) if changes else system
+
+
+def _make_directory(directory: Path) -> None:
+    try:
+        directory.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise RailcosimError(f"the output directory {directory} cannot be made: {error.strerror or error}") from error
+
+
+def _simulate(system: System, checked: Checked, directory: Path | None, progress: Progress | None, begin: float) -> Run:
+    slaves: dict[str, Slave] = {}
+    recorder: Recorder | None = None
+    status: Status = "completed"
+    failure: FmuError | None = None
+    seconds: dict[str, float] = {}
+    try:
+        for name, model in checked.models.items():
+            slaves[name] = model.instantiate(name)
+        master = Master(slaves, checked.order.sequence, checked.wiring.links, checked.wiring.starts, system.algorithm)
+        master.initialize(system.start_time, system.stop_time)
+        recorder = Recorder(master.signals, directory)
+        recorder.record(system.start_time, master.values)
+        seconds["setup"] = clock.perf_counter() - begin
+        stepping = clock.perf_counter()
+        with _interruptible() as stopped:
+            observe = _observer(system, recorder, progress, stopped)
+            count = round((system.stop_time - system.start_time) / system.step)
+            status = "completed" if master.run(system.start_time, system.step, count, observe) else "interrupted"
+        seconds.update(stepping=clock.perf_counter() - stepping, steps=count)
+        master.terminate()
+    except FmuError as error:
+        status, failure = "failed", error
+    finally:
+        if recorder is not None:
+            recorder.close()
+        for slave in slaves.values():
+            slave.free()
+    return Run(system, _results(system, checked, recorder, status), status, checked, error=failure, seconds=seconds)
+
+
+def _observer(
+    system: System, recorder: Recorder, progress: Progress | None, stopped: threading.Event
+) -> Callable[[int, float, Any], bool]:
+    every = 1 if system.record is None else round(system.record / system.step)
+    last = round((system.stop_time - system.start_time) / system.step)
+    shown = clock.monotonic()
+
+    def observe(k: int, time: float, values: Any) -> bool:
+        nonlocal shown
+        go_on = not stopped.is_set()
+        if k % every == 0 or k == last or not go_on:
+            recorder.record(time, values)
+        if progress is not None and (clock.monotonic() - shown > 0.1 or k == last):
+            shown = clock.monotonic()
+            progress(time, system.stop_time)
+        return go_on
+
+    return observe
+
+
+@contextmanager
+def _interruptible() -> Iterator[threading.Event]:
+    """Turn Ctrl-C into an event that is looked at between steps: never inside an FMU, and nothing is lost."""
+    stopped = threading.Event()
+    if threading.current_thread() is not threading.main_thread():
+        yield stopped
+        return
+    before = signal.getsignal(signal.SIGINT)
+
+    def stop(*_: Any) -> None:
+        stopped.set()
+        signal.signal(signal.SIGINT, before)  # a second Ctrl-C does not wait
+
+    signal.signal(signal.SIGINT, stop)
+    try:
+        yield stopped
+    finally:
+        signal.signal(signal.SIGINT, before)
+
+
+def _results(system: System, checked: Checked, recorder: Recorder | None, status: Status) -> Results:
+    time, columns = (np.empty(0), {}) if recorder is None else recorder.columns()
+    units, parameters = {}, {}
+    for instance, model in checked.models.items():
+        starts = checked.wiring.starts[instance]
+        for variable in model.interface.variables.values():
+            name = f"{instance}.{variable.name}"
+            if variable.unit is not None:
+                units[name] = variable.unit
+            if variable.causality == "parameter":
+                parameters[name] = starts.get(variable.name, variable.start)
+    return Results(
+        columns,
+        time,
+        units=units,
+        parameters=parameters,
+        step=system.step,
+        stop_time=system.stop_time,
+        completed=status == "completed",
+    )
