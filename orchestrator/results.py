@@ -25,7 +25,7 @@ class Results:
         units: unit by signal name, where there is one.
         parameters: parameters and start values by full name, as the run used them.
         step: communication step in s. stop_time: planned end in s.
-        completed: whether the run reached its end.
+        completed: whether the run reached its end. figures: the figures the scenario asks for.
     """
 
     def __init__(
@@ -38,6 +38,7 @@ class Results:
         step: float,
         stop_time: float,
         completed: bool,
+        figures: Sequence[Mapping[str, Any]] = (),
     ) -> None:
         self._columns = dict(columns)
         self.time = time
@@ -46,6 +47,7 @@ class Results:
         self.step = step
         self.stop_time = stop_time
         self.completed = completed
+        self.figures = figures
 
     def names(self) -> Collection[str]:
         """All recorded signals."""
@@ -80,6 +82,7 @@ class Results:
             step=record["step"],
             stop_time=record["stop_time"],
             completed=record["status"] == "completed",
+            figures=record["figures_wanted"],
         )
 
 

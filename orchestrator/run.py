@@ -69,11 +69,9 @@ class Run:
         return self.results.names()
 
     @property
-    def passed(self) -> bool:
-        """Whether no requirement failed and no published value was missed."""
-        return all(v.verdict == "pass" for v in self.requirements) and all(
-            p.verdict != "missed" for p in self.published
-        )
+    def failed(self) -> bool:
+        """Whether a requirement failed or a published value was missed."""
+        return any(v.verdict == "fail" for v in self.requirements) or any(p.verdict == "missed" for p in self.published)
 
 
 def run(
@@ -96,7 +94,7 @@ def run(
         kind: how components become models: ``"python"`` FMUs, or ``"plain"`` Python objects in this process.
         output: directory for results, metrics and figures; without one everything stays in memory.
         figures: whether to draw the system's figures (only with an output directory).
-        progress: called about ten times a second.
+        progress: called at every per cent of the run and at least ten times a second.
 
     Raises:
         ScenarioError: the system cannot run; all problems are listed.
@@ -212,6 +210,7 @@ def _observer(
 ) -> Callable[[int, float, Any], bool]:
     every = 1 if system.record is None else round(system.record / system.step)
     last = round((system.stop_time - system.start_time) / system.step)
+    percent = max(1, last // 100)
     shown = clock.monotonic()
 
     def observe(k: int, time: float, values: Any) -> bool:
@@ -219,7 +218,7 @@ def _observer(
         go_on = not stopped.is_set()
         if k % every == 0 or k == last or not go_on:
             recorder.record(time, values)
-        if progress is not None and (clock.monotonic() - shown > 0.1 or k == last):
+        if progress is not None and (k % percent == 0 or clock.monotonic() - shown > 0.1 or k == last):
             shown = clock.monotonic()
             progress(time, system.stop_time)
         return go_on
@@ -266,4 +265,5 @@ def _results(system: System, checked: Checked, recorder: Recorder | None, status
         step=system.step,
         stop_time=system.stop_time,
         completed=status == "completed",
+        figures=system.figures,
     )
