@@ -1,0 +1,114 @@
+"""Models, files and numbers of a draft; every message read."""
+
+import math
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from railcosim.orchestrator.draft import (
+    Entry,
+    Group,
+    build_argument,
+    expand_group,
+    number,
+    resolve_model,
+    shown,
+    whole_multiple,
+)
+from railcosim.orchestrator.errors import ScenarioError
+
+
+@pytest.fixture
+def folder(tmp_path):
+    for name in ("mine.py", "plant.fmu", "Plant.FMU", "line.json"):
+        (tmp_path / name).touch()
+    return str(tmp_path)
+
+
+@pytest.mark.parametrize(
+    ("text", "kind", "model"),
+    [
+        ("PointMassTrain", "component", "PointMassTrain"),
+        ("mine.py:Mine", "component", "{}/mine.py:Mine"),
+        ("x/../mine.py:Mine", "component", "{}/mine.py:Mine"),
+        ("plant.fmu", "fmu", "{}/plant.fmu"),
+        ("./Plant.FMU", "", "{}/Plant.FMU"),
+        ("PointMassTrain", "", "PointMassTrain"),
+    ],
+)
+def test_models(folder, text, kind, model):
+    assert resolve_model(text, folder, kind) == model.format(folder)
+
+
+@pytest.mark.parametrize(
+    ("text", "kind", "message"),
+    [
+        (3, "component", "takes a text: a component's name, 'file.py:Class', or the path of an .fmu"),
+        (" ", "", "takes a text: a component's name, 'file.py:Class', or the path of an .fmu"),
+        ("plant.fmu", "component", "'plant.fmu' is an FMU file; write fmu = ... instead of component = ..."),
+        (
+            "PointMassTrain",
+            "fmu",
+            "'PointMassTrain' does not end in .fmu; for a component of the catalogue write component = ...",
+        ),
+        ("plan.fmu", "fmu", "there is no file '{}/plan.fmu'; did you mean 'plant.fmu'?"),
+        ("min.py:Mine", "component", "there is no file '{}/min.py'; did you mean 'mine.py'?"),
+        ("gone/min.py:Mine", "component", "there is no file '{}/gone/min.py'"),
+        ("mine.py", "component", "'mine.py' does not name a class; write 'file.py:Class'"),
+        ("mine.py:My Class", "", "'mine.py:My Class' does not name a class; write 'file.py:Class'"),
+        ("a/b", "", "'a/b' is neither a component's name, nor 'file.py:Class', nor the path of an .fmu"),
+    ],
+)
+def test_models_that_are_none(folder, text, kind, message):
+    with pytest.raises(ScenarioError) as caught:
+        resolve_model(text, folder, kind)
+    assert str(caught.value) == message.format(folder)
+
+
+def test_build_arguments(folder):
+    assert build_argument("line.json", folder) == f"{folder}/line.json"
+    assert build_argument("m/s", folder) == "m/s"
+    assert build_argument({"a": [1, {"b": True}]}, folder) == {"a": [1, {"b": True}]}
+    with pytest.raises(ScenarioError, match=r"there is no file '.*lin\.json'; did you mean 'line.json'\?"):
+        build_argument("lin.json", folder)
+
+
+@given(st.integers(1, 10**6), st.integers(1, 10**4))
+def test_a_whole_number_of_steps_is_recognised_in_spite_of_rounding(steps, part):
+    step = 1.0 / part
+    assert whole_multiple(steps * step, step)
+    assert not whole_multiple((steps + 0.4) * step, step)
+
+
+@pytest.mark.parametrize("value", [0.0, -1.0, 0.05, 1e308 * 10])
+def test_no_number_of_steps(value):
+    assert not whole_multiple(value, 0.1)
+
+
+@pytest.mark.parametrize(
+    ("value", "text"),
+    [
+        (True, "true"),
+        ("x", "'x'"),
+        (math.inf, "inf"),
+        (10**400, "a number of more than 50 digits"),
+        (["a" * 100], f"['{'a' * 55}..."),
+    ],
+)
+def test_what_is_not_a_number_is_shown_as_written(value, text):
+    problems = []
+    assert number(Entry(value, "x.toml:3", "a.b"), problems, 7.0) == 7.0
+    assert problems == [f"x.toml:3: a.b: takes a finite number, not {text}"]
+    assert shown(value) == text
+
+
+def test_a_group_without_a_count_keeps_lists_whole():
+    (instance, origins), *others = expand_group(Group("a", "x.toml:1", "A", start={"x": Entry([1, 2], "x.toml:2")}), [])
+    assert not others
+    assert (instance.name, instance.index, instance.count, instance.start) == ("a", None, 1, {"x": [1, 2]})
+    assert origins == {"a.x": "x.toml:2"}
+
+
+def test_a_group_of_one_still_has_a_number():
+    ((instance, _),) = expand_group(Group("a", "x.toml:1", "A", count=1, start={"x": Entry([[1, 2]], "x.toml:2")}), [])
+    assert (instance.name, instance.index, instance.start) == ("a[1]", 1, {"x": [1, 2]})
