@@ -1,0 +1,281 @@
+/* An instance in time: the initial state, samples, integration, outputs. components/simulate.py says it in Python, and the
+   order of every floating-point operation here is the order there: the two agree to the last bit. */
+
+#include <math.h>
+#include <string.h>
+
+/* Evaluate one group of equations into a result; they take arrays of pointers. */
+static void call_equations(const Instance *s, Equations function, double *result)
+{
+    const double clock[2] = {s->time, s->step};
+    const double *arguments[2] = {clock, s->values};
+    double *results[1] = {result};
+    function(arguments, results);
+}
+
+/* Every result must be finite, and whole where its variable is an integer. */
+static fmi2Status check_results(Instance *s, const char *method, int first, int count, const double *result)
+{
+    for (int k = 0; k < count; k++) {
+        const Variable *variable = &model_variables[first + k];
+        if (!isfinite(result[k])) {
+            return fail(s, "%s: '%s' is %g at t = %.17g s; guard the arguments it comes from", method, variable->name,
+                        result[k], s->time);
+        }
+        if (variable->type != TYPE_REAL && result[k] != rint(result[k])) {
+            return fail(s, "%s: '%s' is %.17g at t = %.17g s, not a whole number", method, variable->name, result[k],
+                        s->time);
+        }
+    }
+    return fmi2OK;
+}
+
+#if N_TAPE > 0
+/* Time along the trip: within a communication step of several samples the tape runs on; a wait stays a wait. */
+static double trip_time_after(const Instance *s, double elapsed)
+{
+    double trip_time = s->values[TRIP_TIME];
+    return waiting(s, trip_time) ? trip_time : trip_time + elapsed;
+}
+#endif
+
+/* All outputs into the values, `elapsed` seconds after the inputs were read. */
+static fmi2Status evaluate(Instance *s, double elapsed)
+{
+    if (draw(s) != fmi2OK) {
+        return fmi2Error;
+    }
+#if N_TAPE > 0
+    if (tape_read(s, trip_time_after(s, elapsed)) != fmi2OK) {
+        return fmi2Error;
+    }
+#else
+    (void)elapsed;
+#endif
+#if N_OUTPUTS > 0
+    call_equations(s, MODEL_OUTPUTS, s->scratch);
+    if (check_results(s, "outputs", FIRST_OUTPUT, N_OUTPUTS, s->scratch) != fmi2OK) {
+        return fmi2Error;
+    }
+    memcpy(s->values + FIRST_OUTPUT, s->scratch, N_OUTPUTS * sizeof(double));
+#endif
+    return fmi2OK;
+}
+
+/* Bring what follows from parameters, start values and inputs up to date with them. */
+static fmi2Status prepare(Instance *s)
+{
+    if (s->prepared) {
+        return fmi2OK;
+    }
+#if N_INITIAL > 0
+    for (int k = 0; k < N_INITIAL; k++) {
+        s->values[model_initial_targets[k]] = model_variables[model_initial_targets[k]].start;
+    }
+    if (draw(s) != fmi2OK) {
+        return fmi2Error;
+    }
+    call_equations(s, MODEL_INITIAL, s->scratch);
+    for (int k = 0; k < N_INITIAL; k++) {
+        int target = model_initial_targets[k];
+        if (check_results(s, "initial", target, 1, s->scratch + k) != fmi2OK) {
+            return fmi2Error;
+        }
+        s->values[target] = s->scratch[k];
+    }
+#endif
+#if N_TAPE > 0
+    if (tape_prepare(s) != fmi2OK) {
+        return fmi2Error;
+    }
+#endif
+    s->prepared = true;
+    return fmi2OK;
+}
+
+/* Parameters must lie within their declared bounds. */
+static fmi2Status check_bounds(Instance *s, int reference)
+{
+    const Variable *variable = &model_variables[reference];
+    double value = s->values[reference];
+    if (variable->type != TYPE_STRING && (value < variable->minimum || value > variable->maximum)) {
+        return fail(s, "%s = %g is outside [%g, %g]", variable->name, value, variable->minimum, variable->maximum);
+    }
+    return fmi2OK;
+}
+
+#if N_STATES > 0
+static void slope(Instance *s, double time, double *result)
+{
+    s->time = time;
+    call_equations(s, MODEL_DERIVATIVES, result);
+}
+
+/* Classical Runge-Kutta in equal sub-steps no longer than max_step, inputs and memory held. */
+static fmi2Status integrate(Instance *s, double begin, double length)
+{
+    double longest = s->values[MAX_STEP];
+    double parts = longest > 0.0 ? ceil(length / longest - 1e-9) : 1.0;
+    int count = parts > 1.0 ? (int)parts : 1;
+    double h = length / (double)count, half = 0.5 * h, sixth = h / 6.0;
+    double *x = s->values + FIRST_STATE, *start = s->states;
+    double *k1 = s->slopes[0], *k2 = s->slopes[1], *k3 = s->slopes[2], *k4 = s->slopes[3];
+    for (int part = 0; part < count; part++) {
+        double t = begin + (double)part * h;
+        memcpy(start, x, N_STATES * sizeof(double));
+        slope(s, t, k1);
+        for (int n = 0; n < N_STATES; n++) {
+            x[n] = start[n] + half * k1[n];
+        }
+        slope(s, t + half, k2);
+        for (int n = 0; n < N_STATES; n++) {
+            x[n] = start[n] + half * k2[n];
+        }
+        slope(s, t + half, k3);
+        for (int n = 0; n < N_STATES; n++) {
+            x[n] = start[n] + h * k3[n];
+        }
+        slope(s, t + h, k4);
+        for (int n = 0; n < N_STATES; n++) {
+            x[n] = start[n] + sixth * (((k1[n] + 2.0 * k2[n]) + 2.0 * k3[n]) + k4[n]);
+        }
+    }
+    return check_results(s, "derivatives", FIRST_STATE, N_STATES, x);
+}
+#else
+static fmi2Status integrate(Instance *s, double begin, double length)
+{
+    (void)s;
+    (void)begin;
+    (void)length;
+    return fmi2OK;
+}
+#endif
+
+#if IS_SAMPLED
+/* How many samples of which period make a communication step. */
+static fmi2Status samples(Instance *s, double length, int *count, double *period)
+{
+    double declared = s->values[SAMPLE_TIME];
+    double n = declared == 0.0 ? 1.0 : rint(length / declared);
+    *count = (int)n;
+    *period = length / n;
+    if (declared != 0.0 && (n < 1.0 || fabs(n * declared - length) > 1e-6 * declared)) {
+        return fail(s, "the communication step %.17g s is not a whole multiple of sample_time = %.17g s", length, declared);
+    }
+    return fmi2OK;
+}
+
+/* One sample: outputs with the old memory, then the next memory, tape row and re-initialised states. */
+static fmi2Status sample(Instance *s, double period, double elapsed)
+{
+#if N_TAPE > 0
+    if (tape_follow(s) != fmi2OK) {
+        return fmi2Error;
+    }
+#endif
+    if (evaluate(s, elapsed) != fmi2OK) {
+        return fmi2Error;
+    }
+    memcpy(s->held, s->values + FIRST_OUTPUT, N_OUTPUTS * sizeof(double));
+    double *next = s->scratch, *row = next + N_MEMORY, *again = row + N_TAPE;
+    s->step = period;
+#if N_MEMORY + N_TAPE + N_REINITIALISED > 0
+    call_equations(s, MODEL_UPDATE, next);
+#endif
+    if (check_results(s, "update", FIRST_MEMORY, N_MEMORY, next) != fmi2OK) {
+        return fmi2Error;
+    }
+    for (int k = 0; k < N_TAPE; k++) {
+        if (!isfinite(row[k])) {
+            return fail(s, "update: column %d of the tape is %g at t = %.17g s", k + 1, row[k], s->time);
+        }
+    }
+#if N_TAPE > 0
+    if (tape_record(s, trip_time_after(s, elapsed), row) != fmi2OK) {
+        return fmi2Error;
+    }
+#endif
+    for (int k = 0; k < N_REINITIALISED; k++) {
+        int target = model_reinitialised[k];
+        if (check_results(s, "update", target, 1, again + k) != fmi2OK) {
+            return fmi2Error;
+        }
+        s->values[target] = again[k];
+    }
+    memcpy(s->values + FIRST_MEMORY, next, N_MEMORY * sizeof(double));
+    return fmi2OK;
+}
+#endif
+
+/* One communication step from the present time. */
+static fmi2Status advance(Instance *s, double length)
+{
+    double begin = s->time;
+#if IS_SAMPLED
+    int count;
+    double period;
+    if (samples(s, length, &count, &period) != fmi2OK) {
+        return fmi2Error;
+    }
+    for (int k = 0; k < count; k++) {
+        double elapsed = (double)k * period;
+        s->time = begin + elapsed;
+        if (sample(s, period, elapsed) != fmi2OK || integrate(s, begin + elapsed, period) != fmi2OK) {
+            return fmi2Error;
+        }
+    }
+#else
+    if (integrate(s, begin, length) != fmi2OK) {
+        return fmi2Error;
+    }
+#endif
+    s->time = begin + length;
+    s->fresh = false;
+#if IS_SAMPLED && HAS_HELD
+    if (evaluate(s, 0.0) != fmi2OK) {
+        return fmi2Error;
+    }
+    for (int k = 0; k < N_OUTPUTS; k++) {
+        if (model_held[k]) {
+            s->values[FIRST_OUTPUT + k] = s->held[k];
+        }
+    }
+    s->fresh = true;
+#endif
+    return fmi2OK;
+}
+
+/* Outputs as the present inputs make them. */
+static fmi2Status refresh(Instance *s)
+{
+    if (s->phase == PHASE_INITIALIZATION && prepare(s) != fmi2OK) {
+        return fmi2Error;
+    }
+    if (!s->fresh && evaluate(s, 0.0) != fmi2OK) {
+        return fmi2Error;
+    }
+    s->fresh = true;
+    return fmi2OK;
+}
+
+/* Back to the state after instantiation. */
+static void restart(Instance *s)
+{
+    memset(s->values, 0, sizeof s->values);
+    memset(s->texts, 0, sizeof s->texts);
+    for (int n = 0; n < N_VARIABLES; n++) {
+        s->values[n] = model_variables[n].start;
+        if (model_variables[n].text >= 0) {
+            strncpy(s->texts[model_variables[n].text], model_texts[model_variables[n].text], MAX_TEXT - 1);
+        }
+    }
+#if N_TAPE > 0
+    memcpy(s->values + FIRST_TAPE, model_tape_start, N_TAPE * sizeof(double));
+    tape_free(&s->tape);
+#endif
+    s->phase = PHASE_INSTANTIATED;
+    s->time = s->start_time = s->last_successful_time = 0.0;
+    s->has_stop_time = s->fresh = s->prepared = false;
+    s->step = 0.0;
+}

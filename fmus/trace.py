@@ -1,0 +1,304 @@
+"""Tracing: a component's equations, run on symbols, become CasADi functions and from them C.
+
+The values of an instance stand in one vector: every scalar variable at its value reference, then the cells of the tapes,
+then those of the random numbers. Time and the length of a sample are the vector ``clock``.
+"""
+
+from __future__ import annotations
+
+import functools
+import re
+from collections.abc import Callable, Iterable
+from dataclasses import dataclass
+from typing import Any
+
+import casadi as ca
+import numpy as np
+
+from ..components.component import Component, Slot
+from ..components.declarations import Memory, Output, State, Tape
+from ..components.maths import SymbolArray, elementwise
+from ..components.tracing import TracingError
+from .variables import scalar_variables
+
+_FUNCTIONS = {
+    "sqrt": ca.sqrt,
+    "exp": ca.exp,
+    "log": ca.log,
+    "sin": ca.sin,
+    "cos": ca.cos,
+    "tan": ca.tan,
+    "tanh": ca.tanh,
+    "floor": ca.floor,
+    "abs": ca.fabs,
+}
+_REMEDY = "use railcosim.components.maths (where, tanh, clip, logical_and, ...) instead"
+
+
+class Symbol:
+    """A scalar expression that stands in for a number in the equations and refuses to be taken for one.
+
+    Bare CasADi symbols would fail silently: ``math.tanh`` of one is NaN, an array times one is a matrix.
+    """
+
+    __slots__ = ("sx",)
+    __array_priority__ = 1000.0
+    __hash__ = None  # type: ignore[assignment]
+
+    def __init__(self, sx: Any) -> None:
+        self.sx = sx
+
+    def apply(self, function: str) -> Symbol:
+        """The result of a unary function of `maths`."""
+        return Symbol(_FUNCTIONS[function](self.sx))
+
+    def where(self, then: Any, otherwise: Any) -> Symbol:
+        """The result of a choice on this condition."""
+        return Symbol(ca.if_else(self.sx, _expression(then), _expression(otherwise)))
+
+    def _refuse(self, *_: Any) -> Any:
+        raise TracingError(f"a value was asked for its truth or turned into a plain number; {_REMEDY}")
+
+    def _refuse_division(self, *_: Any) -> Any:
+        raise TracingError("// and % cannot be traced: Python and C round them differently; use maths.floor")
+
+    __bool__ = __float__ = __int__ = __index__ = __complex__ = _refuse
+    __floordiv__ = __rfloordiv__ = __mod__ = __rmod__ = _refuse_division
+
+    def __neg__(self) -> Symbol:
+        return Symbol(-self.sx)
+
+    def __pos__(self) -> Symbol:
+        return self
+
+    def __abs__(self) -> Symbol:
+        return Symbol(ca.fabs(self.sx))
+
+
+def _binary(operation: Callable[[Any, Any], Any], swapped: bool = False) -> Callable[[Symbol, Any], Any]:
+    def method(self: Symbol, other: Any) -> Any:
+        # NumPy leaves an operation of an array with a symbol to the symbol, whichever side it stands on.
+        if isinstance(other, np.ndarray):
+            return elementwise(functools.partial(method, self), other)
+        a, b = self.sx, _expression(other)
+        return Symbol(operation(b, a) if swapped else operation(a, b))
+
+    return method
+
+
+def _expression(value: Any) -> Any:
+    """A value as a CasADi scalar; truth values are 0 and 1, as in C."""
+    if isinstance(value, Symbol):
+        return value.sx
+    if isinstance(value, bool | int | float | np.bool_ | np.integer | np.floating):
+        return ca.SX(float(value))
+    raise TracingError(f"{value!r} is neither a number nor an expression")
+
+
+for _name, _operation in {
+    "add": lambda a, b: a + b,
+    "sub": lambda a, b: a - b,
+    "mul": lambda a, b: a * b,
+    "truediv": lambda a, b: a / b,
+    "pow": lambda a, b: a**b,
+}.items():
+    setattr(Symbol, f"__{_name}__", _binary(_operation))
+    setattr(Symbol, f"__r{_name}__", _binary(_operation, swapped=True))
+for _name, _operation in {
+    "lt": lambda a, b: a < b,
+    "le": lambda a, b: a <= b,
+    "gt": lambda a, b: a > b,
+    "ge": lambda a, b: a >= b,
+    "eq": lambda a, b: a == b,
+    "ne": lambda a, b: a != b,
+}.items():
+    setattr(Symbol, f"__{_name}__", _binary(_operation))
+
+
+@dataclass(frozen=True)
+class Layout:
+    """Where everything stands among the values: the first place and the number of each kind."""
+
+    variables: int
+    outputs: tuple[int, int]
+    states: tuple[int, int]
+    memory: tuple[int, int]
+    tape: tuple[int, int]
+    noise: tuple[int, int]
+
+    @property
+    def values(self) -> int:
+        """Length of the vector."""
+        return sum(self.noise)
+
+
+@dataclass(frozen=True)
+class Traced:
+    """A component as C.
+
+    Attributes:
+        code: the C functions ``<prefix>_outputs``, ``_derivatives``, ``_update``, ``_initial``, ``_keep``,
+            ``_directional``; those that would compute nothing are left out.
+        layout: where the values stand.
+        initial: names of the scalars that ``initial`` computes, in the order of its results.
+        reinitialised: names of the states that ``update`` may re-initialise.
+    """
+
+    code: str
+    layout: Layout
+    initial: tuple[str, ...]
+    reinitialised: tuple[str, ...]
+
+
+def layout(component: Component) -> Layout:
+    """The places of a component's values."""
+    variables = scalar_variables(component)
+
+    def place(*kinds: type) -> tuple[int, int]:
+        references = [v.reference for v in variables if isinstance(v.slot.declaration, kinds)]
+        return (references[0], len(references)) if references else (len(variables), 0)
+
+    columns = sum(len(slot.scalars) for slot in component.of(Tape))
+    cells = sum(int(np.size(component.__dict__[name])) for name in component.noises)
+    count = len(variables)
+    return Layout(count, place(Output), place(State), place(Memory), (count, columns), (count + columns, cells))
+
+
+def trace(component: Component, prefix: str) -> Traced:
+    """Run a component's equations on symbols.
+
+    Args:
+        component: built; its values do not matter.
+        prefix: beginning of the C functions' names.
+
+    Raises:
+        TracingError: an equation cannot be traced; component, method and construct are named.
+    """
+    before = ca.GlobalOptions.getSimplificationOnTheFly()
+    # Rearranged operations would round differently from the Python they came from.
+    ca.GlobalOptions.setSimplificationOnTheFly(False)
+    try:
+        return _Tracer(component, prefix).trace()
+    finally:
+        ca.GlobalOptions.setSimplificationOnTheFly(before)
+
+
+class _Tracer:
+    def __init__(self, component: Component, prefix: str) -> None:
+        self.name = type(component).__name__
+        self.prefix = prefix
+        self.layout = layout(component)
+        self.clock = ca.SX.sym("clock", 2)
+        self.values = ca.SX.sym("values", self.layout.values)
+        self.probe = type(component)(**component.build_arguments)
+        self._fill()
+
+    def _fill(self) -> None:
+        place = self.probe.__dict__
+        references = {v.name: v.reference for v in scalar_variables(self.probe)}
+        for slot in self.probe.slots.values():
+            if slot.type is not str and slot.scalars[0] in references:
+                place[slot.name] = self._cells([references[name] for name in slot.scalars], slot.shape)
+        at = self.layout.tape[0]
+        for slot in self.probe.of(Tape):
+            place[slot.name] = self._cells(range(at, at + len(slot.scalars)), slot.shape)
+            at += len(slot.scalars)
+        for name in self.probe.noises:
+            shape = np.shape(place[name])
+            count = int(np.prod(shape, dtype=int))
+            place[name] = self._cells(range(at, at + count), shape)
+            at += count
+        place["time"] = Symbol(self.clock[0])
+
+    def _cells(self, references: Iterable[int], shape: tuple[int, ...]) -> Any:
+        cells = [Symbol(self.values[k]) for k in references]
+        if not shape:
+            return cells[0]
+        array = np.empty(len(cells), dtype=object)
+        array[:] = cells
+        return array.reshape(shape).view(SymbolArray)
+
+    def trace(self) -> Traced:
+        outputs = self._results("outputs", [*self.probe.of(Output)])
+        derivatives = self._results("derivatives", [*self.probe.of(State)])
+        started = self._returned("initial")
+        computed = [slot for slot in self.probe.of(State, Memory) if slot.name in started]
+        initial = self._flat(started, computed, "initial")
+        self.probe.__dict__["_step"] = Symbol(self.clock[1])
+        updated = self._returned("update")
+        again = [slot for slot in self.probe.of(State) if slot.name in updated]
+        update = self._flat(updated, [*self.probe.of(Memory), *self.probe.of(Tape), *again], "update")
+        del self.probe.__dict__["_step"]
+        keep = [_expression(self._returned("keep"))]
+        seed = ca.SX.sym("seed", self.layout.values)
+        differentiated = [*outputs, *derivatives]
+        directional = ca.jtimes(ca.vertcat(*differentiated), self.values, seed) if differentiated else None
+        functions = {
+            "outputs": outputs,
+            "derivatives": derivatives,
+            "initial": initial,
+            "update": update if self.probe.is_sampled else [],
+            "keep": keep if self.layout.tape[1] else [],
+        }
+        generator = ca.CodeGenerator("equations.c", {"casadi_int": "int"})
+        for name, results in functions.items():
+            if results:
+                generator.add(self._function(name, [self.clock, self.values], ca.vertcat(*results)))
+        if differentiated:
+            generator.add(self._function("directional", [self.clock, self.values, seed], directional))
+        return Traced(
+            _tidy(generator.dump()),
+            self.layout,
+            tuple(name for slot in computed for name in slot.scalars),
+            tuple(name for slot in again for name in slot.scalars),
+        )
+
+    def _function(self, name: str, arguments: list[Any], column: Any) -> Any:
+        return ca.Function(f"{self.prefix}_{name}", arguments, [ca.densify(column)], {"cse": True})
+
+    def _results(self, method: str, slots: list[Slot]) -> list[Any]:
+        return self._flat(self._returned(method), slots, method) if slots else []
+
+    def _returned(self, method: str) -> Any:
+        try:
+            return getattr(self.probe, method)()
+        except TracingError as error:
+            raise TracingError(f"{self.name}.{method}: {error}") from error
+        except (TypeError, AttributeError, ValueError, NotImplementedError) as error:
+            raise TracingError(f"{self.name}.{method} cannot be traced: {error}; {_REMEDY}") from error
+
+    def _flat(self, returned: dict[str, Any], slots: list[Slot], method: str) -> list[Any]:
+        cells: list[Any] = []
+        for slot in slots:
+            if slot.type is str:
+                raise TracingError(f"{self.name}.{slot.name} is a computed text; only a Python FMU can have one")
+            if slot.name not in returned:
+                raise TracingError(f"{self.name}.{method} returns no value of {slot.name!r}")
+            array = np.asarray(returned[slot.name], dtype=object)
+            if array.shape != slot.shape:
+                raise TracingError(
+                    f"{self.name}.{method}: {slot.name!r} has shape {array.shape}, declared {slot.shape}"
+                )
+            cells += [_expression(cell) for cell in array.flat]
+        return cells
+
+
+_HELPER = re.compile(r"^casadi_real (casadi_\w+\([^)]*\) \{\n.*?^\}\n)", re.MULTILINE | re.DOTALL)
+_FUNCTION = re.compile(
+    r"^/\* (?P<name>\w+):.*? \*/\nstatic int casadi_f\d+\([^)]*\) \{\n(?P<body>.*?)^\}\n", re.MULTILINE | re.DOTALL
+)
+
+
+def _tidy(code: str) -> str:
+    """The equations alone out of what CasADi writes, with internal linkage: models are linked into one program.
+
+    The rest of its file is an interface for CasADi itself (names, sparsity, reference counts), which nobody calls here.
+    """
+    helpers = [f"static double {text}" for text in _HELPER.findall(code)]
+    functions = [
+        f"static int {match['name']}(const double **arg, double **res)\n{{\n{match['body']}}}\n"
+        for match in _FUNCTION.finditer(code)
+    ]
+    unused = "  (void)arg;\n  (void)res;\n  return 0;\n"
+    text = "\n".join([*helpers, *(f.replace("  return 0;\n", unused) for f in functions)])
+    return text.replace("casadi_real", "double").replace("casadi_int", "int")
