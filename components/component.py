@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import difflib
+import inspect
 import math
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from typing import Any, ClassVar
 
@@ -13,6 +14,7 @@ import numpy as np
 from .declarations import (
     Data,
     Declaration,
+    Input,
     Memory,
     Noise,
     Output,
@@ -87,7 +89,9 @@ class Component:
     # Parameters of the runtime. Each belongs to the interface only where the component has what it governs.
     sample_time = Parameter("s", 0.0, minimum=0.0, description="sample period; 0 samples once per communication step")
     max_step = Parameter("s", 0.1, minimum=0.0, description="longest integration step inside a communication step")
-    seed = Parameter("1", 0, type=int, minimum=0, description="seed of this instance's random numbers")
+    seed = Parameter(
+        "1", 0, type=int, minimum=0, maximum=2**31 - 1, description="seed of this instance's random numbers"
+    )
     tape_file = Parameter("1", "", description="file the tape is read from at the start and written to at the end")
     tape_duration = Parameter("s", 300.0, minimum=0.0, description="longest trip the tape can hold")
     tape_cutoff = Parameter("Hz", 0.0, minimum=0.0, description="zero-phase low-pass between trips; 0 is off")
@@ -119,7 +123,7 @@ class Component:
         cls = type(self)
         unknown = [name for name in values if name not in cls.declarations and name != "time"]
         if unknown:
-            raise ComponentError(f"{cls.__name__} has no {_nearest(unknown[0], [*cls.declarations, 'time'])}")
+            raise ComponentError(f"{cls.__name__} has no {nearest(unknown[0], [*cls.declarations, 'time'])}")
         place = self.__dict__
         self.build_arguments: Values = {}
         for name, declaration in cls.declarations.items():
@@ -132,12 +136,13 @@ class Component:
             if isinstance(declaration, Variable):
                 slot = self._slot(declaration)
                 self.slots[name] = slot
-                place[name] = slot.start
+                if not isinstance(declaration, Output):
+                    place[name] = slot.start
             elif isinstance(declaration, Noise):
                 shape = self._shape(declaration.shape)
                 place[name] = np.zeros(shape) if shape else 0.0
         for name, value in values.items():
-            place[name] = float(value) if name == "time" else convert(self.slots[name], value, cls.__name__)
+            place[name] = float(value) if name == "time" else self._given(name, value)
 
     # ---------------------------------------------------------------- equations
 
@@ -154,7 +159,7 @@ class Component:
         return {}
 
     def update(self) -> Values:
-        """Next `Memory`, this sample's `Tape` rows and any re-initialised `State`, from values at the sample's start."""
+        """Next `Memory`, this sample's `Tape` row and any re-initialised `State`, from values at the sample's start."""
         return {}
 
     def keep(self) -> Any:
@@ -189,6 +194,22 @@ class Component:
         """The declared random numbers by name."""
         return {name: d for name, d in self.declarations.items() if isinstance(d, Noise)}
 
+    def __setattr__(self, name: str, value: Any) -> None:
+        if name not in ("slots", "build_arguments"):
+            raise ComponentError(
+                f"{type(self).__name__}.{name} cannot be assigned: the methods are pure; "
+                "give values to the constructor, and return what changes from update()"
+            )
+        super().__setattr__(name, value)
+
+    def _given(self, name: str, value: Any) -> Any:
+        owner = type(self).__name__
+        if name not in self.slots:  # a random number, given to look at one case
+            return convert(Slot(name, Variable(), "1", np.shape(self.__dict__[name]), 0.0), value, owner)
+        if isinstance(self.slots[name].declaration, Output):
+            raise ComponentError(f"{owner}.{name} is computed and cannot be set")
+        return convert(self.slots[name], value, owner)
+
     def _shape(self, shape: Shape) -> tuple[int, ...]:
         return tuple(_length(self, axis) for axis in shape)
 
@@ -208,12 +229,15 @@ def convert(slot: Slot, value: Any, owner: str) -> Any:
     """
     where = f"{owner}.{slot.name}"
     if slot.shape:
-        array = np.asarray(value, dtype=object if slot.type is str else None)
+        try:
+            array = np.asarray(value, dtype=None if isinstance(value, np.ndarray) else object)
+        except ValueError:
+            raise ComponentError(f"{where} has shape {slot.shape}, but the value given is ragged: {value!r}") from None
         if array.shape not in ((), slot.shape):
             raise ComponentError(f"{where} has shape {slot.shape}, but the value given has {array.shape}")
         flat = np.broadcast_to(array, slot.shape).flat
         elements = [_scalar(slot.type, item.item() if isinstance(item, np.generic) else item, where) for item in flat]
-        return np.array(elements, dtype=object if slot.type is str else slot.type).reshape(slot.shape)
+        return pack(slot, elements)
     if isinstance(value, np.ndarray | np.generic):
         if value.ndim:
             raise ComponentError(f"{where} is a scalar, but an array of shape {value.shape} was given")
@@ -221,13 +245,22 @@ def convert(slot: Slot, value: Any, owner: str) -> Any:
     return _scalar(slot.type, value, where)
 
 
+def pack(slot: Slot, elements: Any) -> Any:
+    """Elements of the right type as a slot's value; arrays come out read-only, because equations change nothing."""
+    if not slot.shape:
+        return elements
+    array = np.array(elements, dtype=object if slot.type is str else slot.type).reshape(slot.shape)
+    array.flags.writeable = False
+    return array
+
+
 def _scalar(kind: ScalarType, value: Any, where: str) -> Any:
-    accepted: tuple[type, ...] = (float, int) if kind is float else (kind,)
+    accepted: tuple[Any, ...] = (float, int) if kind is float else (kind,)
     if not isinstance(value, accepted) or (kind is not bool and isinstance(value, bool)):
         raise ComponentError(f"{where} takes a {kind.__name__}, not {value!r}")
-    if kind is float and not math.isfinite(value):
+    if isinstance(value, float) and not math.isfinite(value):
         raise ComponentError(f"{where} takes a finite number, not {value!r}")
-    return kind(value)
+    return float(value) if kind is float else value
 
 
 def _length(component: Component, axis: int | Size | SizeExpression) -> int:
@@ -235,7 +268,13 @@ def _length(component: Component, axis: int | Size | SizeExpression) -> int:
         return axis
     if isinstance(axis, Size):
         return int(getattr(component, axis.name))
-    return int(getattr(component, axis.size.name)) + axis.offset
+    length = int(getattr(component, axis.size.name)) + axis.offset
+    if length < 0:
+        raise ComponentError(
+            f"{type(component).__name__}: {axis.size.name} = {length - axis.offset} leaves an array "
+            f"of length {length}; take at least {-axis.offset}"
+        )
+    return length
 
 
 def _build_argument(cls: type, declaration: Size | Data, given: Any) -> Any:
@@ -248,8 +287,8 @@ def _build_argument(cls: type, declaration: Size | Data, given: Any) -> Any:
         return given
     try:
         return declaration.convert(given)
-    except (ValueError, TypeError, KeyError, IndexError) as error:
-        raise ComponentError(f"{where} is unusable: {error}") from error
+    except (ValueError, TypeError, AttributeError, LookupError) as error:
+        raise ComponentError(f"{where} is unusable: {type(error).__name__}: {error}") from error
 
 
 def _shown(declaration: Declaration) -> bool:
@@ -258,14 +297,33 @@ def _shown(declaration: Declaration) -> bool:
 
 def _check_declarations(cls: type[Component]) -> None:
     for name, declaration in cls.declarations.items():
-        if isinstance(declaration, Tape) and not {"trip", "trip_time"} <= set(cls.declarations):
-            raise ComponentError(f"{cls.__name__} has the tape {name!r} but lacks the inputs 'trip' and 'trip_time'")
+        where = f"{cls.__name__}.{name}"
+        if not isinstance(inspect.getattr_static(cls, name), Declaration):
+            raise ComponentError(
+                f"{where} hides the declaration of that name; declare it anew, {name} = Parameter(...)"
+            )
+        if isinstance(declaration, Tape) and not _has_trip_inputs(cls):
+            raise ComponentError(
+                f"{where} is a tape, but the inputs 'trip' (type = int) and 'trip_time' (real) are not declared"
+            )
+        if isinstance(declaration, Noise) and cls.declarations.get(declaration.hold.name) is not declaration.hold:
+            raise ComponentError(f"{where}: hold must be a Parameter of the same component")
         if isinstance(declaration, State | Tape) and declaration.type is not float:
-            raise ComponentError(f"{cls.__name__}.{name}: a {type(declaration).__name__} is a real number")
-        if hasattr(Component, name) and not isinstance(vars(Component).get(name), Declaration):
-            raise ComponentError(f"{cls.__name__}.{name}: the name belongs to Component; choose another")
+            raise ComponentError(f"{where}: a {type(declaration).__name__} is a real number")
+        taken = hasattr(Component, name) or name in ("slots", "build_arguments")
+        if taken and not isinstance(vars(Component).get(name), Declaration):
+            raise ComponentError(f"{where}: the name belongs to Component; choose another")
 
 
-def _nearest(name: str, known: list[str]) -> str:
+def _has_trip_inputs(cls: type[Component]) -> bool:
+    trip, trip_time = cls.declarations.get("trip"), cls.declarations.get("trip_time")
+    if not (isinstance(trip, Input) and isinstance(trip_time, Input)):
+        return False
+    return not (trip.shape or trip_time.shape) and trip.type is int and trip_time.type is float
+
+
+def nearest(name: str, known: Iterable[str]) -> str:
+    """A misspelt name in quotes, with the nearest known one, or else with all of them."""
+    known = list(known)
     close = difflib.get_close_matches(name, known, 1)
     return f"{name!r}" + (f"; did you mean {close[0]!r}?" if close else f"; it has {', '.join(sorted(known))}")

@@ -33,7 +33,10 @@ class Declaration:
         # A non-data descriptor: the value in the instance's __dict__ wins, at the speed of a plain attribute.
         if instance is None:
             return self
-        raise AttributeError(f"{owner.__name__}.{self.name} has no value here")
+        raise AttributeError(
+            f"{owner.__name__}.{self.name} has no value to read: an output is what outputs() returns; "
+            "equations that need it share a method of their own"
+        )
 
     def __repr__(self) -> str:
         return f"<{type(self).__name__} {self.name}>"
@@ -85,8 +88,9 @@ class Variable(Declaration):
 
     Args:
         unit: SI unit such as ``"m/s2"`` or ``"N/kg"``; ``"1"`` for a plain number; a `Data` to let the builder say.
-        start: value before the simulation begins; its type gives the variable's type.
-        type: float, int, bool or str, where it differs from the type of ``start``.
+        start: value before the simulation begins. A boolean or a text gives the variable its type, a number does not:
+            without ``type = int`` it is real, so that a forgotten ``.0`` changes nothing.
+        type: float, int, bool or str.
         shape: lengths of the axes: integers, a `Size` or a `Size` plus a constant. Empty for a scalar.
         minimum: smallest sensible value.
         maximum: largest sensible value.
@@ -114,7 +118,7 @@ class Variable(Declaration):
 
 
 class Parameter(Variable):
-    """A value that does not change by itself; a ``tunable`` one may be set between steps, others only before the start."""
+    """A value that does not change by itself; a ``tunable`` one may be set between steps, others before the start."""
 
     def __init__(self, unit: str | Data = "1", start: Any = 0.0, *, tunable: bool = False, **rest: Any) -> None:
         super().__init__(unit, start, **rest)
@@ -153,7 +157,7 @@ class Memory(Variable):
 
 
 class Tape(Variable):
-    """Memory along one trip: reads what the trip before recorded at the same sample; ``update`` returns this trip's row.
+    """Memory along one trip: reads what the trip before recorded at the same sample; ``update`` returns the new row.
 
     A component with a tape has the inputs ``trip`` (integer) and ``trip_time`` (s).
     """
@@ -179,6 +183,8 @@ class Noise(Declaration):
 
 
 def _type_of(start: Any) -> ScalarType:
+    while isinstance(start, list | tuple) and start:
+        start = start[0]
     for candidate in (bool, str):
         if isinstance(start, candidate):
             return candidate

@@ -1,8 +1,8 @@
 """The functions equations may use, on floats, arrays and symbols alike.
 
 Scalars go through Python's ``math``, as compiled C goes through its ``libm``; arrays element by element through the
-same functions, so that a number does not depend on whether it stood in an array. Anything else is a symbol (a tracer that
-follows dependencies, or one that records an expression) and is asked to apply the function itself.
+same functions, so that a number does not depend on whether it stood in an array. Anything else is a symbol (a tracer
+that follows dependencies, or one that records an expression) and is asked to apply the function itself.
 """
 
 from __future__ import annotations
@@ -37,10 +37,11 @@ class SymbolArray(np.ndarray[Any, Any]):
     def __ne__(self, other: Any) -> Any:
         return np.not_equal(self, other, dtype=object)
 
-    __hash__ = None  # type: ignore[assignment]
+    __hash__ = None
 
 
-def _map(function: Callable[..., Any], *arguments: Any) -> Any:
+def elementwise(function: Callable[..., Any], *arguments: Any) -> Any:
+    """A function of scalars on arrays, broadcast: a plain array of numbers, or an array of symbols."""
     arrays = np.broadcast_arrays(*(np.asarray(a, dtype=object) for a in arguments))
     results = [function(*elements) for elements in zip(*(a.flat for a in arrays), strict=True)]
     plain = all(isinstance(r, bool | int | float | np.generic) for r in results)
@@ -51,12 +52,12 @@ def _map(function: Callable[..., Any], *arguments: Any) -> Any:
     return cells.reshape(arrays[0].shape).view(SymbolArray)
 
 
-def _unary(name: str, function: Callable[[float], float], doc: str) -> Callable[[Any], Any]:
+def _unary(name: str, function: Callable[[Any], float], doc: str) -> Callable[[Any], Any]:
     def apply(x: Any) -> Any:
-        if isinstance(x, float | int):
+        if isinstance(x, float | int | np.integer):
             return function(x)
         if isinstance(x, np.ndarray):
-            return _map(apply, x)
+            return elementwise(apply, x)
         return x.apply(name)
 
     apply.__name__ = name
@@ -77,12 +78,13 @@ absolute = _unary("abs", abs, "Absolute value; ``abs(x)`` does the same.")
 
 def where(condition: Any, then: Any, otherwise: Any) -> Any:
     """``then`` where the condition holds, else ``otherwise``. Both are evaluated: guard their arguments."""
+    # Arrays first, even where the condition is one plain boolean: the result's shape must not depend on its value.
+    if isinstance(condition, np.ndarray) or isinstance(then, np.ndarray) or isinstance(otherwise, np.ndarray):
+        return elementwise(where, condition, then, otherwise)
     if isinstance(condition, bool | np.bool_):
         return then if condition else otherwise
-    if isinstance(condition, np.ndarray):
-        return _map(where, condition, then, otherwise)
-    if any(isinstance(branch, np.ndarray) for branch in (then, otherwise)):
-        return _map(where, condition, then, otherwise)
+    if isinstance(condition, int | float | str | np.generic):
+        raise TypeError(f"where() takes a condition, that is a boolean or a comparison, not {condition!r}")
     return condition.where(then, otherwise)
 
 
@@ -138,7 +140,8 @@ def piecewise_constant(x: Any, breakpoints: Sequence[Any] | np.ndarray, values: 
         values: value from each breakpoint on, shape (n,).
     """
     result = values[0]
-    for position, value in zip(breakpoints[1:], values[1:], strict=True):
+    # The first breakpoint too, though it changes no number: the result takes the shape of x.
+    for position, value in zip(breakpoints, values, strict=True):
         result = where(x >= position, value, result)
     return result
 
@@ -151,7 +154,7 @@ def piecewise_linear(x: Any, breakpoints: Sequence[Any] | np.ndarray, values: Se
         breakpoints: strictly rising positions, shape (n,).
         values: value at each breakpoint, shape (n,).
     """
-    result = values[0]
+    result = where(x >= breakpoints[0], values[0], values[0])
     for k in range(len(breakpoints) - 1):
         width = breakpoints[k + 1] - breakpoints[k]
         width = where(width > 0.0, width, 1.0)

@@ -8,6 +8,9 @@ the last bit.
 from __future__ import annotations
 
 import math
+from typing import Any
+
+import numpy as np
 
 _MASK = (1 << 64) - 1
 _LN2_HIGH = 0.693147180369123816490
@@ -88,3 +91,20 @@ def _ratio(polynomials: tuple[tuple[float, ...], tuple[float, ...]], r: float) -
         numerator = numerator * r + high
         denominator = denominator * r + low
     return numerator / denominator
+
+
+def cells(distribution: str, seed: int, stream: int, index: int, shape: tuple[int, ...]) -> Any:
+    """One number, or an array of independent ones, of a declared `Noise`.
+
+    Args:
+        distribution: ``"normal"`` or ``"uniform"``.
+        seed: of the instance.
+        stream: which `Noise` of the component, below 2^32.
+        index: counts the intervals over which a value is held.
+        shape: of the array; empty for a scalar.
+    """
+    draw = normal if distribution == "normal" else uniform
+    if not shape:
+        return draw(seed, stream, index)
+    # The element's number goes into the upper half of the stream, so that no two streams meet.
+    return np.array([draw(seed, stream + (k << 32), index) for k in range(math.prod(shape))]).reshape(shape)

@@ -20,14 +20,13 @@ from typing import Any, Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from . import noise
-from .component import Component, ComponentError, Slot, convert
+from .component import Component, ComponentError, Slot, convert, nearest, pack
 from .declarations import Input, Memory, Output, Parameter, State, Tape
+from .equations import Equations
 from .tape import TapeDeck
-from .tracing import TracingError, feedthrough
+from .tracing import TracingError, feedthrough, initial_dependencies
 
 Phase = Literal["instantiated", "initialization", "running", "terminated"]
-_DRAW = {"normal": noise.normal, "uniform": noise.uniform}
 _GRID_TOLERANCE = 1e-6
 """How far, relative to a sample, a communication step may miss a whole number of samples (rounding, h = 1/3)."""
 
@@ -39,56 +38,44 @@ class Simulation:
         component: the built component; the simulation owns it from here on.
 
     Raises:
-        ComponentError: from every method, with the component, the variable and the remedy.
+        ComponentError: from every method, with the component, the variable and the remedy. An exception inside an
+            equation passes unchanged.
     """
 
     def __init__(self, component: Component) -> None:
         self.component = component
         self.name = type(component).__name__
         self.phase: Phase = "instantiated"
+        self._equations = Equations(component)
         self._values = component.__dict__
-        self._states = tuple(component.of(State))
-        self._outputs = tuple(component.of(Output))
-        self._kept = tuple(component.of(Memory))
-        self._tapes = tuple(component.of(Tape))
-        self._output_names = {slot.name for slot in self._outputs}
-        self._state_names = {slot.name for slot in self._states}
-        self._kept_names = {slot.name for slot in self._kept}
-        self._returned = {
-            "outputs": self._output_names,
-            "initial": self._state_names | self._kept_names,
-            "update": self._state_names | self._kept_names | {slot.name for slot in self._tapes},
-        }
-        self._held_names: frozenset[str] = self._feedthrough_names() if component.is_sampled else frozenset()
+        self._given = {name: self._values[name] for name in component.slots if name in self._values}
+        self._held_names = self._feedthrough_names() if component.is_sampled else frozenset()
+        self._computed_starts = self._computed_start_names()
         self._deck: TapeDeck | None = None
+        self._prepared = False
         self._fresh: dict[str, Any] | None = None
-        self._computed_starts: frozenset[str] = frozenset()
-        self._given = {slot.name: self._values[slot.name] for slot in component.slots.values()}
 
     # ---------------------------------------------------------------- life cycle
 
     def initialize(self, start_time: float = 0.0) -> None:
         """Enter initialization: parameters and start values are still open, outputs are already consistent."""
-        if self.phase != "instantiated":
-            raise ComponentError(f"{self.name} is already initialized; reset it first")
-        self._values["time"] = start_time
+        self._expect("be initialized", "instantiated")
         self.phase = "initialization"
-        self._fresh = None
+        self.time = start_time
 
     def start(self) -> None:
-        """Leave initialization: fixed parameters are closed from here on, the tape file is read."""
-        self._check_parameters()
-        self._apply_initial()
-        if self._tapes:
-            self._deck = self._make_deck()
+        """Leave initialization: fixed parameters are closed from here on."""
+        self._expect("start", "initialization")
+        for slot in self.component.of(Parameter):
+            self._check_bounds(slot, self._values[slot.name])
+        self._prepare()
         self.phase = "running"
         self._fresh = None
 
     def step(self, length: float) -> None:
         """Advance by one communication step of ``length`` seconds from the current time."""
-        if self.phase != "running":
-            raise ComponentError(f"{self.name} cannot step: it is {self.phase}")
-        if not length > 0.0:
+        self._expect("step", "running")
+        if not 0.0 < length < math.inf:
             raise ComponentError(f"{self.name}: a communication step must be positive, not {length!r} s")
         begin = self._values["time"]
         held: dict[str, Any] = {}
@@ -96,18 +83,18 @@ class Simulation:
             count, sample = self.samples(length)
             for k in range(count):
                 self._values["time"] = begin + k * sample
-                held = self._sample(sample)
-                self._integrate(begin + k * sample, sample)
-        elif self._states:
-            self._integrate(begin, length)
+                held = self._sample(sample, k * sample)
+                self._equations.integrate(begin + k * sample, sample)
+        else:
+            self._equations.integrate(begin, length)
         self._values["time"] = begin + length
         self._fresh = None
         if held:
-            self._fresh = self._evaluate_outputs() | held
+            self._fresh = self._evaluate() | held
 
     def terminate(self) -> None:
         """End the run: the tape, with the trip in progress if it is to be kept, goes to its file."""
-        if self._deck is not None and self._values["tape_file"]:
+        if self.phase == "running" and self._deck is not None and self._values["tape_file"]:
             self._deck.commit(self.component.keep)
             self._deck.save(Path(self._values["tape_file"]))
         self.phase = "terminated"
@@ -115,10 +102,9 @@ class Simulation:
     def reset(self) -> None:
         """Back to the state after construction; a rerun gives the same bits."""
         self._values.update(self._given)
-        self._values["time"] = 0.0
         self.phase = "instantiated"
         self._deck = None
-        self._fresh = None
+        self.time = 0.0
 
     # ---------------------------------------------------------------- values
 
@@ -130,27 +116,28 @@ class Simulation:
     @time.setter
     def time(self, value: float) -> None:
         self._values["time"] = value
-        self._fresh = None
+        self.invalidate()
 
     def get(self, name: str) -> Any:
         """A variable's value, outputs evaluated with the inputs as they now are."""
         slot = self._slot(name)
+        if self.phase == "initialization":
+            self._prepare()
         if isinstance(slot.declaration, Output):
             if self._fresh is None:
-                if self.phase == "initialization":
-                    self._apply_initial()
-                self._fresh = self._evaluate_outputs()
+                self._fresh = self._evaluate()
             return self._fresh[name]
-        if self.phase == "initialization" and isinstance(slot.declaration, State | Memory):
-            self._apply_initial()
         return self._values[name]
 
     def set(self, name: str, value: Any) -> None:
         """Set an input or a tunable parameter at any time; a fixed parameter or a start value before the run begins."""
         slot = self._slot(name)
         self.check_settable(slot)
-        self._values[name] = convert(slot, value, self.name)
-        self._fresh = None
+        converted = convert(slot, value, self.name)
+        if self.phase == "running" and isinstance(slot.declaration, Parameter):
+            self._check_bounds(slot, converted)
+        self._values[name] = converted
+        self.invalidate()
 
     def check_settable(self, slot: Slot) -> None:
         """Raise unless the variable may be set in the present phase."""
@@ -164,21 +151,20 @@ class Simulation:
             raise ComponentError(f"{self.name}.{slot.name} is {what}; it can only be set before the run begins")
 
     def invalidate(self) -> None:
-        """Say that a value was changed in place, past `set`: outputs are to be evaluated anew."""
+        """Say that a value was changed past `set`: what follows from it is to be evaluated anew."""
         self._fresh = None
+        self._prepared = False
 
     # ---------------------------------------------------------------- whole state
 
     def save(self) -> dict[str, Any]:
         """The complete state as JSON-ready values: `restore` and the same steps give the same bits."""
-        values = {slot.name: _plain(self._values[slot.name]) for slot in self.component.slots.values()}
-        held = None if self._fresh is None else {name: _plain(value) for name, value in self._fresh.items()}
         return {
             "component": self.name,
             "phase": self.phase,
             "time": self.time,
-            "values": values,
-            "fresh": held,
+            "values": {name: _plain(self._values[name]) for name in self._given},
+            "fresh": None if self._fresh is None else {name: _plain(value) for name, value in self._fresh.items()},
             "tape": None if self._deck is None else self._deck.state(),
         }
 
@@ -186,22 +172,24 @@ class Simulation:
         """Take back what `save` gave.
 
         Raises:
-            ComponentError: the state belongs to another component.
+            ComponentError: the state belongs to another component, or to one built with other arguments.
         """
-        if state["component"] != self.name or set(state["values"]) != set(self.component.slots):
-            raise ComponentError(f"a saved state of {state['component']} does not fit {self.name}")
-        for name, value in state["values"].items():
-            slot = self.component.slots[name]
-            self._values[name] = np.array(value, dtype=slot.type) if slot.shape else value
-        self._values["time"] = state["time"]
-        self.phase = state["phase"]
         slots = self.component.slots
-        fresh = state["fresh"]
-        self._fresh = None if fresh is None else {n: np.array(v) if slots[n].shape else v for n, v in fresh.items()}
+        try:
+            if state["component"] != self.name or set(state["values"]) != set(self._given):
+                raise ValueError
+            values = {name: pack(slots[name], value) for name, value in state["values"].items()}
+            fresh = state["fresh"] and {name: pack(slots[name], value) for name, value in state["fresh"].items()}
+        except ValueError:
+            raise ComponentError(f"a saved state of {state['component']} does not fit this {self.name}") from None
+        self._values.update(values)
+        self.phase = state["phase"]
+        self.time = state["time"]
         self._deck = None
         if state["tape"] is not None:
-            self._deck = self._make_deck(load=False)
+            self._deck = self._make_deck()
             self._deck.restore(state["tape"])
+        self._fresh = fresh
 
     def to_bytes(self) -> bytes:
         """The saved state, serialized; numbers survive exactly."""
@@ -222,109 +210,68 @@ class Simulation:
             )
         return count, length / count
 
-    def _sample(self, period: float) -> dict[str, Any]:
-        component, values = self.component, self._values
-        self._follow_trip()
-        outputs = self._evaluate_outputs()
-        component._step = period
-        try:
-            changes = self._checked("update", component.update())
-        finally:
-            component._step = None
-        missing = self._kept_names - set(changes)
-        if missing:
-            raise ComponentError(f"{self.name}.update returns no next value of {sorted(missing)}")
-        if self._deck is not None:
-            self._deck.record(values["trip_time"], _row(self._tapes, changes, self.name))
-        for slot in (*self._kept, *self._states):
-            if slot.name in changes:
-                values[slot.name] = self._cast(slot, changes[slot.name], "update")
+    def _sample(self, period: float, elapsed: float) -> dict[str, Any]:
+        """One sample, ``elapsed`` seconds after the inputs were read; gives the outputs to be held."""
+        values, deck = self._values, self._deck
+        if deck is not None:
+            deck.follow(values["trip"], values["trip_time"], self.component.keep)
+        outputs = self._evaluate(elapsed)
+        changes = self._equations.update(period)
+        if deck is not None:
+            deck.record(self._trip_time(elapsed), changes)
+        values.update((slot.name, changes[slot.name]) for slot in self._equations.memory)
+        values.update((slot.name, changes[slot.name]) for slot in self._equations.states if slot.name in changes)
         return {name: outputs[name] for name in self._held_names}
 
-    def _integrate(self, begin: float, length: float) -> None:
-        """Classical Runge-Kutta in equal sub-steps no longer than ``max_step``, inputs and memory held."""
-        if not self._states:
-            return
-        longest = self._values["max_step"]
-        count = max(1, math.ceil(length / longest - 1e-9)) if longest > 0.0 else 1
-        h = length / count
-        values, names = self._values, [slot.name for slot in self._states]
-        x = {name: values[name] for name in names}
-        for k in range(count):
-            t = begin + k * h
-            k1 = self._rates(t, x)
-            k2 = self._rates(t + 0.5 * h, {n: x[n] + (0.5 * h) * k1[n] for n in names})
-            k3 = self._rates(t + 0.5 * h, {n: x[n] + (0.5 * h) * k2[n] for n in names})
-            k4 = self._rates(t + h, {n: x[n] + h * k3[n] for n in names})
-            x = {n: x[n] + (h / 6.0) * (((k1[n] + 2.0 * k2[n]) + 2.0 * k3[n]) + k4[n]) for n in names}
-        for slot in self._states:
-            values[slot.name] = self._cast(slot, x[slot.name], "derivatives")
-
-    def _rates(self, t: float, x: Mapping[str, Any]) -> dict[str, Any]:
-        self._values["time"] = t
-        self._values.update(x)
-        rates = self.component.derivatives()
-        if rates.keys() != x.keys():
-            raise ComponentError(f"{self.name}.derivatives returns {sorted(rates)}, but the states are {sorted(x)}")
-        return rates
-
-    def _evaluate_outputs(self) -> dict[str, Any]:
-        self._refresh_noise()
-        if self._tapes:
-            self._read_tape()
-        returned = self._checked("outputs", self.component.outputs())
-        missing = self._output_names - set(returned)
-        if missing:
-            raise ComponentError(f"{self.name}.outputs returns no value of {sorted(missing)}")
-        return {slot.name: self._cast(slot, returned[slot.name], "outputs") for slot in self._outputs}
-
-    def _apply_initial(self) -> None:
-        self._refresh_noise()
-        slots = {slot.name: slot for slot in (*self._states, *self._kept)}
-        computed = self._checked("initial", self.component.initial())
-        for name, value in computed.items():
-            self._values[name] = self._cast(slots[name], value, "initial")
-        self._computed_starts = frozenset(computed)
-
-    def _refresh_noise(self) -> None:
-        for stream, (name, declaration) in enumerate(self.component.noises.items()):
-            hold = self._values[declaration.hold.name]
-            if not hold > 0.0:
-                raise ComponentError(f"{self.name}.{declaration.hold.name} must be positive: it holds {name!r}")
-            index, seed = round(self._values["time"] / hold), self._values["seed"]
-            draw = _DRAW[declaration.distribution]
-            shape = np.shape(self._values[name])
-            if shape:
-                # The element's number goes into the upper half of the stream, so that no two streams meet.
-                cells = [draw(seed, stream + (k << 32), index) for k in range(math.prod(shape))]
-                self._values[name] = np.array(cells).reshape(shape)
-            else:
-                self._values[name] = draw(seed, stream, index)
-
-    # ---------------------------------------------------------------- tape
-
-    def _make_deck(self, load: bool = True) -> TapeDeck:
-        values = self._values
-        start = np.concatenate([np.ravel(self._given[slot.name]) for slot in self._tapes]).astype(np.float64)
-        deck = TapeDeck(self.name, start, values["sample_time"], values["tape_duration"], values["tape_cutoff"])
-        path = Path(values["tape_file"]) if values["tape_file"] else None
-        if load and path is not None and path.exists():
-            deck.load(path)
-        return deck
-
-    def _follow_trip(self) -> None:
+    def _evaluate(self, elapsed: float = 0.0) -> dict[str, Any]:
+        self._equations.draw()
         if self._deck is not None:
-            self._deck.follow(self._values["trip"], self._values["trip_time"], self.component.keep)
+            self._values.update(self._deck.read(self._trip_time(elapsed)))
+        return self._equations.evaluate()
 
-    def _read_tape(self) -> None:
-        if self._deck is None:
+    def _trip_time(self, elapsed: float) -> float:
+        """Time along the trip: within a communication step of several samples the tape runs on; a wait stays a wait."""
+        trip_time = float(self._values["trip_time"])
+        waiting = self._deck is not None and self._deck.waiting(trip_time)
+        return trip_time if waiting else trip_time + elapsed
+
+    # ---------------------------------------------------------------- the initial state
+
+    def _prepare(self) -> None:
+        """Bring what follows from parameters, start values and inputs up to date with them: starts, and the tape."""
+        if self._prepared:
             return
-        row = self._deck.read(self._values["trip_time"])
-        at = 0
-        for slot in self._tapes:
-            size = len(slot.scalars)
-            self._values[slot.name] = row[at : at + size].reshape(slot.shape).copy() if slot.shape else float(row[at])
-            at += size
+        self._values.update((name, self._given[name]) for name in self._computed_starts)
+        self._equations.draw()
+        self._values.update(self._equations.initial())
+        if self._equations.tapes:
+            self._deck = self._make_deck()
+            path = self._values["tape_file"]
+            if path and Path(path).exists():
+                self._deck.load(Path(path))
+        self._prepared = True
+
+    def _make_deck(self) -> TapeDeck:
+        values = self._values
+        return TapeDeck(
+            self.name,
+            self._equations.tapes,
+            self._given,
+            sample_time=values["sample_time"],
+            duration=values["tape_duration"],
+            cutoff=values["tape_cutoff"],
+        )
+
+    def _computed_start_names(self) -> frozenset[str]:
+        """The states and memory that ``initial`` computes."""
+        if type(self.component).initial is Component.initial:
+            return frozenset()
+        try:
+            traced, _ = initial_dependencies(self.component)
+        except TracingError:
+            return frozenset(self.component.initial())
+        kept = self.component.of(State, Memory)
+        return frozenset(slot.name for slot in kept if not traced.keys().isdisjoint(slot.scalars))
 
     # ---------------------------------------------------------------- checks
 
@@ -332,52 +279,26 @@ class Simulation:
         try:
             return self.component.slots[name]
         except KeyError:
-            raise ComponentError(f"{self.name} has no variable {name!r}") from None
+            raise ComponentError(f"{self.name} has no variable {nearest(name, self.component.slots)}") from None
+
+    def _expect(self, what: str, phase: Phase) -> None:
+        if self.phase != phase:
+            raise ComponentError(f"{self.name} cannot {what}: its phase is {self.phase!r}, not {phase!r}")
 
     def _feedthrough_names(self) -> frozenset[str]:
         """Outputs of a sampled block that are held because they belong to the inputs they were computed from."""
         try:
             direct = feedthrough(self.component)
         except TracingError:
-            return frozenset(slot.name for slot in self._outputs)
-        return frozenset(s.name for s in self._outputs if any(direct[scalar] for scalar in s.scalars))
+            return frozenset(slot.name for slot in self._equations.outputs)
+        return frozenset(s.name for s in self._equations.outputs if any(direct[scalar] for scalar in s.scalars))
 
-    def _check_parameters(self) -> None:
-        for slot in self.component.of(Parameter):
-            low, high = slot.declaration.minimum, slot.declaration.maximum
-            value = np.asarray(self._values[slot.name])
-            if (low is not None and (value < low).any()) or (high is not None and (value > high).any()):
-                limits = f"[{'-inf' if low is None else low}, {'inf' if high is None else high}]"
-                raise ComponentError(f"{self.name}.{slot.name} = {value.tolist()!r} is outside {limits} {slot.unit}")
-
-    def _checked(self, method: str, returned: dict[str, Any]) -> dict[str, Any]:
-        known = self._returned[method]
-        if not returned.keys() <= known:
-            unknown = sorted(returned.keys() - known)
-            raise ComponentError(f"{self.name}.{method} returns {unknown}; it may return {sorted(known)}")
-        return returned
-
-    def _cast(self, slot: Slot, value: Any, method: str) -> Any:
-        array: Any
-        if slot.shape:
-            array = np.asarray(value, dtype=slot.type if slot.type is not str else object)
-            if array.shape != slot.shape:
-                shapes = f"{array.shape}, declared {slot.shape}"
-                raise ComponentError(f"{self.name}.{method}: {slot.name!r} has shape {shapes}")
-            finite = slot.type is not float or bool(np.isfinite(array).all())
-        else:
-            array = slot.type(value)
-            finite = slot.type is not float or math.isfinite(array)
-        if not finite:
-            raise ComponentError(f"{self.name}.{method}: {slot.name!r} is {_plain(array)!r} at t = {self.time!r} s")
-        return array
-
-
-def _row(tapes: tuple[Slot, ...], changes: Mapping[str, Any], owner: str) -> NDArray[np.float64]:
-    missing = [slot.name for slot in tapes if slot.name not in changes]
-    if missing:
-        raise ComponentError(f"{owner}.update returns no tape row of {missing}")
-    return np.concatenate([np.ravel(changes[slot.name]) for slot in tapes]).astype(np.float64)
+    def _check_bounds(self, slot: Slot, value: Any) -> None:
+        low, high = slot.declaration.minimum, slot.declaration.maximum
+        array = np.asarray(value)
+        if (low is not None and (array < low).any()) or (high is not None and (array > high).any()):
+            limits = f"[{'-inf' if low is None else low}, {'inf' if high is None else high}]"
+            raise ComponentError(f"{self.name}.{slot.name} = {array.tolist()!r} is outside {limits} {slot.unit}")
 
 
 def _plain(value: Any) -> Any:

@@ -9,14 +9,14 @@ from __future__ import annotations
 
 import math
 import os
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from .component import ComponentError
+from .component import ComponentError, Slot, pack
 
 Rows = NDArray[np.float64]
 _HEADER = "railcosim tape 1"
@@ -27,24 +27,40 @@ class TapeDeck:
 
     Args:
         owner: the component's name, for messages and the file's header.
-        start: a row before anything was learned, shape (columns,).
+        slots: the declared tapes; a row is all their elements in order.
+        start: a row before anything was learned, by name.
         sample_time: distance of the samples in s.
         duration: longest trip in s.
         cutoff: corner frequency of the low-pass between trips in Hz; 0 is off.
     """
 
-    def __init__(self, owner: str, start: Rows, sample_time: float, duration: float, cutoff: float) -> None:
+    def __init__(
+        self,
+        owner: str,
+        slots: tuple[Slot, ...],
+        start: Mapping[str, Any],
+        *,
+        sample_time: float,
+        duration: float,
+        cutoff: float,
+    ) -> None:
         if sample_time <= 0.0:
             raise ComponentError(f"{owner}.sample_time must be set: a tape is recorded on a fixed grid")
         self.owner = owner
-        self.start = start
+        self.slots = slots
+        self.start = self._row(start)
         self.sample_time = sample_time
         self.cutoff = cutoff
         self.length = round(duration / sample_time) + 1
-        self.committed: Rows = np.tile(start, (self.length, 1))
+        self.committed: Rows = np.tile(self.start, (self.length, 1))
         self.recording: Rows = self.committed.copy()
-        self.recorded = False
+        self.span: tuple[int, int] | None = None
+        """First and last sample recorded on the present trip."""
         self.trip: int | None = None
+
+    def waiting(self, trip_time: float) -> bool:
+        """Whether the train has not yet departed; a departure at zero may be told with a rounding error."""
+        return trip_time < -0.01 * self.sample_time
 
     def index(self, trip_time: float) -> int | None:
         """The sample along the trip; None while waiting (negative trip time).
@@ -52,7 +68,7 @@ class TapeDeck:
         Raises:
             ComponentError: off the sample grid by more than 1 % of a sample, or past the end of the tape.
         """
-        if trip_time < -0.01 * self.sample_time:
+        if self.waiting(trip_time):
             return None
         n = round(trip_time / self.sample_time)
         if abs(trip_time - n * self.sample_time) > 0.01 * self.sample_time:
@@ -65,17 +81,24 @@ class TapeDeck:
             )
         return n
 
-    def read(self, trip_time: float) -> Rows:
-        """What the last committed trip recorded here, shape (columns,); the start row while waiting."""
+    def read(self, trip_time: float) -> dict[str, Any]:
+        """What the last committed trip recorded here, by name; the start row while waiting."""
         n = self.index(trip_time)
-        return self.start if n is None else self.committed[n]
+        row = self.start if n is None else self.committed[n]
+        values, at = {}, 0
+        for slot in self.slots:
+            cells = row[at : at + len(slot.scalars)]
+            values[slot.name] = pack(slot, cells if slot.shape else float(cells[0]))
+            at += len(cells)
+        return values
 
-    def record(self, trip_time: float, row: Rows) -> None:
+    def record(self, trip_time: float, row: Mapping[str, Any]) -> None:
         """Store this trip's row; nothing is recorded while waiting."""
         n = self.index(trip_time)
         if n is not None:
-            self.recording[n] = row
-            self.recorded = True
+            self.recording[n] = self._row(row)
+            first, last = self.span or (n, n)
+            self.span = min(first, n), max(last, n)
 
     def follow(self, trip: int, trip_time: float, keep: Callable[[], Any]) -> None:
         """Notice a new trip: commit what was recorded if it is to be kept, drop it otherwise.
@@ -87,7 +110,7 @@ class TapeDeck:
             self.trip = trip
         if trip == self.trip:
             return
-        if trip_time >= 0.0:
+        if not self.waiting(trip_time):
             raise ComponentError(
                 f"{self.owner}: the trip number changed from {self.trip} to {trip} at trip_time = {trip_time!r} s; "
                 "it may change only while trip_time is negative (the wait before a departure)"
@@ -96,24 +119,30 @@ class TapeDeck:
         self.commit(keep)
 
     def commit(self, keep: Callable[[], Any]) -> None:
-        """End a trip: if anything was recorded and is to be kept, the filtered rows become the ones that are read."""
-        if self.recorded and keep():
-            self.committed = smooth(self.recording, self.cutoff, self.sample_time)
+        """End a trip: if anything was recorded and is to be kept, the filtered rows become the ones that are read.
+
+        Only the samples of this trip are filtered: what lies past its end is not part of the signal.
+        """
+        if self.span is not None and keep():
+            trip = slice(self.span[0], self.span[1] + 1)
+            self.committed = self.recording.copy()
+            self.committed[trip] = smooth(self.recording[trip], self.cutoff, self.sample_time)
         self.recording = self.committed.copy()
-        self.recorded = False
+        self.span = None
 
     def state(self) -> dict[str, Any]:
         """Everything a restore needs, as JSON-ready values."""
         return {
             "trip": self.trip,
-            "recorded": self.recorded,
+            "span": None if self.span is None else list(self.span),
             "committed": self.committed.tolist(),
             "recording": self.recording.tolist(),
         }
 
     def restore(self, state: dict[str, Any]) -> None:
         """Take back what `state` gave."""
-        self.trip, self.recorded = state["trip"], state["recorded"]
+        self.trip = state["trip"]
+        self.span = None if state["span"] is None else (state["span"][0], state["span"][1])
         self.committed = np.array(state["committed"], dtype=np.float64).reshape(self.committed.shape)
         self.recording = np.array(state["recording"], dtype=np.float64).reshape(self.committed.shape)
 
@@ -138,12 +167,16 @@ class TapeDeck:
         try:
             if lines[-1] != "end" or len(lines) != self.length + 2:
                 raise ValueError("it is cut short")
-            rows = np.array([[float(word) for word in line.split()] for line in lines[1:-1]], dtype=np.float64)
-            if rows.shape != self.committed.shape or not np.isfinite(rows).all():
-                raise ValueError("a row is incomplete or not finite")
+            numbers = [[float(word) for word in line.split()] for line in lines[1:-1]]
+            for number, row in enumerate(numbers, 2):
+                if len(row) != self.start.size or not all(map(math.isfinite, row)):
+                    raise ValueError(f"line {number} is incomplete or not finite")
         except ValueError as error:
-            raise ComponentError(f"{self.owner}.tape_file: {path} is corrupt: {error}") from error
-        self.committed, self.recording = rows, rows.copy()
+            raise ComponentError(
+                f"{self.owner}.tape_file: {path} is corrupt: {error}; remove it to start anew"
+            ) from error
+        self.committed = np.array(numbers, dtype=np.float64).reshape(self.committed.shape)
+        self.recording = self.committed.copy()
 
     def save(self, path: Path) -> None:
         """Write the tape file, whole or not at all."""
@@ -155,6 +188,9 @@ class TapeDeck:
             os.replace(part, path)
         except OSError as error:
             raise ComponentError(f"{self.owner}.tape_file: {path} cannot be written: {error}") from error
+
+    def _row(self, values: Mapping[str, Any]) -> Rows:
+        return np.concatenate([np.ravel(values[slot.name]) for slot in self.slots]).astype(np.float64)
 
     def _header(self) -> str:
         return (
@@ -175,8 +211,8 @@ def smooth(rows: Rows, cutoff: float, sample_time: float) -> Rows:
         return rows.copy()
     gain = 1.0 - math.exp(-2.0 * math.pi * cutoff * sample_time)
     # Ten time constants of run-in leave less than 5e-5 of the start value in the result.
-    pad = min(len(rows) - 1, math.ceil(10.0 / gain))
-    padded = np.concatenate([2.0 * rows[0] - rows[pad:0:-1], rows, 2.0 * rows[-1] - rows[-2 : -pad - 2 : -1]])
+    pad = math.ceil(10.0 / gain)
+    padded = np.pad(rows, ((pad, pad), (0, 0)), mode="reflect", reflect_type="odd")
     for direction in (1, -1):
         padded = _low_pass(padded[::direction], gain)[::direction]
     return np.array(padded[pad : pad + len(rows)])

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from typing import Any
 
@@ -9,9 +10,13 @@ import numpy as np
 
 from .component import Component, ComponentError
 from .declarations import Input, Memory, Output, Parameter, State, Tape
-from .maths import SymbolArray
+from .maths import SymbolArray, elementwise
 
 Names = frozenset[str]
+
+
+_TAPE_SOURCES: Names = frozenset({"trip_time", "sample_time", "tape_duration", "tape_file"})
+"""What a tape reads depends on where along the trip the component is, and on the file it was filled from."""
 
 
 class TracingError(ComponentError):
@@ -29,8 +34,9 @@ class Traced:
         self.names = names
 
     def _join(self, *others: Any) -> Any:
+        # NumPy leaves an operation of an array with a symbol to the symbol, whichever side it stands on.
         if any(isinstance(other, np.ndarray) for other in others):
-            return NotImplemented
+            return elementwise(self._join, *others)
         return Traced(self.names.union(*(other.names for other in others if isinstance(other, Traced))))
 
     def apply(self, function: str) -> Traced:
@@ -65,12 +71,17 @@ def dependencies(component: Component) -> dict[str, Names]:
     return _collect(component, "outputs", probe.outputs, Output)
 
 
+def rate_dependencies(component: Component) -> dict[str, Names]:
+    """The same for the rate of each scalar state."""
+    return _collect(component, "derivatives", _traced_copy(component).derivatives, State)
+
+
 def initial_dependencies(component: Component) -> tuple[dict[str, Names], dict[str, Names]]:
     """The same for the initial state: of what ``initial`` computes, and of the outputs that follow from it."""
     probe = _traced_copy(component)
     computed = _collect(component, "initial", probe.initial, State, Memory)
     for slot in probe.of(State, Memory):
-        if slot.scalars[0] in computed:
+        if slot.scalars and slot.scalars[0] in computed:
             cells = [Traced(computed[name]) for name in slot.scalars]
             probe.__dict__[slot.name] = _cells(cells, slot.shape)
     return computed, _collect(component, "outputs", probe.outputs, Output)
@@ -86,14 +97,14 @@ def feedthrough(component: Component) -> dict[str, Names]:
 def _traced_copy(component: Component) -> Component:
     probe = type(component)(**component.build_arguments)
     for slot in probe.of(Input, Parameter, State, Memory, Tape):
-        if slot.type is str:
+        if slot.type is str:  # a text is not traced: equations may compare it
             continue
-        if isinstance(slot.declaration, Tape):
-            # What a tape reads depends on where along the trip the component is.
-            cells = [Traced(frozenset({"trip_time"})) for _ in slot.scalars]
-        else:
-            cells = [Traced(frozenset({name})) for name in slot.scalars]
+        cells = [Traced(_TAPE_SOURCES if isinstance(slot.declaration, Tape) else frozenset({n})) for n in slot.scalars]
         probe.__dict__[slot.name] = _cells(cells, slot.shape)
+    for name, noise in probe.noises.items():
+        shape = np.shape(probe.__dict__[name])
+        sources = frozenset({"time", "seed", noise.hold.name})
+        probe.__dict__[name] = _cells([Traced(sources) for _ in range(math.prod(shape))], shape)
     probe.__dict__["time"] = Traced(frozenset({"time"}))
     return probe
 
@@ -109,15 +120,29 @@ def _cells(cells: list[Traced], shape: tuple[int, ...]) -> Any:
 def _collect(
     component: Component, method: str, call: Callable[[], dict[str, Any]], *kinds: type[Output | State | Memory]
 ) -> dict[str, Names]:
+    where = f"{type(component).__name__}.{method}"
     try:
-        returned = call()
+        returned = dict(call())
     except TracingError as error:
-        raise TracingError(f"{type(component).__name__}.{method}: {error}") from error
+        raise TracingError(f"{where}: {error}") from error
+    except Exception as error:
+        raise TracingError(
+            f"{where} cannot be traced ({type(error).__name__}: {error}): "
+            "on values use operators, slices, reshaping and railcosim.components.maths, nothing else"
+        ) from error
+    texts = frozenset(
+        name
+        for slot in component.of(Input, Parameter)
+        if slot.type is str and slot.name != "tape_file"
+        for name in slot.scalars
+    )
     slots = {slot.name: slot for slot in component.of(*kinds)}
     found: dict[str, Names] = {}
-    for name, value in returned.items():
-        if name in slots:
-            flat = np.broadcast_to(np.asarray(value, dtype=object), slots[name].shape).flat
-            for scalar, cell in zip(slots[name].scalars, flat, strict=True):
-                found[scalar] = cell.names if isinstance(cell, Traced) else frozenset()
+    for name in returned.keys() & slots.keys():
+        slot, cells = slots[name], np.asarray(returned[name], dtype=object)
+        if cells.shape != slot.shape:
+            raise ComponentError(f"{where}: {name!r} has shape {cells.shape}, declared {slot.shape}")
+        for scalar, cell in zip(slot.scalars, cells.flat, strict=True):
+            names = cell.names if isinstance(cell, Traced) else frozenset()
+            found[scalar] = names | texts if slot.type is str else names
     return found
