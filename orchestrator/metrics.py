@@ -13,18 +13,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .errors import ExpressionError, WindowError
-from .expressions import (
-    ELEMENTWISE,
-    Call,
-    Expression,
-    Function,
-    Node,
-    Number,
-    Operation,
-    Reference,
-    Signals,
-    parse,
-)
+from .expressions import ELEMENTWISE, Expression, Function, Signals, parse
+from .syntax import Call, Node, Number, Operation, Reference
 
 Array = NDArray[np.float64]
 

@@ -17,8 +17,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .errors import ExpressionError, ScenarioError, did_you_mean
-from .expressions import Expression, Reference, Signals, parse
+from .expressions import Expression, Signals, parse
 from .metrics import FUNCTIONS, unit_of
+from .syntax import Reference
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

@@ -14,23 +14,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .errors import ExpressionError, WindowError, did_you_mean
-from .expressions import (
-    CONSTANTS,
-    Call,
-    Expression,
-    Name,
-    Node,
-    Number,
-    Operation,
-    Reference,
-    Scope,
-    Signals,
-    evaluate,
-    evaluate_constant,
-    parse,
-    walk,
-)
+from .expressions import CONSTANTS, Expression, Scope, Signals, evaluate, evaluate_constant, parse
 from .metrics import EVERY_STEP, FUNCTIONS, select
+from .syntax import Call, Name, Node, Number, Operation, Reference, walk
 
 QUANTIFIERS = ("always", "eventually", "finally")
 CLAUSES = ("from", "until", "outside")

@@ -7,7 +7,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from railcosim.orchestrator.errors import ExpressionError, RailcosimError, ScenarioError, did_you_mean
-from railcosim.orchestrator.expressions import MAX_DEPTH, Reference, evaluate_constant, parse
+from railcosim.orchestrator.expressions import evaluate_constant, parse
+from railcosim.orchestrator.syntax import MAX_DEPTH, Reference
 
 
 class Run:
