@@ -4,23 +4,31 @@ from __future__ import annotations
 
 import importlib.metadata
 import json
-from collections.abc import Iterable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any, Literal
 
 import numpy as np
 from lxml import etree
 
-from ..components.component import Component
+from ..components.component import Component, ComponentError
 from ..components.declarations import Input, Memory, Parameter, State
-from ..components.tracing import Names, TracingError, dependencies, initial_dependencies
+from ..components.tracing import Names, TracingError, dependencies, initial_dependencies, rate_dependencies
 from .units import BASE, parse
 from .variables import ScalarVariable, scalar_variables
 
-Kind = Literal["python"]
+Kind = Literal["python", "native"]
 TOOL = "railcosim"
 _ELEMENT = {float: "Real", int: "Integer", bool: "Boolean", str: "String"}
-_NOTE_OF_KIND: dict[Kind, str] = {"python": "runs in the importing process's Python: needs Python 3.11+ and NumPy there"}
+NOTE_OF_KIND: dict[Kind, str] = {
+    "python": "runs in the importing process's Python: needs Python 3.11+ and NumPy there",
+    "native": "compiled C: needs nothing but the C library",
+}
+_LOG_CATEGORIES = {
+    "logStatusError": "what went wrong; always sent",
+    "logStatusWarning": "what is doubtful; always sent",
+    "logEvents": "what the instance does; sent while debug logging is on",
+}
 
 
 @dataclass(frozen=True)
@@ -28,12 +36,14 @@ class Structure:
     """What depends on what, found by running the equations; None where they cannot be traced.
 
     Attributes:
-        direct: for each scalar output, the inputs it depends on at one instant.
+        direct: for each scalar output, the inputs and states it depends on at one instant.
+        rates: the same for the rate of each scalar state.
         initial: for each scalar that is computed at the start, what it follows from.
         computed: scalars of State and Memory that ``initial`` computes.
     """
 
     direct: Mapping[str, Names] | None
+    rates: Mapping[str, Names] | None
     initial: Mapping[str, Names] | None
     computed: frozenset[str]
 
@@ -41,16 +51,15 @@ class Structure:
 def structure(component: Component) -> Structure:
     """Trace a component; one that reads values as plain numbers (a Python-only one) keeps its dependencies unknown."""
     try:
-        inputs = {name for slot in component.of(Input) for name in slot.scalars}
-        direct = {name: sources & inputs for name, sources in dependencies(component).items()}
         computed, initial = initial_dependencies(component)
-        return Structure(direct, {**computed, **initial}, frozenset(computed))
+        rates = rate_dependencies(component)
+        return Structure(dependencies(component), rates, {**computed, **initial}, frozenset(computed))
     except TracingError:
         if not component.requires:
             raise
         started = component.initial()
         names = frozenset(n for s in component.of(State, Memory) if s.name in started for n in s.scalars)
-        return Structure(None, None, names)
+        return Structure(None, None, None, names)
 
 
 def write(component: Component, kind: Kind, digest: str) -> bytes:
@@ -60,9 +69,16 @@ def write(component: Component, kind: Kind, digest: str) -> bytes:
         component: built with its arguments; its values are the start values.
         kind: how it is packaged.
         digest: hash of everything in the FMU; it becomes the GUID.
+
+    Raises:
+        ComponentError: a name that FMI does not allow, build arguments that are not JSON, or equations that cannot be
+            traced.
     """
     cls = type(component)
     variables = scalar_variables(component)
+    for name in (cls.__name__, *component.slots):
+        if not name.isascii():
+            raise ComponentError(f"{cls.__name__}: FMI allows ASCII letters, digits and _ in names; rename {name!r}")
     traced = structure(component)
     root = etree.Element(
         "fmiModelDescription",
@@ -77,7 +93,7 @@ def write(component: Component, kind: Kind, digest: str) -> bytes:
     )
     if not root.get("license"):
         del root.attrib["license"]
-    etree.SubElement(
+    capabilities = etree.SubElement(
         root,
         "CoSimulation",
         modelIdentifier=cls.__name__,
@@ -87,7 +103,16 @@ def write(component: Component, kind: Kind, digest: str) -> bytes:
         canGetAndSetFMUstate="true",
         canSerializeFMUstate="true",
     )
-    _write_units(root, variables)
+    rates = _rates(variables) if kind == "native" else ()
+    if kind == "native":
+        capabilities.set("providesDirectionalDerivative", "true")
+        files = etree.SubElement(capabilities, "SourceFiles")
+        etree.SubElement(files, "File", name=f"{cls.__name__}.c")
+    _write_units(root, {v.slot.unit for v in variables if v.slot.type is float} | {rate.unit for rate in rates})
+    if kind == "native":
+        categories = etree.SubElement(root, "LogCategories")
+        for name, description in _LOG_CATEGORIES.items():
+            etree.SubElement(categories, "Category", name=name, description=description)
     step = cls.recommended_step or component.__dict__.get("sample_time") or component.__dict__.get("max_step") or 0.1
     etree.SubElement(root, "DefaultExperiment", startTime="0", stepSize=_number(step))
     annotations = etree.SubElement(root, "VendorAnnotations")
@@ -96,14 +121,30 @@ def write(component: Component, kind: Kind, digest: str) -> bytes:
     block = etree.SubElement(root, "ModelVariables")
     for variable in variables:
         _write_variable(block, variable, component, traced)
-    _write_structure(root, variables, traced)
+    for rate in rates:
+        _write_rate(block, rate)
+    _write_structure(root, variables, rates, traced)
     text: bytes = etree.tostring(root, xml_declaration=True, encoding="UTF-8", pretty_print=True)
     return text
 
 
 def summary(cls: type[Component]) -> str:
     """First line of the class's docstring."""
-    return (cls.__doc__ or cls.__name__).strip().splitlines()[0]
+    return ((cls.__doc__ or "").strip() or cls.__name__).splitlines()[0]
+
+
+def arguments(component: Component) -> str:
+    """The build arguments as JSON.
+
+    Raises:
+        ComponentError: one is not JSON data.
+    """
+    try:
+        return json.dumps(component.build_arguments, sort_keys=True)
+    except (TypeError, ValueError) as error:
+        raise ComponentError(
+            f"{type(component).__name__}: build arguments are JSON data (numbers, texts, lists, dicts): {error}"
+        ) from error
 
 
 def _annotation(component: Component, kind: Kind, digest: str) -> dict[str, str]:
@@ -111,10 +152,10 @@ def _annotation(component: Component, kind: Kind, digest: str) -> dict[str, str]
     optional = [n for s in component.of(Input) if s.declaration.optional for n in s.scalars]  # type: ignore[attr-defined]
     fields = {
         "name": cls.__name__,
-        "arguments": json.dumps(component.build_arguments, sort_keys=True),
+        "arguments": arguments(component),
         "digest": digest,
         "kind": kind,
-        "kindNote": _NOTE_OF_KIND[kind],
+        "kindNote": NOTE_OF_KIND[kind],
         "source": cls.source,
         "note": cls.note,
         "requires": " ".join(cls.requires),
@@ -125,12 +166,50 @@ def _annotation(component: Component, kind: Kind, digest: str) -> dict[str, str]
     return {name: value for name, value in fields.items() if value}
 
 
-def _write_units(root: Any, variables: Iterable[ScalarVariable]) -> None:
-    names = sorted({v.slot.unit for v in variables if v.slot.type is float and v.slot.unit != "1"})
+@dataclass(frozen=True)
+class Rate:
+    """The variable ``der(x)`` of a scalar state: it has a value reference after all others."""
+
+    state: ScalarVariable
+    reference: int
+
+    @property
+    def name(self) -> str:
+        """As FMI's structured naming has it."""
+        return f"der({self.state.name})"
+
+    @property
+    def unit(self) -> str:
+        """The state's unit per second."""
+        unit = self.state.slot.unit
+        return f"{unit}2" if unit.endswith("/s") else f"{unit}/s"
+
+
+def _rates(variables: tuple[ScalarVariable, ...]) -> tuple[Rate, ...]:
+    states = (v for v in variables if isinstance(v.slot.declaration, State))
+    return tuple(Rate(state, len(variables) + k) for k, state in enumerate(states))
+
+
+def _write_rate(block: Any, rate: Rate) -> None:
+    variable = etree.SubElement(
+        block,
+        "ScalarVariable",
+        name=rate.name,
+        valueReference=str(rate.reference),
+        description=f"rate of {rate.state.name}",
+        causality="local",
+        variability="continuous",
+        initial="calculated",
+    )
+    etree.SubElement(variable, "Real", unit=rate.unit, derivative=str(rate.state.reference + 1))
+
+
+def _write_units(root: Any, names: set[str]) -> None:
+    names = names - {"1"}
     if not names:
         return
     block = etree.SubElement(root, "UnitDefinitions")
-    for name in names:
+    for name in sorted(names):
         meaning = parse(name)
         exponents = {base: str(e) for base, e in zip(BASE, meaning.exponents, strict=True) if e}
         scale = {} if meaning.factor == 1.0 else {"factor": _number(meaning.factor)}
@@ -176,21 +255,33 @@ def _write_variable(block: Any, variable: ScalarVariable, component: Component, 
         element.set("start", _text(value if variable.element is None else np.ravel(value)[variable.element]))
 
 
-def _write_structure(root: Any, variables: tuple[ScalarVariable, ...], traced: Structure) -> None:
+def _write_structure(
+    root: Any, variables: tuple[ScalarVariable, ...], rates: tuple[Rate, ...], traced: Structure
+) -> None:
+    """Outputs, Derivatives and InitialUnknowns; states are knowns only where their rates are listed."""
     block = etree.SubElement(root, "ModelStructure")
-    index = {v.name: str(k + 1) for k, v in enumerate(variables)}
-    knowns = {v.name for v in variables if v.causality == "input" or initial_kind(v, traced) == "exact"}
-    shown = [v for v in variables if v.causality == "output"]
-    unknowns = [v for v in shown if initial_kind(v, traced) == "calculated"]
-    for tag, members, sources in (("Outputs", shown, traced.direct), ("InitialUnknowns", unknowns, traced.initial)):
+    index = {v.name: str(v.reference + 1) for v in variables} | {rate.name: str(rate.reference + 1) for rate in rates}
+    inputs = {v.name for v in variables if v.causality == "input"}
+    states = {rate.state.name for rate in rates}
+    exact = {v.name for v in variables if initial_kind(v, traced) == "exact"}
+    computed = [v.name for v in variables if initial_kind(v, traced) == "calculated"]
+    shown = [v.name for v in variables if v.causality == "output"]
+    of_rates = None if traced.rates is None else {f"der({name})": names for name, names in traced.rates.items()}
+    unknowns = [name for name in computed if name in shown or name in states]
+    initial = None if traced.initial is None or of_rates is None else {**of_rates, **traced.initial}
+    for tag, members, sources, knowns in (
+        ("Outputs", shown, traced.direct, inputs | states),
+        ("Derivatives", [rate.name for rate in rates], of_rates, inputs | states),
+        ("InitialUnknowns", [*unknowns, *(rate.name for rate in rates)], initial, inputs | exact),
+    ):
         if not members:
             continue
         parent = etree.SubElement(block, tag)
-        for variable in members:
-            entry = etree.SubElement(parent, "Unknown", index=index[variable.name])
+        for name in members:
+            entry = etree.SubElement(parent, "Unknown", index=index[name])
             if sources is not None:
-                names = sources.get(variable.name, frozenset()) & knowns
-                entry.set("dependencies", " ".join(sorted((index[n] for n in names), key=int)))
+                known = sources.get(name, frozenset()) & knowns
+                entry.set("dependencies", " ".join(sorted((index[n] for n in known), key=int)))
 
 
 def _text(value: Any) -> str:
