@@ -2,14 +2,16 @@
 
 from __future__ import annotations
 
+import contextlib
 import difflib
 import hashlib
+import importlib
 import importlib.util
 import os
 import sys
 import tempfile
 import zipfile
-from collections.abc import Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from types import ModuleType
@@ -18,7 +20,7 @@ from typing import Any
 import platformdirs
 
 from ..components import CATALOGUE, Component, ComponentError, Simulation
-from . import python_fmu
+from . import native_fmu, python_fmu, toolchain
 from .description import Kind
 
 _EPOCH = (1980, 1, 1, 0, 0, 0)
@@ -68,6 +70,7 @@ def build(
     arguments: Mapping[str, Any] | None = None,
     *,
     kind: Kind = "python",
+    platforms: Sequence[str] = (),
     folder: Path | None = None,
 ) -> Path:
     """The FMU of a component, built if the cache does not have it.
@@ -75,26 +78,56 @@ def build(
     Args:
         reference: catalogue name or ``"file.py:Class"``.
         arguments: build arguments (`Size`, `Data`) by name.
-        kind: ``"python"``.
+        kind: ``"native"`` (compiled C) or ``"python"``.
+        platforms: of a native FMU, keys of `toolchain.PLATFORMS`; this machine's by default.
         folder: where a relative file path starts.
 
     Returns:
         Path of the FMU in the user's cache; copy it to keep it.
 
     Raises:
-        ComponentError: the component or its arguments are unusable.
+        ComponentError: the component or its arguments are unusable, cannot be traced, or do not compile.
     """
     component = resolve(reference, folder)(**(arguments or {}))
-    return build_component(component, kind)
+    return build_component(component, kind, platforms)
 
 
-def build_component(component: Component, kind: Kind = "python") -> Path:
+def build_component(component: Component, kind: Kind = "python", platforms: Sequence[str] = ()) -> Path:
     """The same for a component at hand; its values become the FMU's start values."""
+    if kind == "native":
+        return _build_native(component, tuple(platforms) or (toolchain.here(),))
     archive, digest = python_fmu.contents(component)
-    target = cache_folder() / digest[:32] / f"{type(component).__name__}.fmu"
+    return _keep(digest, type(component).__name__, lambda: archive)
+
+
+def _build_native(component: Component, platforms: tuple[str, ...]) -> Path:
+    digest = native_fmu.digest(component)
+    identity = hashlib.sha256(f"{digest} {toolchain.identity(platforms)}".encode()).hexdigest()
+    return _keep(identity, type(component).__name__, lambda: native_fmu.contents(component, digest, platforms))
+
+
+def _keep(identity: str, name: str, make: Callable[[], Mapping[str, bytes]]) -> Path:
+    """The FMU of this identity in the cache, made only if it is not there."""
+    target = cache_folder() / identity[:32] / f"{name}.fmu"
     if not target.exists():
-        write_archive(archive, target)
+        archive = make()
+        try:
+            write_archive(archive, target)
+        except PermissionError:  # on Windows: another process has just written the same file and is reading it
+            if not target.exists():
+                raise
     return target
+
+
+def native_problem(component: type[Component]) -> str:
+    """Why a component cannot become a native FMU here, in one line; empty if it can."""
+    if component.requires:
+        return f"{component.__name__} imports {', '.join(component.requires)}"
+    if importlib.util.find_spec("casadi") is None:
+        return "casadi is not installed (pip install 'railcosim[native]')"
+    if not toolchain.can_compile():
+        return "there is no C compiler (install cc, gcc or clang, or pip install 'railcosim[cross]')"
+    return ""
 
 
 def plain(reference: str, arguments: Mapping[str, Any] | None = None, *, folder: Path | None = None) -> Plain:
@@ -118,6 +151,7 @@ def write_archive(archive: Mapping[str, bytes], target: Path) -> None:
         with os.fdopen(handle, "wb") as stream, zipfile.ZipFile(stream, "w", zipfile.ZIP_DEFLATED) as fmu:
             for path in sorted(archive):
                 entry = zipfile.ZipInfo(path, _EPOCH)
+                entry.create_system = 3  # what Unix writes, everywhere
                 entry.compress_type = zipfile.ZIP_DEFLATED
                 entry.external_attr = 0o644 << 16
                 fmu.writestr(entry, archive[path])
@@ -129,32 +163,52 @@ def write_archive(archive: Mapping[str, bytes], target: Path) -> None:
 
 
 def _load_file(path: Path) -> ModuleType:
-    """Run a user's component file as a module of its own; its neighbours import as they would from its folder."""
+    """Run a user's component file as a module of its own, anew each time, because it may have been edited."""
     path = path.resolve()
     if not path.is_file():
         raise ComponentError(f"there is no file {path}")
-    content = path.read_bytes()
-    name = f"railcosim_user_{hashlib.sha256(str(path).encode() + b':' + content).hexdigest()[:16]}"
-    if name in sys.modules:
-        return sys.modules[name]
+    name = f"railcosim_user_{hashlib.sha256(str(path).encode()).hexdigest()[:16]}"
     spec = importlib.util.spec_from_file_location(name, path)
     if spec is None or spec.loader is None:
         raise ComponentError(f"{path} cannot be read as Python")
     module = importlib.util.module_from_spec(spec)
     sys.modules[name] = module
-    sys.path.insert(0, str(path.parent))
     try:
-        spec.loader.exec_module(module)
+        with _neighbours(path.parent):
+            spec.loader.exec_module(module)
     except Exception as error:
-        del sys.modules[name]
-        line = getattr(error, "lineno", None) or _line_in(error, path)
+        line = _line_in(error, path)
         raise ComponentError(f"{path}{f':{line}' if line else ''}: {type(error).__name__}: {error}") from error
-    finally:
-        sys.path.remove(str(path.parent))
     return module
 
 
+@contextlib.contextmanager
+def _neighbours(folder: Path) -> Iterator[None]:
+    """Modules beside a user's file import as they would from its folder, and are forgotten afterwards.
+
+    Otherwise the first ``helper.py`` of a process would serve every component that has a module of that name, and a
+    compiled file left behind could outlive an edit within the same second.
+    """
+    names = (
+        {file.stem for file in folder.glob("*.py")} - sys.stdlib_module_names - {"numpy", __package__.partition(".")[0]}
+    )
+    before = {name: sys.modules.pop(name) for name in names if name in sys.modules}
+    writes_bytecode, sys.dont_write_bytecode = sys.dont_write_bytecode, True
+    sys.path.insert(0, str(folder))
+    importlib.invalidate_caches()
+    try:
+        yield
+    finally:
+        sys.path.remove(str(folder))
+        sys.dont_write_bytecode = writes_bytecode
+        for name in names:
+            sys.modules.pop(name, None)
+        sys.modules.update(before)
+
+
 def _line_in(error: BaseException, path: Path) -> int | None:
+    if isinstance(error, SyntaxError) and error.filename == str(path):
+        return error.lineno
     line, trace = None, error.__traceback__
     while trace is not None:
         if trace.tb_frame.f_code.co_filename == str(path):

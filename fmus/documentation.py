@@ -4,18 +4,18 @@ from __future__ import annotations
 
 import html
 import inspect
-import json
 
 import numpy as np
 
 from ..components.component import Component
-from .description import _NOTE_OF_KIND, Kind, summary
+from .description import NOTE_OF_KIND, Kind, arguments, summary
 from .variables import scalar_variables
 
 _STYLE = (
     "body{font:15px/1.5 sans-serif;max-width:60em;margin:2em auto;padding:0 1em;color:#222}"
     "table{border-collapse:collapse;width:100%}td,th{border-bottom:1px solid #ddd;padding:.2em .6em;text-align:left;"
-    "vertical-align:top}code,pre{background:#f4f4f4}.note{border-left:4px solid #c60;padding:.3em 1em;background:#fff6ea}"
+    "vertical-align:top}code,pre{background:#f4f4f4}"
+    ".note{border-left:4px solid #c60;padding:.3em 1em;background:#fff6ea}"
 )
 
 
@@ -30,13 +30,13 @@ def page(component: Component, kind: Kind) -> str:
         for v in scalar_variables(component)
     )
     note = f'<p class="note">{html.escape(cls.note)}</p>' if cls.note else ""
-    arguments = html.escape(json.dumps(component.build_arguments))
     return (
         f'<!DOCTYPE html><html lang="en"><head><meta charset="utf-8"><title>{cls.__name__}</title>'
         f"<style>{_STYLE}</style></head><body><h1>{cls.__name__}</h1><p>{html.escape(summary(cls))}</p>{note}"
         f"<pre>{html.escape(inspect.cleandoc(cls.__doc__ or ''))}</pre>"
-        f"<p>Source: {html.escape(cls.source or 'own')}. Build arguments: <code>{arguments}</code>. "
-        f"Kind: {kind} ({_NOTE_OF_KIND[kind]}).</p><h2>Stepping</h2><p>{html.escape(_stepping(component))}</p>"
+        f"<p>Source: {html.escape(cls.source or 'own')}. Build arguments: "
+        f"<code>{html.escape(arguments(component))}</code>. Kind: {kind} ({NOTE_OF_KIND[kind]}).</p>"
+        f"<h2>Stepping</h2><p>{html.escape(_stepping(component))}</p>"
         f"<h2>Interface</h2><table><tr><th>name</th><th>causality</th><th>variability</th><th>unit or type</th>"
         f"<th>start</th><th>description</th></tr>{rows}</table></body></html>\n"
     )

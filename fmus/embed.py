@@ -7,7 +7,9 @@ hash of its content, and imports itself by relative imports only: two versions o
 from __future__ import annotations
 
 import ast
+import functools
 import inspect
+import keyword
 import sys
 from collections.abc import Iterable
 from pathlib import Path
@@ -25,14 +27,15 @@ def embedded_files(cls: type[Component]) -> tuple[dict[str, str], str]:
     """The files of the copy by path inside it, and the dotted module of ``cls`` in it.
 
     Raises:
-        ComponentError: a component outside the project imports a package that it does not name in ``requires``.
+        ComponentError: a component outside the project imports a package that it does not name in ``requires``, or
+            does not stand in a file of its own.
     """
     files: dict[str, str] = {}
     if cls.__module__.startswith(components.__name__ + "."):
         module = cls.__module__.removeprefix(_PROJECT + ".")
         _add(module.replace(".", "/") + ".py", files)
     else:
-        path = Path(inspect.getfile(cls))
+        path = _source_file(cls)
         module = f"user.{path.stem}"
         _add_user_file(path, cls, files)
     for runtime in _RUNTIME:
@@ -45,15 +48,19 @@ def embedded_files(cls: type[Component]) -> tuple[dict[str, str], str]:
 
 def _add(path: str, files: dict[str, str]) -> None:
     """Add a file of the project and, through its relative imports, every file it needs."""
-    if path in files:
-        return
+    if path not in files:
+        files[path], needed = _own_file(path)
+        for other in needed:
+            _add(other, files)
+
+
+@functools.cache
+def _own_file(path: str) -> tuple[str, tuple[str, ...]]:
+    """A file of the project, and those it imports; read once, as Python itself does."""
     folder, _, rest = path.partition("/")
     text = ((_COMPONENTS if folder == "components" else _FMUS) / rest).read_text(encoding="utf-8")
-    files[path] = text
-    for node in ast.walk(ast.parse(text)):
-        if isinstance(node, ast.ImportFrom) and node.level:
-            for needed in _targets(path, node):
-                _add(needed, files)
+    nodes = (n for n in ast.walk(ast.parse(text)) if isinstance(n, ast.ImportFrom) and n.level)
+    return text, tuple(dict.fromkeys(needed for node in nodes for needed in _targets(path, node)))
 
 
 def _targets(path: str, node: ast.ImportFrom) -> Iterable[str]:
@@ -67,22 +74,38 @@ def _targets(path: str, node: ast.ImportFrom) -> Iterable[str]:
 # ---------------------------------------------------------------- files from outside the project
 
 
+def _source_file(cls: type[Component]) -> Path:
+    try:
+        path = Path(inspect.getfile(cls))
+    except (TypeError, OSError):
+        path = Path()
+    if not path.is_file() or cls.__qualname__ != cls.__name__:
+        raise ComponentError(
+            f"{cls.__name__} must stand at the top level of a file, so that its FMU can carry the file"
+        )
+    if not (path.stem.isidentifier() and path.stem.isascii()) or keyword.iskeyword(path.stem):
+        raise ComponentError(f"{path}: rename the file to ASCII letters, digits and _ only, such as my_controller.py")
+    return path
+
+
 def _add_user_file(path: Path, cls: type[Component], files: dict[str, str]) -> None:
     name = f"user/{path.name}"
     if name in files:
         return
-    text = path.read_text(encoding="utf-8")
+    text = path.read_text(encoding="utf-8-sig")
     files[name] = ""  # known from here on: two local modules may import one another
-    lines = text.splitlines()
+    replacements = []
     for node in ast.walk(ast.parse(text, str(path))):
         if isinstance(node, ast.Import | ast.ImportFrom):
             replacement = _localised(node, path, cls, files)
             if replacement is not None:
-                _replace(lines, node, replacement)
-    files[name] = "\n".join(lines) + "\n"
+                replacements.append((node, replacement))
+    files[name] = _replaced(text, replacements)
 
 
-def _localised(node: ast.Import | ast.ImportFrom, path: Path, cls: type[Component], files: dict[str, str]) -> str | None:
+def _localised(
+    node: ast.Import | ast.ImportFrom, path: Path, cls: type[Component], files: dict[str, str]
+) -> str | None:
     """The import statement as it must stand inside the copy; None where it may stay."""
     if isinstance(node, ast.ImportFrom):
         if node.level:
@@ -91,7 +114,7 @@ def _localised(node: ast.Import | ast.ImportFrom, path: Path, cls: type[Componen
         if module.split(".")[0] == _PROJECT:
             return _project_import(node, path, files)
         if _is_local(module, path):
-            _add_user_file(path.parent / f"{module.replace('.', '/')}.py", cls, files)
+            _add_user_file(path.parent / f"{module}.py", cls, files)
             return f"from .{module} import {_names(node.names)}"
         _check_named(module, path, node.lineno, cls)
         return None
@@ -100,7 +123,8 @@ def _localised(node: ast.Import | ast.ImportFrom, path: Path, cls: type[Componen
     for alias in node.names:
         if alias.name.split(".")[0] == _PROJECT:
             raise ComponentError(
-                f"{path}:{node.lineno}: write 'from {_PROJECT}.components import ...' so that the FMU can carry its own copy"
+                f"{path}:{node.lineno}: write 'from {_PROJECT}.components import ...', so that the FMU can carry "
+                "its own copy"
             )
         if _is_local(alias.name, path):
             _add_user_file(path.parent / f"{alias.name}.py", cls, files)
@@ -116,11 +140,18 @@ def _project_import(node: ast.ImportFrom, path: Path, files: dict[str, str]) -> 
     """``from railcosim.components import X`` as an import of the module in the copy that defines X."""
     module = node.module or ""
     if module != components.__name__ and not module.startswith(components.__name__ + "."):
-        raise ComponentError(f"{path}:{node.lineno}: a component may import from {components.__name__} only, not {module}")
+        raise ComponentError(
+            f"{path}:{node.lineno}: a component may import from {components.__name__} only, not {module}"
+        )
     statements = []
     for alias in node.names:
         place = module if module != components.__name__ else _defining_module(alias.name, path, node.lineno)
         inside = place.removeprefix(_PROJECT + ".")
+        if not _COMPONENTS.parent.joinpath(*inside.split(".")).with_suffix(".py").is_file():
+            raise ComponentError(
+                f"{path}:{node.lineno}: {place} is a folder; import {alias.name!r} from {components.__name__} or from "
+                "the module that defines it"
+            )
         _add(inside.replace(".", "/") + ".py", files)
         if inside == f"components.{alias.name}":
             statements.append(f"from ..components import {_names([alias])}")
@@ -140,13 +171,17 @@ def _defining_module(name: str, path: Path, line: int) -> str:
 
 
 def _is_local(module: str, path: Path) -> bool:
-    return bool(module) and (path.parent / f"{module.replace('.', '/')}.py").is_file()
+    return "." not in module and (path.parent / f"{module}.py").is_file()
 
 
 def _check_named(module: str, path: Path, line: int, cls: type[Component]) -> None:
-    package = module.split(".")[0]
+    package = module.partition(".")[0]
     if package in sys.stdlib_module_names or package == "numpy" or package in cls.requires:
         return
+    if (path.parent / package).is_dir():
+        raise ComponentError(
+            f"{path}:{line}: {package!r} is a folder; a component's local modules are single files beside it"
+        )
     raise ComponentError(
         f"{path}:{line}: {cls.__name__} imports {package!r}; name it in the class: requires = ({package!r},)"
     )
@@ -156,9 +191,13 @@ def _names(aliases: Iterable[ast.alias]) -> str:
     return ", ".join(a.name if a.asname is None else f"{a.name} as {a.asname}" for a in aliases)
 
 
-def _replace(lines: list[str], node: ast.stmt, statement: str) -> None:
-    """Put a statement in place of another; the lines keep their numbers, so that messages point at the author's file."""
-    first, last = node.lineno - 1, (node.end_lineno or node.lineno) - 1
-    lines[first] = lines[first][: node.col_offset] + statement
-    for k in range(first + 1, last + 1):
-        lines[k] = ""
+def _replaced(text: str, replacements: Iterable[tuple[ast.stmt, str]]) -> str:
+    """The text with statements exchanged; lines keep their numbers, so that messages point at the author's file."""
+    lines = text.encode().split(b"\n")  # the parser counts columns in bytes
+    for node, statement in sorted(replacements, key=lambda r: (r[0].lineno, r[0].col_offset), reverse=True):
+        first, last = node.lineno - 1, (node.end_lineno or node.lineno) - 1
+        rest = lines[last][node.end_col_offset :]
+        lines[first] = lines[first][: node.col_offset] + statement.encode() + rest
+        for k in range(first + 1, last + 1):
+            lines[k] = b""
+    return b"\n".join(lines).decode()

@@ -1,14 +1,41 @@
-"""What makes an FMU the one it is: a hash of everything in it, the values it was given included."""
+"""What makes an FMU the one it is: a hash of everything it is made from, the values it was given included."""
 
 from __future__ import annotations
 
+import functools
 import hashlib
+import importlib.metadata
 import json
 from collections.abc import Mapping
+from pathlib import Path
 
 import numpy as np
 
 from ..components.component import Component
+from .description import TOOL, Kind, arguments
+from .embed import embedded_files
+
+_FOLDER = Path(__file__).parent
+_MAKERS: dict[Kind, tuple[str, ...]] = {"python": (TOOL, "pythonfmu"), "native": (TOOL, "casadi")}
+_MADE_BY = ("*.py", "resources/*.png", "resources/*.txt", "runtime/*.[ch]")
+
+
+def source_digest(component: Component, kind: Kind) -> str:
+    """Hash of what an FMU is made from, without making it: sources, values, and everything that packages them."""
+    files, module = embedded_files(type(component))
+    parts = {name: text.encode() for name, text in files.items()}
+    parts["/"] = f"{kind} {module} {type(component).__qualname__} {given_values(component)}".encode()
+    parts["/packaging"] = _packaging(kind)
+    return digest_of(parts)
+
+
+@functools.cache
+def _packaging(kind: Kind) -> bytes:
+    """The part that is the same for every component: this package, and the versions of those it calls."""
+    files = sorted(path for pattern in _MADE_BY for path in _FOLDER.glob(pattern))
+    parts = {path.relative_to(_FOLDER).as_posix(): path.read_bytes() for path in files}
+    parts |= {f"/{name}": importlib.metadata.version(name).encode() for name in _MAKERS[kind]}
+    return digest_of(parts).encode()
 
 
 def given_values(component: Component) -> str:
@@ -16,7 +43,7 @@ def given_values(component: Component) -> str:
     values = component.__dict__
     kept = (slot for slot in component.slots.values() if slot.name in values)
     changed = {s.name: np.asarray(values[s.name]).tolist() for s in kept if not np.array_equal(values[s.name], s.start)}
-    return json.dumps(component.build_arguments | changed, sort_keys=True)
+    return json.dumps(json.loads(arguments(component)) | changed, sort_keys=True)
 
 
 def digest_of(files: Mapping[str, bytes]) -> str:

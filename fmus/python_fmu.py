@@ -6,9 +6,6 @@ pythonfmu this takes the wrapper library alone (linux64 and win64 are all it has
 
 from __future__ import annotations
 
-import hashlib
-import json
-from collections.abc import Mapping
 from pathlib import Path
 
 import pythonfmu
@@ -17,6 +14,7 @@ from ..components.component import Component
 from .description import write
 from .documentation import page
 from .embed import embedded_files
+from .identity import digest_of, given_values
 
 _WRAPPERS = Path(pythonfmu.__file__).parent / "resources" / "binaries"
 
@@ -29,18 +27,18 @@ def contents(component: Component) -> tuple[dict[str, bytes], str]:
     """
     cls = type(component)
     files, module = embedded_files(cls)
-    arguments = json.dumps(component.build_arguments, sort_keys=True)
+    arguments = given_values(component)
     code = {**{name: text.encode() for name, text in files.items()}, "/": f"{module} {cls.__qualname__}".encode()}
-    package = f"railcosim_{_digest(code)[:16]}"
+    package = f"railcosim_{digest_of(code)[:16]}"
     # The slave module's name must tell apart FMUs that share their equations but not their build arguments.
-    slave = f"{package}_{_digest({'arguments': arguments.encode()})[:8]}_slave"
+    slave = f"{package}_{digest_of({'arguments': arguments.encode()})[:8]}_slave"
     archive = {f"resources/{package}/{name}": text.encode() for name, text in files.items()}
     archive[f"resources/{slave}.py"] = _slave_module(package, module, cls.__qualname__, arguments).encode()
     archive["resources/slavemodule.txt"] = slave.encode()
     archive["documentation/index.html"] = page(component, "python").encode()
     for library in sorted(_WRAPPERS.glob("*/*pythonfmu-export.*")):
         archive[f"binaries/{library.parent.name}/{cls.__name__}{library.suffix}"] = library.read_bytes()
-    digest = _digest({**archive, "modelDescription.xml": write(component, "python", "")})
+    digest = digest_of({**archive, "modelDescription.xml": write(component, "python", "")})
     archive["modelDescription.xml"] = write(component, "python", digest)
     return archive, digest
 
@@ -50,17 +48,11 @@ def _slave_module(package: str, module: str, name: str, arguments: str) -> str:
     # to the module's namespace that it never took (pythonfmu 0.7). Without the line that takes one, the namespace is
     # freed under the living module: the second instance fails and the process crashes.
     return (
+        "import ctypes\n\n"
         f"from {package}.{module} import {name}\n"
         f"from {package}.fmus.slave import Fmi2Slave\n\n"
-        "globals().setdefault('_references', []).append(globals())\n\n\n"
+        "ctypes.pythonapi.Py_IncRef(ctypes.py_object(globals()))\n\n\n"
         f"class Slave(Fmi2Slave):\n"
         f"    component = {name}\n"
         f"    arguments = {arguments!r}\n"
     )
-
-
-def _digest(files: Mapping[str, bytes]) -> str:
-    digest = hashlib.sha256()
-    for name, content in sorted(files.items()):
-        digest.update(f"{len(name)}:{name}{len(content)}:".encode() + content)
-    return digest.hexdigest()

@@ -1,25 +1,36 @@
 """Compiling a native FMU: the system's C compiler for this machine, ziglang for every other platform.
 
-Flags are chosen so that the bits do not depend on the machine: a baseline processor, and no fused multiply-add.
+Flags are chosen so that the bits do not depend on the machine: a baseline processor, and no fused multiply-add. Nothing
+of the machine gets into a library either: names are relative, and neither times nor debug information are kept.
+
+Folders below ``binaries/``: FMI 2.0 knows ``linux64``, ``win64`` and ``darwin64`` and means 64-bit x86 by them; for other
+machines FMI 2.0.5 refers to the platform tuples of FMI 3.0, hence ``aarch64-linux``. Importers differ: on an Arm Mac they
+look into ``darwin64``, which therefore holds a universal library; on Arm Linux FMPy 0.3 and OpenModelica look into
+``linux64``, where an FMU for both machines has the x86 library. An FMU built for Arm Linux alone therefore carries its
+library under both names.
 """
 
 from __future__ import annotations
 
+import functools
+import importlib.metadata
 import importlib.util
 import os
 import platform
 import shutil
 import subprocess
 import sys
+import tempfile
+from collections.abc import Sequence
 from dataclasses import dataclass
-from functools import cache
 from pathlib import Path
 
 import fmpy
 
-from ..components.component import ComponentError
+from ..components.component import ComponentError, nearest
 
-FLAGS = ("-std=c11", "-O2", "-ffp-contract=off", "-fvisibility=hidden", "-Wall", "-Wextra", "-Wconversion")
+FLAGS = ("-std=c11", "-O2", "-ffp-contract=off", "-fvisibility=hidden", "-g0", "-Wall", "-Wextra", "-Wconversion")
+CL_FLAGS = ("/nologo", "/std:c11", "/O2", "/fp:precise", "/W3", "/D_CRT_SECURE_NO_WARNINGS", "/LD")
 _HEADERS = Path(fmpy.__file__).parent / "c-code"
 
 
@@ -28,21 +39,23 @@ class Platform:
     """A platform an FMU can carry a binary for.
 
     Attributes:
-        folder: below ``binaries/``; the names of FMI 2.0, and for 64-bit Arm Linux the one importers look for.
+        folder: below ``binaries/``.
         suffix: of the library.
         targets: what ziglang calls it; several are joined to one universal library.
+        options: for ziglang, beside `FLAGS`.
     """
 
     folder: str
     suffix: str
     targets: tuple[str, ...]
+    options: tuple[str, ...]
 
 
 PLATFORMS = {
-    "linux64": Platform("linux64", ".so", ("x86_64-linux-gnu.2.17",)),
-    "win64": Platform("win64", ".dll", ("x86_64-windows-gnu",)),
-    "darwin64": Platform("darwin64", ".dylib", ("x86_64-macos", "aarch64-macos")),
-    "aarch64-linux": Platform("aarch64-linux", ".so", ("aarch64-linux-gnu.2.17",)),
+    "linux64": Platform("linux64", ".so", ("x86_64-linux-gnu.2.17",), ("-fPIC", "-lm")),
+    "win64": Platform("win64", ".dll", ("x86_64-windows-gnu",), ()),
+    "darwin64": Platform("darwin64", ".dylib", ("x86_64-macos.11.0", "aarch64-macos.11.0"), ("-fPIC",)),
+    "aarch64-linux": Platform("aarch64-linux", ".so", ("aarch64-linux-gnu.2.17",), ("-fPIC", "-lm")),
 }
 
 
@@ -59,17 +72,39 @@ def here() -> str:
     return "aarch64-linux" if platform.machine().lower() in ("aarch64", "arm64") else "linux64"
 
 
-@cache
+def named(text: str) -> tuple[str, ...]:
+    """The platforms that a comma-separated list names; ``all`` is every one.
+
+    Raises:
+        CompilerError: an unknown name; the message suggests the nearest one.
+    """
+    names = tuple(dict.fromkeys(word.strip() for word in text.split(",") if word.strip()))
+    for name in names:
+        if name not in (*PLATFORMS, "all"):
+            raise CompilerError(f"there is no platform {nearest(name, [*PLATFORMS, 'all'])}")
+    return tuple(name for name in PLATFORMS if name in names or "all" in names)
+
+
+def folders(platforms: Sequence[str]) -> dict[str, tuple[str, ...]]:
+    """For each of an FMU's platforms, the folders below ``binaries/`` that hold its library."""
+    found = {name: (PLATFORMS[name].folder,) for name in platforms}
+    if "aarch64-linux" in found and "linux64" not in found:
+        found["aarch64-linux"] += ("linux64",)
+    return found
+
+
+@functools.cache
 def system_compiler() -> str | None:
-    """The system's C compiler: the one CC names, or the first of cc, gcc, clang; None if there is none."""
-    for name in (os.environ.get("CC"), "cc", "gcc", "clang"):
+    """The system's C compiler: the one CC names, or the first of cc, gcc, clang (on Windows cl first), or None."""
+    usual = ("cl", "cc", "gcc", "clang") if sys.platform.startswith("win") else ("cc", "gcc", "clang")
+    for name in (os.environ.get("CC"), *usual):
         found = shutil.which(name) if name else None
         if found is not None:
             return found
     return None
 
 
-@cache
+@functools.cache
 def has_zig() -> bool:
     """Whether the ziglang package (extra ``cross``) is installed."""
     return importlib.util.find_spec("ziglang") is not None
@@ -80,64 +115,76 @@ def can_compile() -> bool:
     return system_compiler() is not None or has_zig()
 
 
+@functools.cache
 def identity(platforms: tuple[str, ...]) -> str:
     """What determines the binaries beside the sources: compiler and flags, for the cache."""
     compiler = system_compiler() if platforms == (here(),) else None
     if compiler is None:
         version = importlib.metadata.version("ziglang") if has_zig() else "none"
-        return f"ziglang {version} {FLAGS} {platforms}"
+        return f"ziglang {version} {FLAGS} {[PLATFORMS[name] for name in platforms]}"
     stat = os.stat(compiler)
-    return f"{os.path.realpath(compiler)} {stat.st_size} {stat.st_mtime_ns} {FLAGS}"
+    return f"{os.path.realpath(compiler)} {stat.st_size} {stat.st_mtime_ns} {FLAGS} {CL_FLAGS}"
 
 
-def compile_library(source: Path, target: Path, name: str, *, only: bool) -> None:
-    """Compile one translation unit to a shared library.
+def compile_library(source: Path, target: Path, name: str, *, only: bool, cache: Path | None = None) -> None:
+    """Compile one translation unit to a shared library; the same source gives the same bytes.
 
     Args:
         source: the C file; what it includes stands beside it.
         target: the library to write.
         name: a key of `PLATFORMS`.
         only: whether this machine's platform is all that is asked for; then the system's compiler serves.
+        cache: where ziglang keeps what it made of its own C libraries, which takes a minute for Windows and seconds for
+            the others; its own folder in the user's home by default. ``ZIG_GLOBAL_CACHE_DIR`` overrides both.
 
     Raises:
         CompilerError: no compiler for that platform, or it failed.
     """
     target.parent.mkdir(parents=True, exist_ok=True)
     compiler = system_compiler() if only and name == here() else None
-    if compiler is not None:
-        extra = [] if sys.platform.startswith("win") else ["-fPIC"]
-        _run([compiler, *FLAGS, *extra, "-shared", "-I", str(_HEADERS), str(source), "-o", str(target), "-lm"])
-        return
-    if not has_zig():
+    if compiler is None and not has_zig():
         raise CompilerError(
-            f"there is no C compiler for {name}: install one (cc, gcc or clang), or 'pip install railcosim[cross]', "
-            "which compiles for every platform"
+            f"there is no C compiler for {name}: 'pip install railcosim[cross]' brings one for every platform"
+            + (", or install cc, gcc or clang" if only and name == here() else "")
         )
-    parts = [target.with_suffix(f".{k}") for k in range(len(PLATFORMS[name].targets))]
-    for zig_target, part in zip(PLATFORMS[name].targets, parts, strict=True):
-        command = [
-            sys.executable,
-            "-m",
-            "ziglang",
-            "cc",
-            "-target",
-            zig_target,
-            *FLAGS,
-            "-g0",
-            "-s",
-            "-fPIC",
-            "-shared",
-        ]
-        if "windows" in zig_target:
-            command = [word for word in command if word != "-fPIC"]
-        math = [] if "windows" in zig_target else ["-lm"]
-        _run([*command, "-I", str(_HEADERS), str(source), "-o", str(part), *math])
-    if len(parts) == 1:
-        os.replace(parts[0], target)
-    else:
-        target.write_bytes(_universal([part.read_bytes() for part in parts]))
-    for part in (*parts, target.with_suffix(".lib"), target.with_suffix(".pdb")):
-        part.unlink(missing_ok=True)
+    # A library can bear the name and path it was written under: in a folder of its own both are always the same.
+    with tempfile.TemporaryDirectory(dir=source.parent) as scratch:
+        made = Path(scratch) / target.name
+        relative = made.relative_to(source.parent).as_posix()
+        if compiler is not None:
+            _run(_system_command(compiler, source.name, relative), source.parent)
+        else:
+            _cross_compile(source, made, PLATFORMS[name], cache)
+        os.replace(made, target)
+
+
+def _system_command(compiler: str, source: str, target: str) -> list[str]:
+    """The command of this machine's compiler. That of cl follows its manual; it has not been tried on Windows yet."""
+    if Path(compiler).stem.lower() == "cl":
+        scratch = target.rpartition("/")[0]
+        outputs = (f"/Fe:{target}", f"/Fo:{scratch}/", "/link", "/NOIMPLIB", "/Brepro", "/INCREMENTAL:NO")
+        return [compiler, *CL_FLAGS, "/I", str(_HEADERS), source, *outputs]
+    extra = {"darwin": ["-fPIC", f"-Wl,-install_name,@rpath/{Path(target).name}"], "win32": ["-s"]}
+    platform_flags = extra.get(sys.platform, ["-fPIC", "-s", "-lm"])
+    return [compiler, *FLAGS, "-shared", "-I", str(_HEADERS), source, "-o", target, *platform_flags]
+
+
+def _cross_compile(source: Path, made: Path, machine: Platform, cache: Path | None) -> None:
+    environment = dict(os.environ)
+    if cache is not None:
+        environment.setdefault("ZIG_GLOBAL_CACHE_DIR", str(cache))
+        environment.setdefault("ZIG_LOCAL_CACHE_DIR", environment["ZIG_GLOBAL_CACHE_DIR"])
+    parts = []
+    for target in machine.targets:
+        part = made.parent / target / made.name
+        part.parent.mkdir()
+        extra = [f"-Wl,-install_name,@rpath/{made.name}"] if "macos" in target else []
+        output = part.relative_to(source.parent).as_posix()
+        command = [sys.executable, "-m", "ziglang", "cc", "-target", target, *FLAGS, "-s", "-shared"]
+        headers = ["-I", str(_HEADERS)]
+        _run([*command, *headers, source.name, "-o", output, *machine.options, *extra], source.parent, environment)
+        parts.append(part)
+    made.write_bytes(parts[0].read_bytes() if len(parts) == 1 else _universal([part.read_bytes() for part in parts]))
 
 
 def _universal(libraries: list[bytes]) -> bytes:
@@ -155,7 +202,9 @@ def _universal(libraries: list[bytes]) -> bytes:
     return head + b"\0" * (offset - len(head)) + body
 
 
-def _run(command: list[str]) -> None:
-    done = subprocess.run(command, capture_output=True, text=True, check=False)
+def _run(command: list[str], folder: Path, environment: dict[str, str] | None = None) -> None:
+    done = subprocess.run(command, cwd=folder, env=environment, capture_output=True, text=True, check=False)
     if done.returncode:
-        raise CompilerError(f"{command[0]} failed:\n{(done.stderr or done.stdout).strip()[-2000:]}")
+        what = "ziglang" if "ziglang" in command else command[0]
+        said = (done.stderr or done.stdout).strip()[-2000:]
+        raise CompilerError(f"{what} failed (exit code {done.returncode}):\n{said}")

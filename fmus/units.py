@@ -50,7 +50,7 @@ def parse(text: str) -> UnitMeaning:
     Raises:
         ValueError: an unknown symbol or a malformed text.
     """
-    tokens = re.findall(r"[A-Za-z%]+|-?\d+|[./()]|\S", text)
+    tokens = re.findall(r"[A-Za-z%]+|-?\d+|[./()]|.", text)
     meaning, rest = _product(tokens, text)
     if rest:
         raise ValueError(f"unit {text!r}: {rest[0]!r} is out of place")
@@ -59,7 +59,7 @@ def parse(text: str) -> UnitMeaning:
 
 def _product(tokens: list[str], text: str) -> tuple[UnitMeaning, list[str]]:
     meaning, tokens = _factor(tokens, text)
-    while tokens and tokens[0] in ("." , "/"):
+    while tokens and tokens[0] in (".", "/"):
         power = 1 if tokens[0] == "." else -1
         other, tokens = _factor(tokens[1:], text)
         exponents = tuple(a + power * b for a, b in zip(meaning.exponents, other.exponents, strict=True))
