@@ -2,16 +2,19 @@
 
 from __future__ import annotations
 
-import shutil
+import importlib.metadata
+import os
+import shlex
 import sys
 import tomllib
+from collections.abc import Sequence
+from contextlib import suppress
 from dataclasses import replace
 from enum import StrEnum
 from pathlib import Path
 from typing import Annotated, Any
 
 import typer
-from rich.text import Text
 
 from ..components import CATALOGUE
 from ..components.component import ComponentError
@@ -21,74 +24,128 @@ from . import console
 from .archive import Workspace
 from .check import check as check_system
 from .errors import FmuError, RailcosimError, ScenarioError
-from .loading import KINDS, load_models
-from .metrics import Comparison, compare
+from .loading import load_fmu
+from .pack import pack as pack_system
 from .plots import draw
+from .published import PublishedRow
+from .release import default_directory, release
 from .reproduce import cases
 from .results import Results
 from .run import Run, execute
 from .scenario import load, shipped
 from .skeleton import write_skeleton
-from .system import ALGORITHMS, System
 
 OK, FAILED, WRONG_INPUT, FMU_FAILED, INTERRUPTED = 0, 1, 2, 3, 130
 
 app = typer.Typer(
-    help="Co-simulate trains, cruise controllers and ATO controllers as FMUs.",
     no_args_is_help=True,
     add_completion=False,
     rich_markup_mode=None,
     pretty_exceptions_enable=False,
 )
 
-KindName = StrEnum("KindName", {kind: kind for kind in KINDS})
-AlgorithmName = StrEnum("AlgorithmName", {name: name for name in ALGORITHMS})
 
-Scenario = Annotated[str, typer.Argument(help="A shipped scenario's name (see 'orchestrate list'), or a .toml file.")]
+class KindName(StrEnum):
+    """`loading.KINDS`, as the command line needs them."""
+
+    auto = "auto"
+    native = "native"
+    python = "python"
+    plain = "plain"
+
+
+class PackagingName(StrEnum):
+    """The kinds of FMU that can be built, as the command line needs them."""
+
+    auto = "auto"
+    native = "native"
+    python = "python"
+
+
+class AlgorithmName(StrEnum):
+    """`system.ALGORITHMS`, as the command line needs them."""
+
+    gauss_seidel = "gauss-seidel"
+    jacobi = "jacobi"
+
+
+Scenario = Annotated[
+    str, typer.Argument(metavar="SCENARIO", help="A shipped scenario (see 'orchestrate list'), or a .toml file.")
+]
 Preset = Annotated[str | None, typer.Option(help="Apply a preset of the scenario.")]
 Set = Annotated[
-    list[str] | None, typer.Option("--set", help="Set a parameter or start value: train[4].speed=10, cruise.alpha=0.01.")
+    list[str] | None,
+    typer.Option("--set", help="Set a parameter or start value: train[4].speed=10."),
 ]
 With = Annotated[list[str] | None, typer.Option("--with", help="Give a build argument: train.carriages=8.")]
 Swap = Annotated[
     list[str] | None,
-    typer.Option("--swap", help="Put another model in place: cruise=other.fmu | OtherComponent | my_controller.py:Class."),
+    typer.Option("--swap", help="Put in another model: cruise=other.fmu, or OtherComponent, or my_file.py:Class."),
 ]
 Stop = Annotated[float | None, typer.Option(help="Stop time in s.")]
 Step = Annotated[float | None, typer.Option(help="Communication step in s; sample times equal to it follow.")]
 Algorithm = Annotated[AlgorithmName | None, typer.Option(help="How the instances exchange values.")]
 Kind = Annotated[
     KindName,
-    typer.Option(help="python: components as FMUs; plain: as Python objects in this process, for a debugger."),
+    typer.Option(
+        help="native: compiled FMUs; python: Python FMUs; plain: Python objects, to debug; auto: native if possible."
+    ),
 ]
 Quiet = Annotated[bool, typer.Option("--quiet", "-q", help="Print nothing but errors.")]
 
 
 def main() -> None:
     """Entry point: every expected error becomes one message and an exit code."""
+    code = call()
+    for stream in (sys.stdout, sys.stderr):
+        with suppress(OSError):  # whoever read it may be gone
+            stream.flush()
+    # pythonfmu 0.7 frees its interpreter state twice when C++ is torn down, and some exits crash: leave before that.
+    os._exit(code)
+
+
+def call(arguments: Sequence[str] | None = None) -> int:
+    """Run a command, with the arguments of the process by default, and return its exit code."""
     try:
-        app()
+        app(arguments)
     except FmuError as error:
-        _fail(f"an FMU failed: {error}", FMU_FAILED)
+        return _fail([f"an FMU failed: {error}"], FMU_FAILED)
     except ScenarioError as error:
-        _fail("\n".join(f"error: {problem}" for problem in error.problems), WRONG_INPUT, prefix="")
+        return _fail(console.folded(error.problems), WRONG_INPUT)
     except (RailcosimError, ComponentError) as error:
-        _fail(str(error), WRONG_INPUT)
-    except KeyboardInterrupt:
-        _fail("interrupted", INTERRUPTED)
-    except BrokenPipeError:
-        sys.stderr.close()
-        sys.exit(OK)
+        return _fail([str(error)], WRONG_INPUT)
+    except OSError as error:
+        return _fail([f"{error.filename or 'a file'}: {error.strerror or error}"], WRONG_INPUT)
+    except SystemExit as end:
+        return end.code if isinstance(end.code, int) else OK
+    return OK
 
 
-def _fail(message: str, code: int, prefix: str = "error: ") -> None:
-    print(f"{prefix}{message}", file=sys.stderr)
-    sys.exit(code)
+def _fail(messages: Sequence[str], code: int) -> int:
+    for message in messages:
+        print(f"error: {message}", file=sys.stderr)
+    return code
+
+
+def _version(wanted: bool) -> None:
+    if wanted:
+        print(f"railcosim {importlib.metadata.version('railcosim')}")
+        raise typer.Exit()
+
+
+@app.callback()
+def options(
+    version: Annotated[
+        bool, typer.Option("--version", callback=_version, is_eager=True, help="Show the version and exit.")
+    ] = False,
+) -> None:
+    """Co-simulate trains, cruise controllers and ATO controllers as FMUs."""
 
 
 @app.command()
 def run(
     scenario: Scenario,
+    *,
     preset: Preset = None,
     settings: Set = None,
     builds: With = None,
@@ -96,7 +153,7 @@ def run(
     stop: Stop = None,
     step: Step = None,
     algorithm: Algorithm = None,
-    kind: Kind = KindName("python"),
+    kind: Kind = KindName.auto,
     verify_step: Annotated[
         bool, typer.Option("--verify-step", help="Run again at half the step and print each metric's difference.")
     ] = False,
@@ -111,29 +168,7 @@ def run(
     Exit codes: 0 fine; 1 a requirement failed or a published value was missed; 2 the input is wrong; 3 an FMU failed;
     130 interrupted by Ctrl-C (what was computed is on disk).
     """
-    system = _load(scenario, preset, settings, builds, swaps, stop, step, algorithm)
-    directory = output or Path("results") / "-".join(filter(None, (system.name, preset)))
-    with console.progress(system.name, quiet) as progress:
-        outcome = execute(system, kind=kind.value, output=directory, figures=not no_figures, progress=progress)
-    comparisons = _verify_step(system, outcome, kind.value, quiet) if verify_step else []
-    if not quiet:
-        _report(outcome, comparisons)
-    if outcome.error is not None:
-        raise outcome.error
-    raise typer.Exit(_exit_code(outcome))
-
-
-def _load(
-    scenario: str,
-    preset: str | None,
-    settings: list[str] | None,
-    builds: list[str] | None,
-    swaps: list[str] | None,
-    stop: float | None = None,
-    step: float | None = None,
-    algorithm: Any = None,
-) -> System:
-    return load(
+    system = load(
         scenario,
         preset=preset,
         settings=settings or (),
@@ -141,44 +176,32 @@ def _load(
         swaps=swaps or (),
         stop_time=stop,
         step=step,
-        algorithm=None if algorithm is None else str(algorithm.value),
+        algorithm=algorithm.value if algorithm else None,
     )
+    directory = output or Path("results") / "-".join(filter(None, (system.name, preset)))
+    with console.progress(system.name, quiet, system.start_time) as progress:
+        outcome = execute(system, kind=kind.value, output=directory, figures=not no_figures, progress=progress)
+    second = _at_half_the_step(outcome, kind, quiet) if verify_step else None
+    console.show_run(outcome, second, quiet)
+    error = outcome.error or (second and second.error)
+    if error:
+        raise error
+    raise typer.Exit(_exit_code(outcome, second))
 
 
-def _verify_step(system: System, outcome: Run, kind: Any, quiet: bool) -> list[Comparison]:
+def _at_half_the_step(outcome: Run, kind: KindName, quiet: bool) -> Run | None:
+    """The same run at half the step, in memory; None where there is nothing to compare it with."""
     if outcome.status != "completed":
-        return []
+        return None
+    system = outcome.system
     rescaled = system.rescaled_from if system.rescaled_from is not None else system.step
     half = replace(system, step=system.step / 2.0, record=system.record or system.step, rescaled_from=rescaled)
-    with console.progress(f"{system.name} at half the step", quiet) as progress:
-        second = execute(half, kind=kind, progress=progress)
-    if second.error is not None:
-        raise second.error
-    return compare(outcome.metrics, second.metrics)
+    with console.progress(f"{system.name} at half the step", quiet, system.start_time) as progress:
+        return execute(half, kind=kind.value, progress=progress)
 
 
-def _report(outcome: Run, comparisons: list[Comparison]) -> None:
-    out = console.console()
-    system = outcome.system
-    out.print(Text(system.title or system.name, style="bold"))
-    how = system.preset or "as it stands"
-    seconds, count = outcome.seconds, len(system.instances)
-    pace = f"{seconds['steps']:g} steps in {seconds['stepping']:.2f} s, set-up {seconds['setup']:.2f} s" if seconds else ""
-    changed = ", modified" if system.modified else ""
-    out.print(f"{how}{changed}; {count} instances, {system.algorithm}, step {system.step:g} s; {pace}", style="dim")
-    for note in outcome.checked.notes:
-        out.print(Text(f"note: {note}", style="yellow"))
-    console.show_run(out, outcome, comparisons)
-    if outcome.status != "completed":
-        reached = float(outcome.time[-1]) if len(outcome.time) else system.start_time
-        out.print(Text(f"{outcome.status} at t = {reached:g} s of {system.stop_time:g} s", style="red"))
-    if outcome.directory is not None:
-        figures = f", {len(outcome.figures)} figures" if outcome.figures else ""
-        out.print(Text(f"Files in {outcome.directory}: results.csv, units.json, metrics.json, run.json{figures}"))
-
-
-def _exit_code(outcome: Run) -> int:
-    if outcome.status == "interrupted":
+def _exit_code(outcome: Run, second: Run | None) -> int:
+    if "interrupted" in (outcome.status, second and second.status):
         return INTERRUPTED
     return FAILED if outcome.failed else OK
 
@@ -187,13 +210,15 @@ def _exit_code(outcome: Run) -> int:
 def list_all() -> None:
     """List the shipped scenarios and components."""
     out = console.console()
-    out.print("Scenarios (orchestrate run NAME)", style="bold")
+    console.say(out, "Scenarios (orchestrate run NAME)", "bold")
     for name, title in shipped():
-        presets = ", ".join(load(name).presets)
-        out.print(Text(f"  {name}: {title}" + (f"  [presets: {presets}]" if presets else "")))
-    out.print("Components (orchestrate describe NAME)", style="bold")
+        console.say(out, f"  {name}: {title}")
+        presets = load(name).presets
+        if presets:
+            console.say(out, f"      presets: {', '.join(presets)}", "dim")
+    console.say(out, "Components (orchestrate describe NAME)", "bold")
     for name, component in CATALOGUE.items():
-        out.print(Text(f"  {name}: {summary(component)}"))
+        console.say(out, f"  {name}: {summary(component)}")
 
 
 @app.command()
@@ -201,15 +226,19 @@ def describe(
     model: Annotated[str, typer.Argument(help="A component's name, my_file.py:Class, or the path of any FMU.")],
     builds: Annotated[list[str] | None, typer.Option("--with", help="Give a build argument: carriages=8.")] = None,
 ) -> None:
-    """Show a model's interface: variables, units, causality, dependencies, arguments."""
-    system = System()
-    system.add("model", model, build=_arguments(builds))
-    out = console.console()
+    """Show the interface of a component or of any FMU.
+
+    Variables by causality, with units, start values and direct dependencies; build arguments; where it comes from.
+    """
+    arguments = _arguments(builds)
+    if model.endswith(".fmu") and arguments:
+        raise ScenarioError(f"{model} is built already; it takes no --with {', '.join(arguments)}")
+    path = Path(model) if model.endswith(".fmu") else build_fmu(model, arguments)
     with Workspace() as workspace:
-        loaded = load_models(system, workspace)["model"]
-    interface = loaded.interface
+        interface = load_fmu(path, workspace).interface
+    out = console.console()
     vendor = interface.vendor
-    out.print(Text(interface.model, style="bold"))
+    console.say(out, interface.model, "bold")
     facts = {
         "": interface.description,
         "note": vendor.get("note", ""),
@@ -224,10 +253,10 @@ def describe(
     }
     for label, fact in facts.items():
         if fact:
-            out.print(Text(f"{label}: {fact}" if label else fact))
+            console.say(out, f"{label}: {fact}" if label else fact)
     for warning in interface.warnings:
-        out.print(Text(f"warning: {warning}", style="yellow"))
-    out.print(console.interface_table(interface))
+        console.say(out, f"warning: {warning}", "yellow")
+    console.show_interface(out, interface)
 
 
 def _arguments(builds: list[str] | None) -> dict[str, Any]:
@@ -245,63 +274,116 @@ def _arguments(builds: list[str] | None) -> dict[str, Any]:
 
 
 @app.command()
-def check(scenario: Scenario, preset: Preset = None, settings: Set = None, builds: With = None, swaps: Swap = None) -> None:
-    """Find everything that can be known to be wrong before a run, and show how the run would step."""
-    system = _load(scenario, preset, settings, builds, swaps)
+def check(
+    scenario: Scenario, preset: Preset = None, settings: Set = None, builds: With = None, swaps: Swap = None
+) -> None:
+    """Find what is wrong before a run, and show how the run would step."""
+    system = load(scenario, preset=preset, settings=settings or (), builds=builds or (), swaps=swaps or ())
     out = console.console()
     with Workspace() as workspace:
         checked = check_system(system, workspace)
-    out.print(Text(system.title or system.name, style="bold"))
+    console.say(out, system.title or system.name, "bold")
     connections = len(checked.wiring.links)
-    out.print(f"{len(system.instances)} instances, {connections} scalar connections, step {system.step:g} s", style="dim")
+    facts = f"{len(system.instances)} instances, {connections} scalar connections, step {system.step:g} s"
+    console.say(out, facts, "dim")
     if system.algorithm == "gauss-seidel":
-        out.print(Text(f"gauss-seidel steps in the order: {', '.join(checked.order.sequence)}"))
+        console.say(out, f"gauss-seidel steps in the order: {', '.join(checked.order.sequence)}")
     else:
-        out.print("jacobi: all instances step in parallel; a feed-through output acts one step late")
+        console.say(out, "jacobi: all instances step in parallel; a feed-through output acts one step late")
     for connection in system.connections:
         if connection.delay:
-            out.print(Text(f"delay: {connection.target} receives {connection.source} {connection.delay} point(s) later"))
-    for note in checked.notes:
-        out.print(Text(f"note: {note}", style="yellow"))
-    out.print("no errors", style="green")
+            points = f"{connection.delay} communication point{'s' * (connection.delay > 1)}"
+            console.say(out, f"delay: {connection.target} receives {connection.source} {points} later")
+    for note in console.folded(checked.notes):
+        console.say(out, f"note: {note}", "yellow")
+    console.say(out, "no errors", "green")
 
 
 @app.command()
 def build(
     names: Annotated[list[str] | None, typer.Argument(help="Component names or my_file.py:Class.")] = None,
-    every: Annotated[bool, typer.Option("--all", help="Build the whole catalogue.")] = False,
+    *,
+    every: Annotated[bool, typer.Option("--all", help="Build the whole catalogue, with SHA256SUMS.")] = False,
     builds: Annotated[list[str] | None, typer.Option("--with", help="Give a build argument: carriages=8.")] = None,
+    kind: Annotated[
+        PackagingName, typer.Option(help="native: compiled C; python: Python FMUs; auto: native if possible.")
+    ] = PackagingName.auto,
+    platforms: Annotated[
+        str | None,
+        typer.Option(
+            help="Of native FMUs: all, or some of linux64,win64,darwin64,aarch64-linux; this machine's by default."
+        ),
+    ] = None,
     output: Annotated[Path | None, typer.Option("--output", "-o", help="Directory for the FMUs.")] = None,
+    quiet: Quiet = False,
 ) -> None:
-    """Build FMUs to keep, for other tools or for --swap."""
+    """Build FMUs to keep, for other tools or for --swap; prints the files it wrote."""
     wanted = [*(names or []), *(CATALOGUE if every else [])]
     if not wanted:
         raise ScenarioError(f"name the components to build, or --all; there is {', '.join(CATALOGUE)}")
-    directory = output or _dist()
-    directory.mkdir(parents=True, exist_ok=True)
-    arguments = _arguments(builds)
-    for name in dict.fromkeys(wanted):
-        source = build_fmu(name, arguments)
-        target = directory / source.name
-        shutil.copyfile(source, target)
-        print(target)
+    written = release(
+        tuple(dict.fromkeys(wanted)),
+        _arguments(builds),
+        output or default_directory(),
+        kind=kind.value,
+        platforms=[name.strip() for name in (platforms or "").split(",") if name.strip()],
+        checksums=every,
+        tell=(lambda line: None) if quiet else (lambda line: print(line, file=sys.stderr, flush=True)),
+    )
+    for path in written:
+        print(path)
 
 
-def _dist() -> Path:
-    """``fmus/dist`` in a checkout, the current folder elsewhere."""
-    checkout = Path("fmus/build.py").is_file() and Path("pyproject.toml").is_file()
-    return Path("fmus/dist") if checkout else Path()
+@app.command()
+def pack(
+    scenario: Scenario,
+    output: Annotated[Path, typer.Option("--output", "-o", help="The FMU to write, such as platoon.fmu.")],
+    *,
+    expose: Annotated[
+        list[str] | None,
+        typer.Option(help="What to show: train[:].speed,gust.size; all outputs of the trains by default."),
+    ] = None,
+    preset: Preset = None,
+    settings: Set = None,
+    builds: With = None,
+    swaps: Swap = None,
+    stop: Stop = None,
+    step: Step = None,
+    algorithm: Algorithm = None,
+    platforms: Annotated[
+        str | None, typer.Option(help="all, or some of linux64,win64,darwin64; this machine's by default.")
+    ] = None,
+) -> None:
+    """Write one FMU that holds a whole scenario, for another tool to run as a block."""
+    system = load(
+        scenario,
+        preset=preset,
+        settings=settings or (),
+        builds=builds or (),
+        swaps=swaps or (),
+        stop_time=stop,
+        step=step,
+        algorithm=algorithm.value if algorithm else None,
+    )
+    packed = pack_system(system, output, expose=expose or (), platforms=(platforms or "").split(","))
+    out = console.console()
+    for note in console.folded(packed.notes):
+        console.say(out, f"note: {note}", "yellow")
+    shown = f"{len(packed.exposed)} variables, for {', '.join(packed.platforms)}"
+    console.say(out, f"{packed.path}: {len(system.instances)} FMUs as one, {shown}", whole=True)
 
 
 @app.command()
 def plot(
-    results: Annotated[Path, typer.Argument(help="A results directory.")],
+    results: Annotated[Path, typer.Argument(help="The directory of a run.")],
     signals: Annotated[
-        list[str] | None, typer.Argument(help="Expressions to draw, such as 'train[:].speed'; the run's own figures if none.")
+        list[str] | None,
+        typer.Argument(help="Expressions such as 'train[:].speed'; without, the run's figures."),
     ] = None,
-    output: Annotated[Path | None, typer.Option("--output", "-o", help="Where to draw; the results directory by default.")] = None,
+    output: Annotated[Path | None, typer.Option("--output", "-o", help="Where to draw; RESULTS by default.")] = None,
 ) -> None:
-    """Draw the figures of a finished or cut-short run again, or chosen signals of it."""
+    """Draw a run's figures again, or chosen signals."""
+    results = results.parent if results.is_file() else results
     loaded = Results.load(results)
     figures = [{"title": ", ".join(signals), "y": signals}] if signals else loaded.figures
     directory = output or results
@@ -312,9 +394,9 @@ def plot(
 
 @app.command()
 def new(path: Annotated[Path, typer.Argument(help="The file to write, such as my_controller.py.")]) -> None:
-    """Write a commented controller that runs, to start from."""
+    """Write a commented controller to start from; it runs."""
     name = write_skeleton(path)
-    print(f"{path} written. Try it:\n  orchestrate run comfort_cruise --swap cruise={path}:{name}")
+    print(f"{path} written. Try it:\n  orchestrate run comfort_cruise --swap cruise={shlex.quote(f'{path}:{name}')}")
 
 
 @app.command()
@@ -322,24 +404,30 @@ def reproduce(
     paper: Annotated[
         str | None, typer.Argument(help="A scenario's name or a word of its source, such as Wang; all by default.")
     ] = None,
-    kind: Kind = KindName("python"),
+    kind: Kind = KindName.auto,
     quiet: Quiet = False,
 ) -> None:
-    """Run every published case and print one table: claim, published, measured, tolerance, verdict, command."""
-    rows, commands = [], []
+    """Run every published case and print one table.
+
+    Claim, published and measured value, tolerance and verdict, under the command that shows them. Exit code 1 if a
+    published value was missed.
+    """
+    groups: dict[str, list[PublishedRow]] = {}
     for case in cases(paper):
-        with console.progress(case.command.removeprefix("orchestrate run "), quiet) as progress:
+        title = case.command.removeprefix("orchestrate run ")
+        with console.progress(title, quiet, case.system.start_time) as progress:
             outcome = execute(case.system, kind=kind.value, progress=progress)
         if outcome.error is not None:
             raise outcome.error
         if outcome.status == "interrupted":
             raise KeyboardInterrupt
-        rows += outcome.published
-        commands += [case.command] * len(outcome.published)
-    console.console().print(console.published_table(rows, commands))
-    missed = sum(row.verdict == "missed" for row in rows)
-    judged = sum(row.verdict == "reproduced" for row in rows)
-    print(f"{judged} reproduced, {missed} missed, {len(rows) - judged - missed} not judged")
+        groups[case.command] = outcome.published
+    out = console.console()
+    console.show_published(out, groups)
+    missed = False
+    for line, bad in console.summary([], [row for rows in groups.values() for row in rows]):
+        missed |= bad
+        console.say(out, line, "bold red" if bad else "green")
     raise typer.Exit(FAILED if missed else OK)
 
 
