@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import hashlib
+import lzma
 import shutil
 import stat
 import tempfile
@@ -16,10 +17,12 @@ MAX_SIZE = 4 << 30
 """Bytes an FMU may unpack to: a bomb is refused, a large real model is not."""
 MAX_FILES = 100_000
 MAX_DESCRIPTION = 256 << 20
+_UNREADABLE = (zipfile.BadZipFile, zlib.error, lzma.LZMAError, EOFError, OSError, RuntimeError, ValueError)
+"""What `zipfile` raises on damaged, encrypted, badly named or unwritable entries (a file where a folder stands)."""
 
 
 class Workspace:
-    """A temporary folder that unpacked FMUs live in while they are used; one copy per file however many instances it has.
+    """A temporary folder that unpacked FMUs live in while they are used; one copy per file for all its instances.
 
     Python FMUs cannot be loaded from a path with letters outside ASCII or with signs that a URI must encode (pythonfmu
     does not decode them and crashes). FMUs are therefore never used where the user keeps them, but unpacked here, and
@@ -36,7 +39,8 @@ class Workspace:
     def unpack(self, path: Path) -> tuple[Path, str]:
         """Unpack an FMU file; its folder and the SHA-256 of the file."""
         try:
-            digest = hashlib.sha256(path.read_bytes()).hexdigest()
+            with path.open("rb") as stream:
+                digest = hashlib.file_digest(stream, "sha256").hexdigest()
         except OSError as error:
             raise FmuFileError(f"{path} cannot be read: {error.strerror or error}") from error
         if digest not in self._unpacked:
@@ -87,7 +91,9 @@ def _extract(path: Path, target: Path) -> None:
             _check_entries(path, entries)
             for entry in entries:
                 archive.extract(entry, target)
-    except (zipfile.BadZipFile, zlib.error, EOFError, NotImplementedError, RuntimeError, UnicodeDecodeError) as error:
+    except FmuFileError:
+        raise
+    except _UNREADABLE as error:
         shutil.rmtree(target, ignore_errors=True)
         raise FmuFileError(f"{path} is not a usable FMU: {error}") from error
     if not (target / "modelDescription.xml").is_file():

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass
 
@@ -33,7 +34,7 @@ class Checked:
     notes: tuple[str, ...]
 
 
-def check(system: System, workspace: Workspace, kind: Kind = "python") -> Checked:
+def check(system: System, workspace: Workspace, kind: Kind = "auto") -> Checked:
     """Check a system as a whole.
 
     Raises:
@@ -59,7 +60,7 @@ def check(system: System, workspace: Workspace, kind: Kind = "python") -> Checke
     if problems:
         raise ScenarioError(problems)
     order = derive(list(system.instances), wiring.links, system.order)
-    return Checked(models, wiring, order, tuple(_notes(system, interfaces, wiring, order)))
+    return Checked(models, wiring, order, tuple(_notes(system, models, wiring, order)))
 
 
 def signal_names(interfaces: Mapping[str, Interface], wiring: Wiring) -> list[str]:
@@ -79,21 +80,28 @@ def _check_simulation(system: System) -> list[str]:
         problems.append("the system has no instances")
     if system.algorithm not in ALGORITHMS:
         problems.append(f"algorithm {system.algorithm!r} is unknown{did_you_mean(system.algorithm, ALGORITHMS)}")
-    if not system.step > 0.0:
-        problems.append(f"step must be positive, not {system.step!r} s")
-        return problems
-    if not system.stop_time > system.start_time:
-        problems.append(f"stop_time {system.stop_time!r} s must lie after start_time {system.start_time!r} s")
-    for name, length in (("stop_time", system.stop_time - system.start_time), ("record", system.record or system.step)):
-        count = length / system.step
-        if round(count) < 1 or abs(count - round(count)) > 1e-6:
-            problems.append(f"{name} is not a whole multiple of step = {system.step:g} s")
+    problems += _check_times(system)
     if system.order:
         missing = [name for name in system.instances if name not in system.order]
         unknown = [name for name in system.order if name not in system.instances]
         problems += [f"order: there is no instance {n!r}{did_you_mean(n, system.instances)}" for n in unknown]
         problems += [f"order: {n!r} is missing" for n in missing]
         problems += [f"order: {n!r} stands twice" for n in dict.fromkeys(system.order) if system.order.count(n) > 1]
+    return problems
+
+
+def _check_times(system: System) -> list[str]:
+    if not 0.0 < system.step < math.inf:
+        return [f"step must be a positive number, not {system.step!r} s"]
+    if not 0.0 < system.stop_time - system.start_time < math.inf:
+        return [f"stop_time {system.stop_time!r} s must lie after start_time {system.start_time!r} s"]
+    record = system.step if system.record is None else system.record
+    duration = "stop_time - start_time" if system.start_time else "stop_time"
+    problems = []
+    for name, length in ((duration, system.stop_time - system.start_time), ("record", record)):
+        count = length / system.step
+        if not 0.5 < count < math.inf or abs(count - round(count)) > 1e-6:
+            problems.append(f"{name} = {length:g} s is not a whole multiple of step = {system.step:g} s")
     return problems
 
 
@@ -109,10 +117,11 @@ def _check_once_per_process(interfaces: Mapping[str, Interface]) -> list[str]:
     ]
 
 
-def _notes(system: System, interfaces: Mapping[str, Interface], wiring: Wiring, order: Order) -> list[str]:
-    notes: dict[str, None] = dict.fromkeys(wiring.notes)
-    seen = {interface.model: interface for interface in interfaces.values()}
-    for model, interface in seen.items():
+def _notes(system: System, models: Mapping[str, Model], wiring: Wiring, order: Order) -> list[str]:
+    notes: dict[str, None] = dict.fromkeys([model.note for model in models.values() if model.note] + wiring.notes)
+    interfaces = {name: model.interface for name, model in models.items()}
+    for interface in {id(interface): interface for interface in interfaces.values()}.values():
+        model = interface.model
         notes.update(dict.fromkeys(interface.warnings))
         silent = [v.name for v in interface.of("output") if v.dependencies is None]
         if silent and interface.of("input"):

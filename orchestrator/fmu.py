@@ -3,22 +3,27 @@
 from __future__ import annotations
 
 import ctypes
+import functools
+import inspect
 import os
 import sys
+import traceback
 from collections import deque
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from pathlib import Path
-from typing import Any, Protocol
+from typing import Any, ParamSpec, Protocol, TypeVar
 
 import fmpy
-from fmpy.fmi2 import FMU2Slave, fmi2CallbackFunctions, fmi2CallbackLoggerTYPE
-from fmpy.fmi2 import defaultCallbacks as _default_callbacks
+from fmpy import fmi2
+from fmpy.fmi1 import printLogMessage
 from fmpy.logging import addLoggerProxy
 
-from ..components.component import ComponentError
 from ..components.simulate import Simulation
-from .errors import FmuError
+from .errors import FmuError, FmuFileError
 from .interface import Interface, Type
+
+P = ParamSpec("P")
+R = TypeVar("R")
 
 STATUS = ("ok", "warning", "discard", "error", "fatal", "pending")
 _WARNING, _FATAL = 1, 4
@@ -63,13 +68,41 @@ class Slave(Protocol):
         """Prepare variables of one type for being set or read together."""
 
     def step(self, time: float, length: float) -> None:
-        """Advance from ``time`` by ``length``."""
+        """Advance from ``time`` by ``length``, both in s."""
 
     def terminate(self) -> None:
         """End the run."""
 
     def free(self) -> None:
         """Give everything back; nothing may follow. Never raises."""
+
+
+_LOGS: dict[int, deque[str]] = {}
+"""What living FMUs said, by the environment pointer that each hands back with its messages."""
+
+
+def _log(environment: int | None, instance: bytes, status: int, category: bytes, message: bytes) -> None:
+    if environment not in _LOGS:  # an FMU that FMPy runs beside us
+        printLogMessage(environment, instance, status, category, message)  # type: ignore[arg-type]
+        return
+    label = STATUS[status] if 0 <= status < len(STATUS) else str(status)
+    lines = (message or b"").decode(errors="replace").splitlines()
+    _LOGS[environment].extend(f"[{label}] {line}" for line in lines)
+
+
+_LOGGER = fmi2.fmi2CallbackLoggerTYPE(_log)
+"""One for all FMUs: FMPy's proxy, which fills a message's arguments in, knows only the logger it was given last."""
+
+
+def _callbacks(environment: int, log: deque[str]) -> Any:
+    _LOGS[environment] = log
+    callbacks = fmi2.fmi2CallbackFunctions()
+    callbacks.logger = _LOGGER
+    callbacks.allocateMemory = fmi2.defaultCallbacks.allocateMemory
+    callbacks.freeMemory = fmi2.defaultCallbacks.freeMemory
+    callbacks.componentEnvironment = environment
+    addLoggerProxy(ctypes.byref(callbacks))
+    return callbacks
 
 
 class FmuSlave:
@@ -79,6 +112,9 @@ class FmuSlave:
         name: the instance's name in the system.
         interface: its interface.
         folder: where the FMU was unpacked.
+
+    Raises:
+        FmuError: it cannot be loaded or instantiated.
     """
 
     def __init__(self, name: str, interface: Interface, folder: Path) -> None:
@@ -89,35 +125,25 @@ class FmuSlave:
         self._dead = False
         here = os.getcwd()
         try:
-            self._fmu = FMU2Slave(
+            make: Any = fmi2.FMU2Slave
+            self._fmu = make(
                 guid=interface.guid,
                 unzipDirectory=str(folder),
                 modelIdentifier=interface.identifier,
                 instanceName=name,
-                libraryPath=str(library(folder, interface, name)),
+                libraryPath=str(library(folder, interface, interface.model)),
             )
-            self._callbacks = self._make_callbacks()
-            self._fmu.instantiate(callbacks=self._callbacks)
-        except FmuError:
-            raise
+            self._callbacks = _callbacks(id(self), self.log)
+            # pythonfmu passes even its errors on only while debug logging is on; others then flood us with details.
+            talks = bool(interface.vendor) or "pythonfmu" in interface.generator.lower()
+            self._fmu.instantiate(callbacks=self._callbacks, loggingOn=talks)
         except Exception as error:
+            _LOGS.pop(id(self), None)
             raise FmuError(f"cannot be instantiated: {error}", instance=name, log=list(self.log)) from error
         finally:
             os.chdir(here)
         self._component = self._fmu.component
         self._do_step = self._function("fmi2DoStep", [ctypes.c_void_p, ctypes.c_double, ctypes.c_double, ctypes.c_int])
-
-    def _make_callbacks(self) -> Any:
-        def logger(_: Any, instance: bytes, status: int, category: bytes, message: bytes) -> None:
-            label = STATUS[status] if 0 <= status < len(STATUS) else str(status)
-            self.log.append(f"[{label}] {(message or b'').decode(errors='replace')}")
-
-        callbacks = fmi2CallbackFunctions()
-        callbacks.logger = fmi2CallbackLoggerTYPE(logger)
-        callbacks.allocateMemory = _default_callbacks.allocateMemory
-        callbacks.freeMemory = _default_callbacks.freeMemory
-        addLoggerProxy(ctypes.byref(callbacks))
-        return callbacks
 
     def _function(self, name: str, argtypes: list[Any]) -> Any:
         # FMPy's own methods check and log in Python at every call; in the step loop we call the library directly.
@@ -129,7 +155,7 @@ class FmuSlave:
         """Raise unless the status of a call is ok or warning."""
         if status <= _WARNING:
             return
-        self._dead = True
+        self._dead = status == _FATAL
         what = "discarded the step" if (call, status) == ("fmi2DoStep", 2) else f"{call} failed"
         if status == len(STATUS) - 1:
             what = f"{call} is pending: asynchronous FMUs are not supported"
@@ -143,29 +169,43 @@ class FmuSlave:
             self.check(name, getattr(error, "status", _FATAL))
 
     def setup(self, start_time: float, stop_time: float) -> None:
+        """Announce the experiment."""
         self.time = start_time
         self._call("fmi2SetupExperiment", 0, 0.0, start_time, 1, stop_time)
 
     def enter_initialization(self) -> None:
+        """Enter initialization mode."""
         self._call("fmi2EnterInitializationMode")
 
     def exit_initialization(self) -> None:
+        """Leave initialization mode."""
         self._call("fmi2ExitInitializationMode")
 
     def channel(self, kind: Type, names: Sequence[str]) -> Channel:
+        """Prepare variables of one type for being set or read together."""
         return _FmuChannel(self, kind, [self.interface.variables[name].reference for name in names])
 
     def step(self, time: float, length: float) -> None:
+        """Advance from ``time`` by ``length``, both in s."""
         self.time = time
         status = self._do_step(self._component, time, length, 1)
         if status:
             self.check("fmi2DoStep", status)
+        self.time = time + length
 
     def terminate(self) -> None:
+        """End the run."""
         self._call("fmi2Terminate")
 
     def free(self) -> None:
-        self._fmu.freeInstance()
+        """Give the instance and its library back; after a fatal status neither, as FMI 2.0 (2.1.3) has it.
+
+        An FMU made with pythonfmu 0.7 has dropped its Python objects by then, and drops them again when freed: the
+        process would crash.
+        """
+        if not self._dead:
+            self._fmu.freeInstance()
+        _LOGS.pop(id(self), None)
 
 
 class _FmuChannel:
@@ -201,8 +241,13 @@ class _FmuChannel:
 def library(folder: Path, interface: Interface, name: str) -> Path:
     """The shared library of an unpacked FMU for this platform, even if it is not named after the model.
 
+    Args:
+        folder: where the FMU was unpacked.
+        interface: its interface.
+        name: the file as the user knows it, for messages.
+
     Raises:
-        FmuError: there is none; the message says for which platforms there are.
+        FmuFileError: there is none; the message says for which platforms there are.
     """
     binaries = folder / "binaries"
     place = binaries / fmpy.platform
@@ -213,13 +258,33 @@ def library(folder: Path, interface: Interface, name: str) -> Path:
     if len(others) == 1:
         return others[0]
     found = sorted(p.name for p in binaries.iterdir() if any(p.iterdir())) if binaries.is_dir() else []
-    raise FmuError(
-        f"has no binary for {fmpy.platform}; the FMU brings {', '.join(found) or 'none at all'}", instance=name
-    )
+    raise FmuFileError(f"{name} has no binary for {fmpy.platform}; it brings {', '.join(found) or 'none at all'}")
+
+
+_RUNTIME = (Path(__file__).parent, Path(inspect.getfile(Simulation)).parent)
+
+
+def _telling(method: Callable[P, R]) -> Callable[P, R]:
+    """Turn any exception of a component into an `FmuError` with instance, time, file and line; it stays the cause."""
+
+    @functools.wraps(method)
+    def wrapped(*args: P.args, **kwargs: P.kwargs) -> R:
+        try:
+            return method(*args, **kwargs)
+        except Exception as error:
+            plain: Any = args[0]
+            frames = traceback.extract_tb(error.__traceback__)
+            authors = [f for f in frames if Path(f.filename).parent not in _RUNTIME]
+            frame = (authors or frames)[-1]
+            place = f"{Path(frame.filename).name}:{frame.lineno}, in {frame.name}"
+            message = f"{type(error).__name__}: {error} [{place}]"
+            raise FmuError(message, instance=plain.name, time=plain.time, status="error") from error
+
+    return wrapped
 
 
 class PlainSlave:
-    """A component as Python objects in this process: slower to fail, easy to debug, the same numbers."""
+    """A component as Python objects in this process: easy to debug, the same numbers."""
 
     def __init__(self, name: str, interface: Interface, simulation: Simulation) -> None:
         self.name = name
@@ -227,38 +292,40 @@ class PlainSlave:
         self.time = 0.0
         self.simulation = simulation
 
-    def _fail(self, error: ComponentError | ArithmeticError | ValueError) -> FmuError:
-        return FmuError(str(error), instance=self.name, time=self.time, status="error")
-
     def setup(self, start_time: float, stop_time: float) -> None:
+        """Announce the experiment; a component does not care when it ends."""
         self.time = start_time
 
+    @_telling
     def enter_initialization(self) -> None:
+        """Enter initialization mode."""
         self.simulation.initialize(self.time)
 
+    @_telling
     def exit_initialization(self) -> None:
-        try:
-            self.simulation.start()
-        except (ComponentError, ArithmeticError, ValueError) as error:
-            raise self._fail(error) from error
+        """Leave initialization mode."""
+        self.simulation.start()
 
     def channel(self, kind: Type, names: Sequence[str]) -> Channel:
+        """Prepare variables for being set or read together."""
         return _PlainChannel(self, names)
 
+    @_telling
     def step(self, time: float, length: float) -> None:
+        """Advance from ``time`` by ``length``, both in s."""
         self.time = time
-        try:
-            if self.simulation.time != time:
-                self.simulation.time = time
-            self.simulation.step(length)
-        except (ComponentError, ArithmeticError, ValueError) as error:
-            raise self._fail(error) from error
+        if self.simulation.time != time:
+            self.simulation.time = time
+        self.simulation.step(length)
+        self.time = time + length
 
+    @_telling
     def terminate(self) -> None:
+        """End the run."""
         self.simulation.terminate()
 
     def free(self) -> None:
-        pass
+        """Nothing to give back."""
 
 
 class _PlainChannel:
@@ -266,29 +333,36 @@ class _PlainChannel:
         self._slave = slave
         self._places = [_place(slave.simulation, name) for name in names]
 
+    @property
+    def name(self) -> str:
+        return self._slave.name
+
+    @property
+    def time(self) -> float:
+        return self._slave.time
+
+    @_telling
     def set(self, values: Sequence[Any]) -> None:
         simulation = self._slave.simulation
         arrays: dict[str, Any] = {}
-        try:
-            for (name, element, kind), value in zip(self._places, values, strict=True):
-                if element is None:
-                    simulation.set(name, kind(value))
-                else:
-                    if name not in arrays:
-                        arrays[name] = simulation.get(name).copy()
-                    arrays[name].flat[element] = kind(value)
-            for name, array in arrays.items():
-                simulation.set(name, array)
-        except (ComponentError, ArithmeticError, ValueError) as error:
-            raise self._slave._fail(error) from error
+        for (name, element, kind), value in zip(self._places, values, strict=True):
+            if element is None:
+                simulation.set(name, kind(value))
+            else:
+                if name not in arrays:
+                    arrays[name] = simulation.get(name).copy()
+                arrays[name].flat[element] = kind(value)
+        for name, array in arrays.items():
+            simulation.set(name, array)
 
+    @_telling
     def get(self) -> list[Any]:
-        simulation = self._slave.simulation
-        try:
-            found = [(simulation.get(name), element, kind) for name, element, kind in self._places]
-        except (ComponentError, ArithmeticError, ValueError) as error:
-            raise self._slave._fail(error) from error
-        return [kind(value if element is None else value.flat[element]) for value, element, kind in found]
+        found = [(self._slave.simulation.get(name), element, kind) for name, element, kind in self._places]
+        # A boolean is 0 or 1 here, as it comes from an FMU.
+        return [
+            (int if kind is bool else kind)(value if element is None else value.flat[element])
+            for value, element, kind in found
+        ]
 
 
 def _place(simulation: Simulation, scalar: str) -> tuple[str, int | None, Any]:

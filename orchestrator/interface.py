@@ -2,10 +2,8 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from pathlib import Path
 from typing import Any, Literal
 
 Type = Literal["Real", "Integer", "Boolean", "String", "Enumeration"]
@@ -13,7 +11,7 @@ Type = Literal["Real", "Integer", "Boolean", "String", "Enumeration"]
 
 @dataclass(frozen=True)
 class Unit:
-    """A unit definition: value in SI base units = factor * value + offset; ``exponents`` over kg, m, s, A, K, mol, cd, rad."""
+    """A unit definition: value in SI = factor * value + offset; ``exponents`` over kg, m, s, A, K, mol, cd, rad."""
 
     name: str
     exponents: tuple[int, ...] | None
@@ -44,6 +42,8 @@ class Variable:
     @property
     def settable(self) -> bool:
         """Whether a start value may be set before initialization."""
+        if self.variability == "constant":
+            return False
         return self.causality in ("input", "parameter") or self.initial in ("exact", "approx")
 
 

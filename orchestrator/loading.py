@@ -2,21 +2,22 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Literal
 
-from ..components.component import ComponentError
-from ..fmus.build import Plain, build, plain
+from ..components.tracing import TracingError
+from ..fmus.build import Plain, build, native_problem, plain, resolve
+from ..fmus.toolchain import CompilerError
 from .archive import Workspace
 from .errors import FmuFileError, ScenarioError
-from .fmu import FmuSlave, PlainSlave, Slave
+from .fmu import FmuSlave, PlainSlave, Slave, library
 from .interface import Interface
 from .reader import read
 from .system import Instance, System
 
-Kind = Literal["python", "plain"]
-KINDS: tuple[Kind, ...] = ("python", "plain")
+Kind = Literal["auto", "native", "python", "plain"]
+KINDS: tuple[Kind, ...] = ("auto", "native", "python", "plain")
 
 
 @dataclass(frozen=True)
@@ -25,10 +26,11 @@ class Model:
 
     Attributes:
         interface: what it shows.
-        kind: ``"fmu"`` for a file of the user's, ``"python"`` for a component packaged here, ``"plain"`` for one in
-            this process.
+        kind: ``"fmu"`` for a file of the user's, ``"native"`` or ``"python"`` for a component packaged here,
+            ``"plain"`` for one in this process.
         path: the FMU file; None for a plain component.
         digest: SHA-256 of the file, or the component's own digest.
+        note: why it is not of the kind a user would expect; empty mostly.
     """
 
     interface: Interface
@@ -37,6 +39,7 @@ class Model:
     path: Path | None
     digest: str
     plain: Plain | None = None
+    note: str = ""
 
     def instantiate(self, name: str) -> Slave:
         """One instance.
@@ -49,7 +52,7 @@ class Model:
         return FmuSlave(name, self.interface, self.folder)
 
 
-def load_models(system: System, workspace: Workspace, kind: Kind = "python") -> dict[str, Model]:
+def load_models(system: System, workspace: Workspace, kind: Kind = "auto") -> dict[str, Model]:
     """The model of every instance; instances of the same file or component share one.
 
     Raises:
@@ -64,7 +67,7 @@ def load_models(system: System, workspace: Workspace, kind: Kind = "python") -> 
             if key not in shared:
                 shared[key] = _load(instance, workspace, kind)
             models[instance.name] = shared[key]
-        except (ComponentError, FmuFileError) as error:
+        except (ValueError, OSError) as error:  # ComponentError and FmuFileError among them
             family = instance.name.partition("[")[0]
             problems[f"{instance.origin + ': ' if instance.origin else ''}instance {family!r}: {error}"] = None
     if problems:
@@ -78,13 +81,29 @@ def _load(instance: Instance, workspace: Workspace, kind: Kind) -> Model:
             raise FmuFileError(
                 f"{instance.model} is built already; it takes no build arguments {sorted(instance.build)}"
             )
-        return load_fmu(Path(instance.model), workspace, "fmu")
+        model = load_fmu(Path(instance.model), workspace, "fmu")
+        library(model.folder, model.interface, instance.model)  # said now, not when the run has begun
+        return model
     if kind == "plain":
         component = plain(instance.model, instance.build)
         folder = workspace.write_description(component.description)
         interface = read(folder, instance.model)
         return Model(interface, kind, folder, None, str(interface.vendor.get("digest", "")), component)
+    if kind == "auto":
+        return _load_best(instance, workspace)
     return load_fmu(build(instance.model, instance.build, kind=kind), workspace, kind)
+
+
+def _load_best(instance: Instance, workspace: Workspace) -> Model:
+    """A native FMU where one can be made here, a Python FMU with a note that says why not elsewhere."""
+    problem = native_problem(resolve(instance.model))
+    if not problem:
+        try:
+            return load_fmu(build(instance.model, instance.build, kind="native"), workspace, "native")
+        except (TracingError, CompilerError) as error:
+            problem = str(error).splitlines()[0]
+    model = load_fmu(build(instance.model, instance.build, kind="python"), workspace, "python")
+    return replace(model, note=f"running Python FMUs, not native ones: {problem}")
 
 
 def load_fmu(path: Path, workspace: Workspace, kind: str = "fmu") -> Model:

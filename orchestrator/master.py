@@ -19,8 +19,12 @@ from .system import Algorithm
 from .wiring import Link
 
 _SWEEPS = 100
+_SHRINKS = 0.8
+"""How much smaller each sweep's change must be than the last: slower than that, Newton's method is the better way."""
 _AGREE = 1e-12
 """Relative change below which a connected value counts as settled; acyclic systems settle exactly."""
+_SOLVED = 1e-9
+"""The same after Newton's method, which ends at a residual, not at a fixed point."""
 
 Observer = Callable[[int, float, Sequence[Any]], bool]
 """Called with the step number, the time and all values after every step; returns False to stop the run."""
@@ -76,12 +80,14 @@ class Master:
         self.signals: list[str] = []
         """Names of the values, in the order in which they are recorded."""
         self.values: list[Any] = []
+        self.steps = 0
+        """Communication steps taken."""
         self._starts = starts
         self._links = links
         index: dict[tuple[str, str], int] = {}
         self._yields = {name: self._plan_outputs(slave, index) for name, slave in slaves.items()}
         deepest = max((link.delay for link in links), default=0)
-        self._history: deque[list[Any]] = deque(maxlen=deepest + 1)
+        self._history: deque[list[Any]] | None = deque(maxlen=deepest + 1) if deepest else None
         self._feeds = {name: self._plan_inputs(slave, index) for name, slave in slaves.items()}
         self._sequence = [slaves[name] for name in sequence]
 
@@ -149,8 +155,9 @@ class Master:
         self._settle()
         for slave in self.slaves.values():
             slave.exit_initialization()
-        self._check_finite(start_time)
-        self._history.append(list(self.values))
+        for slave in self.slaves.values():
+            self._read_finite(slave)
+        self._remember()
 
     def _set_starts(self, slave: Slave) -> None:
         given = self._starts.get(slave.name, {})
@@ -160,16 +167,19 @@ class Master:
             slave.channel(kind, names).set([given[name] for name in names])
 
     def _settle(self) -> None:
-        change = math.inf
-        for _ in range(_SWEEPS):
+        """Exchange until nothing changes; what is left after that is a loop, for Newton's method where it diverges."""
+        flushed = len(self.slaves) + 1  # sweeps after which every chain has settled, whatever the order
+        begin, last = list(self.values), math.inf
+        for count in range(max(_SWEEPS, flushed)):
             before = list(self.values)
             self._sweep()
             change = _largest_change(before, self.values)
             if change <= _AGREE:
                 return
-            if not math.isfinite(change):
+            if count >= flushed and not change < _SHRINKS * last:
                 break
-        solve_loops(self, change)
+            last = change
+        solve_loops(self, begin, before)
 
     def _sweep(self) -> None:
         for slave in self._sequence:
@@ -188,10 +198,9 @@ class Master:
         advance = self._gauss_seidel if self.algorithm == "gauss-seidel" else self._jacobi
         for k in range(count):
             advance(start_time + k * step, step)
-            now = start_time + (k + 1) * step
-            self._check_finite(now)
-            self._history.append(list(self.values))
-            if not observe(k + 1, now, self.values):
+            self._remember()
+            self.steps = k + 1
+            if not observe(k + 1, start_time + (k + 1) * step, self.values):
                 return False
         return True
 
@@ -204,7 +213,7 @@ class Master:
         for slave in self._sequence:
             self._write(slave.name)
             slave.step(time, step)
-            self._read(slave)
+            self._read_finite(slave)
 
     def _jacobi(self, time: float, step: float) -> None:
         for name in self.slaves:
@@ -212,7 +221,7 @@ class Master:
         for slave in self.slaves.values():
             slave.step(time, step)
         for slave in self.slaves.values():
-            self._read(slave)
+            self._read_finite(slave)
 
     def _write(self, name: str) -> None:
         values = self.values
@@ -235,22 +244,28 @@ class Master:
             return self.values[k]
         return self._history[max(0, len(self._history) - 1 - age)][k]
 
+    def _remember(self) -> None:
+        if self._history is not None:
+            self._history.append(list(self.values))
+
     def _read(self, slave: Slave) -> None:
         for part in self._yields[slave.name]:
             self.values[part.begin : part.end] = part.channel.get()
 
-    def _check_finite(self, time: float) -> None:
-        for name, parts in self._yields.items():
-            for part in parts:
-                # One sum instead of one test per value: it is finite unless a value is not (or all are astronomic).
-                if part.is_real and not math.isfinite(sum(self.values[part.begin : part.end])):
-                    self._name_culprit(name, part, time)
+    def _read_finite(self, slave: Slave) -> None:
+        """Read, and stop before anyone else is given what is not finite, so that the blame falls on its source."""
+        for part in self._yields[slave.name]:
+            found = part.channel.get()
+            self.values[part.begin : part.end] = found
+            # One sum instead of one test per value: it is finite unless a value is not (or all are astronomic).
+            if part.is_real and not math.isfinite(sum(found)):
+                self._name_culprit(slave, part)
 
-    def _name_culprit(self, name: str, part: _Yield, time: float) -> None:
+    def _name_culprit(self, slave: Slave, part: _Yield) -> None:
         for k in range(part.begin, part.end):
             if not math.isfinite(self.values[k]):
-                variable = self.signals[k].removeprefix(f"{name}.")
-                raise FmuError(f"output {variable!r} is {self.values[k]!r}", instance=name, time=time)
+                variable = self.signals[k].removeprefix(f"{slave.name}.")
+                raise FmuError(f"output {variable!r} is {self.values[k]!r}", instance=slave.name, time=slave.time)
 
 
 def _types(kinds: Any) -> tuple[Type, ...]:
@@ -258,49 +273,56 @@ def _types(kinds: Any) -> tuple[Type, ...]:
 
 
 def _largest_change(before: Sequence[Any], after: Sequence[Any]) -> float:
-    change = 0.0
-    for a, b in zip(before, after, strict=True):
-        if a == b:
-            continue
-        if isinstance(a, str) or isinstance(b, str):
-            change = max(change, 1.0)
-        else:
-            change = max(change, abs(b - a) / max(1.0, abs(a), abs(b)))
-        if change != change:
-            return math.nan
-    return change
+    return max(map(_change, before, after), default=0.0)
 
 
-def solve_loops(master: Master, change: float) -> None:
-    """Newton's method (SciPy) on the connected real values, where repeated exchange does not settle.
+def _change(a: Any, b: Any) -> float:
+    """How far a value has moved, relative to its size above 1; what stays NaN has not moved."""
+    if a == b:
+        return 0.0
+    if isinstance(a, str) or isinstance(b, str):
+        return 1.0
+    if not math.isfinite(b - a):
+        return 0.0 if math.isnan(a) and math.isnan(b) else math.inf
+    return float(abs(b - a) / max(1.0, abs(a), abs(b)))
+
+
+def solve_loops(master: Master, begin: Sequence[Any], before: Sequence[Any]) -> None:
+    """Newton's method (SciPy) on the connected real values that repeated exchange does not settle.
+
+    Args:
+        master: its last sweep ended in other values than it began with.
+        begin: values before any exchange, where the search starts: exchange that diverges leads away from them.
+        before: values before the last sweep.
 
     Raises:
-        ScenarioError: no consistent initial values were found; the residual and the connections involved are named.
+        ScenarioError: no consistent initial values were found; the signals involved and the residual are named.
     """
     from scipy import optimize  # noqa: PLC0415 (a heavy import for a rare case)
 
-    before = list(master.values)
-    master._sweep()
-    moving = [
-        k for k, (a, b) in enumerate(zip(before, master.values, strict=True)) if a != b and not isinstance(a, str)
-    ]
-    start = [before[k] if math.isfinite(before[k]) else 0.0 for k in moving]
+    moving = [k for k, (a, b) in enumerate(zip(before, master.values, strict=True)) if _change(a, b) > 0.0]
+    unknown = [k for k in moving if isinstance(begin[k], float)]
+    names = ", ".join(master.signals[k] for k in moving[:6]) + (", ..." if len(moving) > 6 else "")
 
     def residual(candidate: Any) -> list[float]:
-        for k, value in zip(moving, candidate, strict=True):
+        for k, value in zip(unknown, candidate, strict=True):
             master.values[k] = float(value)
         master._sweep()
-        return [master.values[k] - float(value) for k, value in zip(moving, candidate, strict=True)]
+        return [master.values[k] - float(value) for k, value in zip(unknown, candidate, strict=True)]
 
-    names = ", ".join(master.signals[k] for k in moving[:6])
+    master.values[:] = begin
     try:
-        solution = optimize.root(residual, [min(max(v, -1e12), 1e12) for v in start], method="hybr", tol=1e-13)
-        final = residual(solution.x)
+        start = [begin[k] if math.isfinite(begin[k]) else 0.0 for k in unknown]
+        solution = optimize.root(residual, start, method="hybr", tol=1e-13).x if unknown else []
+        residual(solution)
+        found = list(master.values)
+        master._sweep()
     except (FmuError, ValueError, OverflowError) as error:
         raise ScenarioError(f"the initial values of {names} do not settle: {error}") from error
-    worst = max((abs(r) / max(1.0, abs(x)) for r, x in zip(final, solution.x, strict=True)), default=0.0)
-    if not worst <= 1e-9:
+    worst = _largest_change(found, master.values)
+    if not worst <= _SOLVED:
         raise ScenarioError(
             f"the initial values of {names} do not settle: they form an algebraic loop for which no solution was found "
-            f"(residual {worst:.3g}); break it with delay = 1 on one connection, or give other start values"
+            f"(they still change by {worst:.3g} when exchanged); put a component with memory into the loop, or start "
+            "the search elsewhere by other start values"
         )

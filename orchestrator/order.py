@@ -1,8 +1,8 @@
 """The order in which instances step, derived from direct feed-through.
 
-Where an output depends directly on an input of its FMU (a controller's force), that FMU steps before the receiver, which
-then gets the value computed from this communication point. Otherwise (a plant's position) it steps after the receiver,
-which thus gets the value *of* this communication point. Every connection then carries one time stamp.
+Where an output depends directly on an input of its FMU (a controller's force), that FMU steps before the receiver,
+which then gets the value computed from this communication point. Otherwise (a plant's position) it steps after the
+receiver, which thus gets the value *of* this communication point. Every connection then carries one time stamp.
 """
 
 from __future__ import annotations
@@ -36,8 +36,8 @@ def derive(instances: Sequence[str], links: Iterable[Link], chosen: Sequence[str
         links: the connections; delayed ones do not constrain the order.
         chosen: the user's own order, which then is only checked.
     """
-    bound = [link for link in links if not link.delay and link.source[0] != link.target[0]]
-    sequence = tuple(chosen) if chosen else _sort(instances, bound)
+    bound = [link for link in links if not link.delay]
+    sequence = tuple(chosen) if chosen else _sort(instances, [x for x in bound if x.source[0] != x.target[0]])
     return Order(sequence, tuple(_late(sequence, bound)))
 
 
@@ -55,8 +55,9 @@ def _sort(instances: Sequence[str], links: Sequence[Link]) -> tuple[str, ...]:
     condensed = nx.condensation(graph)
     groups = {g: sorted(condensed.nodes[g]["members"], key=rank.__getitem__) for g in condensed}
     sequence: list[str] = []
-    for group in nx.lexicographical_topological_sort(condensed, key=lambda g: rank[groups[g][0]]):
-        sequence.extend(_sort_cycle(groups[group], links, rank))
+    for generation in nx.topological_generations(condensed):
+        for group in sorted(generation, key=lambda g: rank[groups[g][0]]):
+            sequence.extend(_sort_cycle(groups[group], links, rank))
     return tuple(sequence)
 
 
@@ -79,7 +80,8 @@ def _late(sequence: Sequence[str], links: Sequence[Link]) -> Iterable[str]:
     for link in links:
         first, second = _before(link)
         source, target = ".".join(link.source), ".".join(link.target)
-        if at[first] < at[second] or (link.source[0], link.target[0]) in told:
+        in_time = at[first] < at[second] or (first == second and not link.direct)
+        if in_time or (link.source[0], link.target[0]) in told:
             continue
         told.add((link.source[0], link.target[0]))
         if link.direct:

@@ -7,15 +7,14 @@ import re
 from pathlib import Path
 from typing import Any, cast
 
-import fmpy
-from fmpy.model_description import ValidationError
+from fmpy.model_description import ValidationError, read_model_description
 from lxml import etree
 
 from .errors import FmuFileError
 from .interface import Interface, Type, Unit, Variable
 
 _EXPONENTS = ("kg", "m", "s", "A", "K", "mol", "cd", "rad")
-_ELEMENT = re.compile(r"^(?P<array>.*)\[\d+(?:,\s*\d+)*\]$")
+_ELEMENT = re.compile(r"^(?P<array>.*)\[(?P<index>\d+(?:,\s*\d+)*)\]$")
 
 
 def read(folder: Path, name: str) -> Interface:
@@ -35,6 +34,13 @@ def read(folder: Path, name: str) -> Interface:
     if root.find("CoSimulation") is None:
         raise FmuFileError(f"{name} has no co-simulation part (it is a model-exchange FMU)")
     description, warnings = _read(folder, name)
+    try:
+        return _interface(description, root, warnings)
+    except (ValueError, TypeError, AttributeError) as error:
+        raise FmuFileError(f"{name}: its modelDescription.xml cannot be used: {error}") from error
+
+
+def _interface(description: Any, root: Any, warnings: list[str]) -> Interface:
     variables = {v.name: v for v in _variables(description)}
     simulation = description.coSimulation
     experiment = description.defaultExperiment
@@ -59,22 +65,25 @@ def read(folder: Path, name: str) -> Interface:
 
 
 def _parse(path: Path, name: str) -> Any:
-    content = path.read_bytes()
-    if b"<!DOCTYPE" in content or b"<!ENTITY" in content:
-        raise FmuFileError(f"{name} is refused: its modelDescription.xml declares XML entities")
     try:
-        return etree.fromstring(content, etree.XMLParser(resolve_entities=False, no_network=True))
+        parsed = etree.parse(str(path), etree.XMLParser(resolve_entities=False, no_network=True))
     except etree.XMLSyntaxError as error:
         raise FmuFileError(f"{name}: its modelDescription.xml is not XML: {error}") from error
+    # Asked of the parser, not searched for in the bytes: they may be in any encoding.
+    if parsed.docinfo.internalDTD is not None:
+        raise FmuFileError(f"{name} is refused: its modelDescription.xml has a DOCTYPE, which may declare XML entities")
+    return parsed.getroot()
 
 
 def _read(folder: Path, name: str) -> tuple[Any, list[str]]:
     try:
-        return fmpy.read_model_description(str(folder), validate=True), []
+        return read_model_description(str(folder), validate=True), []
     except ValidationError as error:
         problems = [f"{name}: {problem}" for problem in error.problems]
+    except Exception as error:
+        problems = [f"{name}: {error}"]
     try:
-        return fmpy.read_model_description(str(folder), validate=False), problems
+        return read_model_description(str(folder), validate=False), problems
     except Exception as error:
         raise FmuFileError(f"{name}: its modelDescription.xml cannot be used: {error}") from error
 
@@ -128,12 +137,14 @@ def _unit(unit: Any) -> Unit:
 
 
 def _arrays(variables: dict[str, Variable]) -> dict[str, tuple[str, ...]]:
-    found: dict[str, list[str]] = {}
+    found: dict[str, list[tuple[tuple[int, ...], str]]] = {}
     for name in variables:
         match = _ELEMENT.match(name)
         if match:
-            found.setdefault(match["array"], []).append(name)
-    return {name: tuple(elements) for name, elements in found.items() if name not in variables}
+            index = tuple(int(k) for k in match["index"].split(","))
+            found.setdefault(match["array"], []).append((index, name))
+    # By index, because a file may list the elements in any order.
+    return {array: tuple(n for _, n in sorted(elements)) for array, elements in found.items() if array not in variables}
 
 
 def _vendor(root: Any) -> dict[str, Any]:

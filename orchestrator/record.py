@@ -22,9 +22,16 @@ _PACKAGES = ("railcosim", "fmpy", "pythonfmu", "numpy", "scipy")
 
 def write(directory: Path, system: System, checked: Checked, kind: str) -> None:
     """Write what is known before the first step, so that a run that is killed can be read."""
+    for name in ("results.csv", "metrics.json"):  # of an earlier run: not to be taken for this one's
+        (directory / name).unlink(missing_ok=True)
     _dump(directory / "run.json", _describe(system, checked, kind) | {"status": "running"})
-    units = {n: u for n, u in _units(checked).items() if not n.startswith("time")}
-    _dump(directory / "units.json", {"time": "s"} | units)
+    _dump(directory / "units.json", {"time": "s"} | _units(checked))
+
+
+def abandon(directory: Path, error: BaseException) -> None:
+    """Let the record of a run that never began not say "running" for ever."""
+    path = directory / "run.json"
+    _dump(path, json.loads(path.read_text(encoding="utf-8")) | {"status": "failed", "error": str(error)})
 
 
 def finish(directory: Path, outcome: Run, kind: str) -> None:
@@ -94,6 +101,7 @@ def _describe(system: System, checked: Checked, kind: str) -> dict[str, Any]:
         },
         "connections": [dataclasses.asdict(connection) for connection in system.connections],
         "units": _units(checked),
+        "texts": _texts(checked),
         "parameters": {
             f"{name}.{v.name}": starts[name].get(v.name, v.start)
             for name, model in checked.models.items()
@@ -116,6 +124,16 @@ def _units(checked: Checked) -> dict[str, str]:
     }
 
 
+def _texts(checked: Checked) -> list[str]:
+    """Signals that are texts, even where every text looks like a number."""
+    return [
+        f"{name}.{v.name}"
+        for name, model in checked.models.items()
+        for v in model.interface.variables.values()
+        if v.type == "String"
+    ]
+
+
 def _dump(path: Path, content: dict[str, Any]) -> None:
     part = path.with_name(path.name + ".part")
     part.write_text(json.dumps(_plain(content), indent=1, ensure_ascii=False) + "\n", encoding="utf-8")
@@ -123,7 +141,7 @@ def _dump(path: Path, content: dict[str, Any]) -> None:
 
 
 def _plain(value: Any) -> Any:
-    """JSON has no infinity and no NaN: they become text."""
+    """JSON has no infinity, no NaN and no dates: they become text."""
     if isinstance(value, dict):
         return {str(k): _plain(v) for k, v in value.items()}
     if isinstance(value, list | tuple | set | frozenset):
@@ -132,4 +150,4 @@ def _plain(value: Any) -> Any:
         value = value.item()
     if isinstance(value, float) and not math.isfinite(value):
         return repr(value)
-    return value
+    return value if value is None or isinstance(value, str | int | float) else str(value)

@@ -60,37 +60,44 @@ class Results:
         return len(self.time)
 
     @classmethod
-    def load(cls, directory: Path) -> Results:
+    def load(cls, directory: str | Path) -> Results:
         """Read a results directory back, complete or cut short.
 
         Raises:
             ScenarioError: the directory holds no readable run.
         """
+        directory = Path(directory)
         try:
             record = json.loads((directory / "run.json").read_text(encoding="utf-8"))
-            with (directory / "results.csv").open(newline="", encoding="utf-8") as stream:
-                rows = list(csv.reader(stream))
-        except (OSError, ValueError) as error:
+            header, rows = _read_rows(directory / "results.csv")
+            columns = {name: _column(rows, k, name in record["texts"]) for k, name in enumerate(header)}
+            return cls(
+                columns,
+                columns.pop("time"),
+                units=record["units"],
+                parameters=record["parameters"],
+                step=record["step"],
+                stop_time=record["stop_time"],
+                completed=record["status"] == "completed",
+                figures=record["figures_wanted"],
+            )
+        except KeyError as error:
+            raise ScenarioError(f"{directory} holds no run that can be read: it has no {error}") from error
+        except (OSError, ValueError, TypeError) as error:
             raise ScenarioError(f"{directory} holds no run that can be read: {error}") from error
-        header, body = rows[0], [row for row in rows[1:] if len(row) == len(rows[0])]
-        columns = {name: _column([row[k] for row in body]) for k, name in enumerate(header)}
-        return cls(
-            columns,
-            columns.pop("time"),
-            units=record["units"],
-            parameters=record["parameters"],
-            step=record["step"],
-            stop_time=record["stop_time"],
-            completed=record["status"] == "completed",
-            figures=record["figures_wanted"],
-        )
 
 
-def _column(texts: Sequence[str]) -> NDArray[Any]:
-    try:
-        return np.array([float(text) for text in texts])
-    except ValueError:
-        return np.array(texts, dtype=object)
+def _read_rows(path: Path) -> tuple[list[str], list[list[str]]]:
+    """Header and complete rows; the line that a killed run had begun to write is left out."""
+    with path.open(newline="", encoding="utf-8") as stream:
+        header, *rows = list(csv.reader(line for line in stream if line.endswith("\n"))) or [[]]
+    return header, [row for row in rows if len(row) == len(header)]
+
+
+def _column(rows: Sequence[Sequence[str]], k: int, is_text: bool) -> NDArray[Any]:
+    if is_text:
+        return np.array([row[k] for row in rows], dtype=object)
+    return np.array([float(row[k]) for row in rows], dtype=np.float64)
 
 
 class Recorder:
@@ -109,6 +116,7 @@ class Recorder:
         if directory is not None:
             self._file = (directory / "results.csv").open("w", newline="", encoding="utf-8")
             csv.writer(self._file, lineterminator="\n").writerow(["time", *self.names])
+            self._file.flush()
 
     def record(self, time: float, values: Sequence[Any]) -> None:
         """Append one point."""

@@ -40,7 +40,8 @@ class Run:
     Attributes:
         results: recorded signals. metrics, requirements, published: evaluated tables.
         status: ``"completed"``, ``"interrupted"`` or ``"failed"``; error: why it failed.
-        notes: what a user should know about the system. directory: where the files are, if there are any.
+        checked: models, wiring, order, and the notes a user should read.
+        directory: where the files are, if there are any. figures: those that were drawn.
         seconds: wall time of ``setup`` and ``stepping``, and the number of communication ``steps``.
     """
 
@@ -80,7 +81,7 @@ def run(
     stop_time: float | None = None,
     step: float | None = None,
     algorithm: Algorithm | None = None,
-    kind: Kind = "python",
+    kind: Kind = "auto",
     output: str | Path | None = None,
     figures: bool = True,
     progress: Progress | None = None,
@@ -89,9 +90,11 @@ def run(
 
     Args:
         system: from `load`, or built by hand.
-        stop_time, step: override the system's, in s.
-        algorithm: override the system's.
-        kind: how components become models: ``"python"`` FMUs, or ``"plain"`` Python objects in this process.
+        stop_time: overrides the system's, in s.
+        step: overrides the system's, in s.
+        algorithm: overrides the system's.
+        kind: how components become models: ``"native"`` or ``"python"`` FMUs, ``"plain"`` Python objects in this
+            process; ``"auto"`` takes native where it can.
         output: directory for results, metrics and figures; without one everything stays in memory.
         figures: whether to draw the system's figures (only with an output directory).
         progress: called at every per cent of the run and at least ten times a second.
@@ -111,7 +114,7 @@ def run(
 def execute(
     system: System,
     *,
-    kind: Kind = "python",
+    kind: Kind = "auto",
     output: str | Path | None = None,
     figures: bool = True,
     progress: Progress | None = None,
@@ -123,8 +126,7 @@ def execute(
         try:
             checked = check(system, workspace, kind)
             if directory is not None:
-                _make_directory(directory)
-                record_file.write(directory, system, checked, kind)
+                _open_directory(directory, system, checked, kind)
             outcome = _simulate(system, checked, directory, progress, begin)
         finally:
             forget_paths(workspace.folder)
@@ -159,7 +161,7 @@ def _override(system: System, stop_time: float | None, step: float | None, algor
     if stop_time is not None and stop_time != system.stop_time:
         changes["stop_time"] = stop_time
     if step is not None and step != system.step:
-        changes.update(step=step, rescaled_from=system.step)
+        changes.update(step=step, rescaled_from=system.rescaled_from or system.step)
         if system.record is not None and system.record < step:
             changes["record"] = None
     if algorithm is not None and algorithm != system.algorithm:
@@ -167,11 +169,12 @@ def _override(system: System, stop_time: float | None, step: float | None, algor
     return replace(system, **changes, modified=True) if changes else system
 
 
-def _make_directory(directory: Path) -> None:
+def _open_directory(directory: Path, system: System, checked: Checked, kind: Kind) -> None:
     try:
         directory.mkdir(parents=True, exist_ok=True)
+        record_file.write(directory, system, checked, kind)
     except OSError as error:
-        raise RailcosimError(f"the output directory {directory} cannot be made: {error.strerror or error}") from error
+        raise RailcosimError(f"the output directory {directory} cannot be used: {error.strerror or error}") from error
 
 
 def _simulate(system: System, checked: Checked, directory: Path | None, progress: Progress | None, begin: float) -> Run:
@@ -179,7 +182,7 @@ def _simulate(system: System, checked: Checked, directory: Path | None, progress
     recorder: Recorder | None = None
     status: Status = "completed"
     failure: FmuError | None = None
-    seconds: dict[str, float] = {}
+    seconds: dict[str, float] = {"setup": 0.0, "stepping": 0.0, "steps": 0}
     try:
         for name, model in checked.models.items():
             slaves[name] = model.instantiate(name)
@@ -192,11 +195,19 @@ def _simulate(system: System, checked: Checked, directory: Path | None, progress
         with _interruptible() as stopped:
             observe = _observer(system, recorder, progress, stopped)
             count = round((system.stop_time - system.start_time) / system.step)
-            status = "completed" if master.run(system.start_time, system.step, count, observe) else "interrupted"
-        seconds.update(stepping=clock.perf_counter() - stepping, steps=count)
+            try:
+                status = "completed" if master.run(system.start_time, system.step, count, observe) else "interrupted"
+            finally:
+                seconds.update(stepping=clock.perf_counter() - stepping, steps=master.steps)
         master.terminate()
     except FmuError as error:
         status, failure = "failed", error
+    except KeyboardInterrupt:  # a second Ctrl-C, or one before the first step
+        status = "interrupted"
+    except BaseException as error:  # initial values that do not settle
+        if directory is not None:
+            record_file.abandon(directory, error)
+        raise
     finally:
         if recorder is not None:
             recorder.close()

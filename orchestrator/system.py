@@ -17,7 +17,7 @@ class Instance:
         name: ``"gust"``, or ``"train[2]"`` where the scenario gives a count.
         model: a catalogue name, ``"path/to/any.fmu"``, or ``"my_file.py:MyClass"``.
         build: build arguments by name.
-        start: parameters and start values by variable name (``"alpha"``, ``"force"`` for a whole array, ``"force[2]"``).
+        start: parameters and start values by variable name (``"alpha"``, ``"force"`` for an array, ``"force[2]"``).
             Text is an expression of ``i`` and ``count`` unless the variable is a string.
         index: 1-based place among its siblings; None where there is no count.
         count: how many siblings, itself included.
@@ -100,12 +100,16 @@ class System:
     origins: dict[str, str] = field(default_factory=dict, compare=False, repr=False)
 
     def add(self, name: str, model: str, build: dict[str, Any] | None = None, **start: Any) -> Instance:
-        """Add one instance; keyword arguments are parameters and start values.
+        """Add one instance.
 
         Args:
             name: its name in connections and results.
             model: a catalogue name, a path ending in ``.fmu``, or ``"file.py:Class"``.
             build: build arguments.
+            **start: parameters and start values by variable name.
+
+        Raises:
+            ValueError: the name is taken.
         """
         if name in self.instances:
             raise ValueError(f"the system already has an instance {name!r}")

@@ -1,4 +1,4 @@
-"""A system against the interfaces of its FMUs: start values and connections down to single scalars, or what is wrong."""
+"""A system against the interfaces of its FMUs: start values and connections as single scalars, or what is wrong."""
 
 from __future__ import annotations
 
@@ -7,6 +7,8 @@ import math
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 from typing import Any
+
+import numpy as np
 
 from .errors import ExpressionError, did_you_mean
 from .expressions import evaluate_constant
@@ -45,7 +47,12 @@ class Link:
 
 @dataclass
 class Wiring:
-    """The resolved system. ``starts`` gives start values by instance and scalar; ``problems`` and ``notes`` are sentences."""
+    """The resolved system.
+
+    Attributes:
+        starts: start values by instance and scalar variable. links: scalar connections.
+        problems, notes: sentences; with a problem the system cannot run.
+    """
 
     starts: dict[str, dict[str, Any]] = field(default_factory=dict)
     links: list[Link] = field(default_factory=list)
@@ -82,47 +89,47 @@ def _starts(system: System, instance: Instance, interface: Interface, wiring: Wi
                 f"{did_you_mean(name, valid)}"
             )
         else:
-            _set_start(instance, interface, name, scalars, given, values, wiring)
+            try:
+                values.update(_elements(instance, interface, name, scalars, given))
+            except (ValueError, ExpressionError) as error:
+                wiring.problems.append(f"{_place(instance.origin)}{instance.name}.{name}: {error}")
     if dropped:
         wiring.notes.append(f"{instance.name}: {interface.model} has no {', '.join(dropped)}; dropped with the swap")
     _set_runtime(system, instance, interface, values)
     return values
 
 
-def _set_start(
-    instance: Instance,
-    interface: Interface,
-    name: str,
-    scalars: tuple[str, ...],
-    given: Any,
-    values: dict[str, Any],
-    wiring: Wiring,
-) -> None:
-    where = f"{_place(instance.origin)}{instance.name}.{name}"
+def _elements(
+    instance: Instance, interface: Interface, name: str, scalars: tuple[str, ...], given: Any
+) -> dict[str, Any]:
+    """Start values by scalar; a single value is given to every element of an array.
+
+    Raises:
+        ValueError: what is wrong with it.
+    """
+    fixed = [s for s in scalars if not interface.variables[s].settable]
+    if fixed:
+        raise ValueError(f"it is computed (causality {interface.variables[fixed[0]].causality}) and cannot be set")
     elements = _flatten(given)
-    if len(elements) not in (1, len(scalars)) or (len(scalars) == 1 and isinstance(given, list)):
-        wiring.problems.append(f"{where} takes {len(scalars)} value{'s' * (len(scalars) > 1)}, {len(elements)} given")
-        return
-    for k, scalar in enumerate(scalars):
-        variable = interface.variables[scalar]
-        if not variable.settable:
-            wiring.problems.append(f"{where} is computed ({variable.causality}, {variable.initial}); it cannot be set")
-            return
-        try:
-            values[scalar] = _typed(elements[k % len(elements)], variable, instance)
-        except (ValueError, ExpressionError) as error:
-            wiring.problems.append(f"{where}: {error}")
-            return
+    if isinstance(given, list | tuple | np.ndarray):
+        if name in interface.variables:
+            raise ValueError(f"takes a single value, not the list {given!r}")
+        if len(elements) != len(scalars):
+            raise ValueError(f"takes {len(scalars)} value{'s' * (len(scalars) > 1)}, {len(elements)} given")
+    return {
+        scalar: _typed(elements[k % len(elements)], interface.variables[scalar], instance)
+        for k, scalar in enumerate(scalars)
+    }
 
 
 def _flatten(given: Any) -> list[Any]:
-    if not isinstance(given, list):
+    if not isinstance(given, list | tuple | np.ndarray):
         return [given]
     return [element for part in given for element in _flatten(part)]
 
 
 def _typed(given: Any, variable: Variable, instance: Instance) -> Any:
-    """A start value as the variable's type; text is an expression of ``i`` and ``count`` unless the variable is text."""
+    """A start value as the variable's type; text is an expression of ``i`` and ``count``, but for a text variable."""
     if variable.type == "String":
         if not isinstance(given, str):
             raise ValueError(f"takes text, not {given!r}")
@@ -132,21 +139,27 @@ def _typed(given: Any, variable: Variable, instance: Instance) -> Any:
             {"count": instance.count} if instance.index is None else {"i": instance.index, "count": instance.count}
         )
         given = evaluate_constant(given, **constants)
-    is_truth = isinstance(given, bool) or type(given).__name__ == "bool"
+    is_truth = isinstance(given, bool | np.bool_)
     if variable.type == "Boolean":
         if not is_truth:
             raise ValueError(f"takes true or false, not {given!r}")
-        return int(bool(given))
-    if is_truth or not math.isfinite(given):
-        raise ValueError(f"takes a finite number, not {given!r}")
-    if variable.type != "Real":
-        if given != int(given):
-            raise ValueError(f"takes a whole number, not {given!r}")
         return int(given)
-    for limit, wrong in ((variable.minimum, "below"), (variable.maximum, "above")):
-        if limit is not None and (given < limit if wrong == "below" else given > limit):
-            raise ValueError(f"{given!r} is {wrong} the limit {limit!r} {variable.unit or ''}".rstrip())
-    return float(given)
+    if is_truth or not isinstance(given, float | int | np.floating | np.integer):
+        raise ValueError(f"takes a number, not {given!r}")
+    return _bounded(given, variable)
+
+
+def _bounded(given: Any, variable: Variable) -> float | int:
+    if not abs(given) < math.inf:
+        raise ValueError(f"takes a finite number, not {given!r}")
+    if variable.type != "Real" and given != int(given):
+        raise ValueError(f"takes a whole number, not {given!r}")
+    low, high = variable.minimum, variable.maximum
+    if low is not None and given < low:
+        raise ValueError(f"{given} is below the limit {low:g} {variable.unit or ''}".rstrip())
+    if high is not None and given > high:
+        raise ValueError(f"{given} is above the limit {high:g} {variable.unit or ''}".rstrip())
+    return float(given) if variable.type == "Real" else int(given)
 
 
 def _set_runtime(system: System, instance: Instance, interface: Interface, values: dict[str, Any]) -> None:
@@ -178,6 +191,9 @@ def _links(connection: Connection, interfaces: Mapping[str, Interface], wiring: 
             wiring.problems.append(f"{where}: {problem}")
         ends.append(scalars)
     sources, targets = ends
+    if isinstance(connection.delay, bool) or not isinstance(connection.delay, int) or connection.delay < 0:
+        wiring.problems.append(f"{where}: delay counts communication points: 0, 1, 2, ..., not {connection.delay!r}")
+        return []
     if not sources or not targets:
         return []
     if len(sources) != len(targets):
@@ -230,7 +246,8 @@ def _end(reference: str, direction: str, interfaces: Mapping[str, Interface]) ->
 def is_direct(interface: Interface, output: Variable) -> bool:
     """Whether an output depends directly on an input of its FMU.
 
-    An FMU that lists no dependencies is taken to have none, except one of ours: ours say so unless they cannot be traced.
+    An FMU that lists no dependencies is taken to have none, except one of ours: ours list them unless they cannot be
+    traced.
     """
     if output.causality != "output":
         return False
@@ -284,6 +301,7 @@ def _check_inputs(system: System, interfaces: Mapping[str, Interface], wiring: W
                 f"{link.connection.source!r}"
             )
         fed[link.target] = link.connection
+    # Of an input that something is meant to feed, nothing more is said than what is wrong with its connection.
     broken = {c.target for c in system.connections} if wiring.problems else set()
     for instance, interface in interfaces.items():
         given = wiring.starts[instance]
@@ -291,7 +309,7 @@ def _check_inputs(system: System, interfaces: Mapping[str, Interface], wiring: W
             key = (instance, variable.name)
             if key in fed or variable.name in given or variable.name in interface.optional_inputs:
                 continue
-            if ".".join(key) in broken:
+            if not broken.isdisjoint((".".join(key), f"{instance}.{variable.name.rpartition('[')[0]}")):
                 continue
             if interface.vendor:
                 wiring.problems.append(

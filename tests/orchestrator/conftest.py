@@ -1,0 +1,180 @@
+"""What the tests of the orchestrator share: a cache of their own, components of a user's, FMUs of another maker's."""
+
+import hashlib
+import zipfile
+from pathlib import Path
+from xml.sax.saxutils import quoteattr
+
+import fmpy
+import pytest
+import pythonfmu
+from railcosim.orchestrator.archive import Workspace
+
+_WRAPPER = next(
+    (Path(pythonfmu.__file__).parent / "resources" / "binaries" / fmpy.platform).glob("*pythonfmu-export.*")
+)
+
+_HEAD = """from railcosim.components import Component, Data, Input, Memory, Noise, Output, Parameter, Size, State, maths
+
+
+class Base(Component):
+    pass
+
+
+"""
+
+_SLAVE = '''import math
+
+globals().setdefault("_references", []).append(globals())  # pythonfmu drops one it does not own
+
+
+class Fmi2Slave:
+    """Keeps values by reference, and writes down every call in a file if there is one."""
+
+    def __init__(self, **wrapper):
+        self.name, self.v, self.kept = wrapper["instance_name"], dict(START), []
+
+    def note(self, call):
+        if TRACE:
+            with open(TRACE, "a") as stream:
+                stream.write(f"{self.name} {call}\\n")
+
+    def _get_log_queue(self):
+        return self.kept
+
+    def setup_experiment(self, *_):
+        self.note("setup")
+
+    def enter_initialization_mode(self):
+        self.note("enter")
+
+    def exit_initialization_mode(self):
+        self.note("exit")
+
+    def terminate(self):
+        self.note("terminate")
+
+    def do_step(self, t, h):
+        self.note("step")
+        return self.step(t, h, self.v) is not False
+
+    def step(self, t, h, v):
+        pass
+
+    def refresh(self, v):
+        pass
+
+    def get(self, references):
+        self.note("get")
+        self.refresh(self.v)
+        return [self.v[k] for k in references]
+
+    def set(self, references, values):
+        self.note("set")
+        self.v.update(zip(references, values))
+
+    get_real = get_integer = get_boolean = get_string = get
+    set_real = set_integer = set_boolean = set_string = set
+
+
+class Slave(Fmi2Slave):
+'''
+
+
+@pytest.fixture(scope="session", autouse=True)
+def own_cache(tmp_path_factory):
+    """A cache of our own: no test may be served by what an earlier version left in the user's."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setenv("RAILCOSIM_CACHE", str(tmp_path_factory.mktemp("cache")))
+        yield
+
+
+@pytest.fixture
+def workspace():
+    with Workspace() as place:
+        yield place
+
+
+@pytest.fixture
+def components(tmp_path):
+    """Write a user's component file; gives a function from class name to reference."""
+
+    def write(body, name="mine.py"):
+        (tmp_path / name).write_text(_HEAD + body, encoding="utf-8")
+        return lambda cls: f"{tmp_path / name}:{cls}"
+
+    return write
+
+
+def variable(name, causality, kind="Real", start=None, dependencies=None, **attributes):
+    """A scalar variable of a hand-written model description, for `foreign`."""
+    return {"name": name, "causality": causality, "kind": kind, "start": start, "on": dependencies, **attributes}
+
+
+def description(variables, units="", *, identifier="Foreign", simulation="", version="2.0"):
+    """A model description as another tool might write it."""
+    lines = []
+    for reference, v in enumerate(variables):
+        own = {k: v[k] for k in ("variability", "initial") if k in v}
+        typed = {k: v[k] for k in ("unit", "min", "max", "declaredType") if k in v}
+        if v["start"] is not None and v["causality"] != "output":
+            typed["start"] = str(v["start"]).lower() if isinstance(v["start"], bool) else v["start"]
+        lines.append(
+            f'<ScalarVariable name="{v["name"]}" valueReference="{reference}" causality="{v["causality"]}"'
+            f"{''.join(f' {k}={quoteattr(str(x))}' for k, x in own.items())}>"
+            f"<{v['kind']}{''.join(f' {k}={quoteattr(str(x))}' for k, x in typed.items())}/></ScalarVariable>"
+        )
+    index = {v["name"]: k + 1 for k, v in enumerate(variables)}
+    shown = [v for v in variables if v["causality"] == "output"]
+    outputs = "".join(
+        f'<Unknown index="{index[v["name"]]}"'
+        + ("/>" if v["on"] is None else f' dependencies="{" ".join(str(index[n]) for n in v["on"])}"/>')
+        for v in shown
+    )
+    initial = "".join(f'<Unknown index="{index[v["name"]]}"/>' for v in shown)
+    structure = f"<Outputs>{outputs}</Outputs><InitialUnknowns>{initial}</InitialUnknowns>" if shown else ""
+    return (
+        f'<?xml version="1.0" encoding="UTF-8"?>\n<fmiModelDescription fmiVersion="{version}" modelName="{identifier}"'
+        f' guid="{{1}}" generationTool="PythonFMU by hand"><CoSimulation modelIdentifier="{identifier}" {simulation}/>'
+        f"{f'<UnitDefinitions>{units}</UnitDefinitions>' if units else ''}"
+        f"<ModelVariables>{''.join(lines)}</ModelVariables><ModelStructure>{structure}</ModelStructure>"
+        "</fmiModelDescription>"
+    )
+
+
+def write_archive(path, files):
+    """A zip of the given contents by entry name."""
+    with zipfile.ZipFile(path, "w") as archive:
+        for name, content in files.items():
+            archive.writestr(name, content)
+    return path
+
+
+@pytest.fixture
+def foreign(tmp_path):
+    """Make an FMU of another maker: no annotation of ours, and whatever is in the model description.
+
+    ``body`` gives the methods ``step(self, t, h, v)`` and ``refresh(self, v)`` on values by value reference.
+    """
+
+    def make(
+        variables, body="    pass\n", *, name="foreign.fmu", trace="", platform=fmpy.platform, library="Foreign", **of
+    ):
+        start = {k: v["start"] if v["start"] is not None else 0.0 for k, v in enumerate(variables)}
+        script = f"START, TRACE = {start!r}, {str(trace)!r}\n{_SLAVE}{body}"
+        module = f"foreign_{hashlib.sha256(script.encode()).hexdigest()[:16]}"
+        files = {
+            "modelDescription.xml": description(variables, **of),
+            "resources/slavemodule.txt": module,
+            f"resources/{module}.py": script,
+            f"binaries/{platform}/{library}{fmpy.sharedLibraryExtension}": _WRAPPER.read_bytes(),
+        }
+        return str(write_archive(tmp_path / name, files))
+
+    return make
+
+
+@pytest.fixture(scope="session")
+def xml():
+    """The writers of hand-made descriptions and archives, by name."""
+    return {"variable": variable, "description": description, "write_archive": write_archive}
