@@ -21,7 +21,8 @@ import platformdirs
 
 from ..components import CATALOGUE, Component, ComponentError, Simulation
 from . import native_fmu, python_fmu, toolchain
-from .description import Kind
+from .description import Kind, write
+from .identity import source_digest
 
 _EPOCH = (1980, 1, 1, 0, 0, 0)
 """The earliest time a zip can hold: archives of equal content are equal files."""
@@ -54,9 +55,7 @@ def resolve(reference: str, folder: Path | None = None) -> type[Component]:
     if not colon or not path.endswith(".py"):
         if reference in CATALOGUE:
             return CATALOGUE[reference]
-        raise ComponentError(
-            f"there is no component {_nearest(reference, CATALOGUE)}; a component of your own is written file.py:Class"
-        )
+        raise ComponentError(f"there is no component {_nearest(reference, CATALOGUE)}")
     module = _load_file((folder or Path()) / path)
     found = {k: v for k, v in vars(module).items() if isinstance(v, type) and issubclass(v, Component)}
     own = {k: v for k, v in found.items() if v.__module__ == module.__name__}
@@ -94,16 +93,13 @@ def build(
 
 def build_component(component: Component, kind: Kind = "python", platforms: Sequence[str] = ()) -> Path:
     """The same for a component at hand; its values become the FMU's start values."""
-    if kind == "native":
-        return _build_native(component, tuple(platforms) or (toolchain.here(),))
-    archive, digest = python_fmu.contents(component)
-    return _keep(digest, type(component).__name__, lambda: archive)
-
-
-def _build_native(component: Component, platforms: tuple[str, ...]) -> Path:
-    digest = native_fmu.digest(component)
-    identity = hashlib.sha256(f"{digest} {toolchain.identity(platforms)}".encode()).hexdigest()
-    return _keep(identity, type(component).__name__, lambda: native_fmu.contents(component, digest, platforms))
+    name, digest = type(component).__name__, source_digest(component, kind)
+    if kind == "python":
+        return _keep(digest, name, lambda: python_fmu.contents(component, digest))
+    chosen = toolchain.chosen(platforms)
+    identity = hashlib.sha256(f"{digest} {toolchain.identity(chosen)}".encode()).hexdigest()
+    zig = cache_folder().with_name("zig")
+    return _keep(identity, name, lambda: native_fmu.contents(component, digest, chosen, zig))
 
 
 def _keep(identity: str, name: str, make: Callable[[], Mapping[str, bytes]]) -> Path:
@@ -133,8 +129,8 @@ def native_problem(component: type[Component]) -> str:
 def plain(reference: str, arguments: Mapping[str, Any] | None = None, *, folder: Path | None = None) -> Plain:
     """A component to run in this process as Python objects, for a debugger."""
     cls = resolve(reference, folder)
-    archive, _ = python_fmu.contents(cls(**(arguments or {})))
-    return Plain(cls, dict(arguments or {}), archive["modelDescription.xml"])
+    component = cls(**(arguments or {}))
+    return Plain(cls, dict(arguments or {}), write(component, "python", source_digest(component, "python")))
 
 
 def cache_folder() -> Path:
@@ -221,4 +217,4 @@ def _nearest(name: str, known: Mapping[str, Any]) -> str:
     close = difflib.get_close_matches(name, known, 1)
     if close:
         return f"{name!r}; did you mean {close[0]!r}?"
-    return f"{name!r}; there is {', '.join(sorted(known)) or 'none'}"
+    return f"{name!r}; there is {', '.join(sorted(known)) or 'none'}; one of your own is written file.py:Class"

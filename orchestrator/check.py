@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from .archive import Workspace
 from .errors import ScenarioError, did_you_mean
@@ -13,7 +13,7 @@ from .loading import Kind, Model, load_models
 from .metrics import check_metrics, metric_indices
 from .order import Order, derive
 from .plots import check_figures
-from .published import check_published
+from .published import check_published, split_metric
 from .requirements import check_requirements
 from .system import ALGORITHMS, System
 from .wiring import Wiring, wire
@@ -24,10 +24,12 @@ class Checked:
     """A system found fit to run.
 
     Attributes:
+        system: as it will run: after a swap, without the tables that speak of what the new model does not have.
         models: by instance name. wiring: start values and scalar connections. order: how a sweep steps.
         notes: what a user should know though it is not an error.
     """
 
+    system: System
     models: Mapping[str, Model]
     wiring: Wiring
     order: Order
@@ -51,6 +53,7 @@ def check(system: System, workspace: Workspace, kind: Kind = "auto") -> Checked:
     problems += _check_once_per_process(interfaces)
     names = signal_names(interfaces, wiring)
     every_step = system.record is None or abs(system.record - system.step) < 1e-9 * system.step
+    system, left_out = _without_the_missing(system, names, every_step)
     problems += check_requirements(system.requirements, names, every_step)
     found = check_metrics(system.metrics, names, every_step)
     problems += found
@@ -60,7 +63,26 @@ def check(system: System, workspace: Workspace, kind: Kind = "auto") -> Checked:
     if problems:
         raise ScenarioError(problems)
     order = derive(list(system.instances), wiring.links, system.order)
-    return Checked(models, wiring, order, tuple(_notes(system, models, wiring, order)))
+    return Checked(system, models, wiring, order, (*left_out, *_notes(system, models, wiring, order)))
+
+
+def _without_the_missing(system: System, names: list[str], every_step: bool) -> tuple[System, list[str]]:
+    """After a swap, a system without the tables that speak of variables the new model does not have, and what they are.
+
+    A controller of one's own need not have every output that the scenario's own figures draw.
+    """
+    if not any(instance.swapped for instance in system.instances.values()):
+        return system, []
+    requirements = {k: v for k, v in system.requirements.items() if not check_requirements({k: v}, names, every_step)}
+    metrics = {k: v for k, v in system.metrics.items() if not check_metrics({k: v}, names, every_step)}
+    figures = [figure for figure in system.figures if not check_figures([figure], names, every_step)]
+    published = [entry for entry in system.published if split_metric(str(entry.get("metric")))[0] in metrics]
+    gone = [f"requirement {name!r}" for name in system.requirements if name not in requirements]
+    gone += [f"metric {name!r}" for name in system.metrics if name not in metrics]
+    gone += [f"figure {figure.get('title')!r}" for figure in system.figures if figure not in figures]
+    notes = [f"left out, because the swapped model lacks what they speak of: {', '.join(gone)}"] if gone else []
+    changes = {"requirements": requirements, "metrics": metrics, "figures": figures, "published": published}
+    return replace(system, **changes), notes
 
 
 def signal_names(interfaces: Mapping[str, Interface], wiring: Wiring) -> list[str]:

@@ -183,7 +183,7 @@ class FmuSlave:
 
     def channel(self, kind: Type, names: Sequence[str]) -> Channel:
         """Prepare variables of one type for being set or read together."""
-        return _FmuChannel(self, kind, [self.interface.variables[name].reference for name in names])
+        return FmuChannel(self, kind, [self.interface.variables[name].reference for name in names])
 
     def step(self, time: float, length: float) -> None:
         """Advance from ``time`` by ``length``, both in s."""
@@ -192,6 +192,16 @@ class FmuSlave:
         if status:
             self.check("fmi2DoStep", status)
         self.time = time + length
+
+    @property
+    def pointer(self) -> int:
+        """The instance, as the library knows it."""
+        return int(self._component)
+
+    @property
+    def step_addresses(self) -> tuple[int, int]:
+        """Where fmi2DoStep and the instance stand in memory, for the kernel."""
+        return address(self._do_step), self.pointer
 
     def terminate(self) -> None:
         """End the run."""
@@ -208,34 +218,48 @@ class FmuSlave:
         _LOGS.pop(id(self), None)
 
 
-class _FmuChannel:
+class FmuChannel:
+    """Some variables of one type of an FMU: value references and a buffer, prepared once.
+
+    ``calls`` names the functions that set and get; ``addresses`` gives (function, instance) for each, for the kernel.
+    """
+
     def __init__(self, slave: FmuSlave, kind: Type, references: Sequence[int]) -> None:
         count = len(references)
         suffix = _SUFFIX.get(kind, kind)
         signature = [ctypes.c_void_p, ctypes.c_void_p, ctypes.c_size_t, ctypes.c_void_p]
         self._slave = slave
         self._component = slave._component
-        self._names = f"fmi2Set{suffix}", f"fmi2Get{suffix}"
-        self._set = slave._function(self._names[0], signature)
-        self._get = slave._function(self._names[1], signature)
+        self.calls = f"fmi2Set{suffix}", f"fmi2Get{suffix}"
+        self._set = slave._function(self.calls[0], signature)
+        self._get = slave._function(self.calls[1], signature)
+        self.references = list(references)
+        self.addresses = [(address(function), slave.pointer) for function in (self._set, self._get)]
         self._references = (ctypes.c_uint * count)(*references)
         self._values = (_C_TYPES[kind] * count)()
         self._count = count
         self._text = kind == "String"
 
     def set(self, values: Sequence[Any]) -> None:
+        """Set all of them."""
         self._values[:] = [v.encode() for v in values] if self._text else values
         status = self._set(self._component, self._references, self._count, self._values)
         if status:
-            self._slave.check(self._names[0], status)
+            self._slave.check(self.calls[0], status)
 
     def get(self) -> list[Any]:
+        """Read all of them."""
         status = self._get(self._component, self._references, self._count, self._values)
         if status:
-            self._slave.check(self._names[1], status)
+            self._slave.check(self.calls[1], status)
         if self._text:
             return [(v or b"").decode(errors="replace") for v in self._values]
         return list(self._values)
+
+
+def address(function: Any) -> int:
+    """Where a function of a loaded library stands in memory."""
+    return ctypes.cast(function, ctypes.c_void_p).value or 0
 
 
 def library(folder: Path, interface: Interface, name: str) -> Path:

@@ -12,6 +12,10 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
+import numpy as np
+from numpy.typing import NDArray
+
+from .compiled import CompiledLoop, can_run
 from .errors import FmuError, ScenarioError
 from .fmu import Channel, Slave
 from .interface import Type
@@ -26,12 +30,13 @@ _AGREE = 1e-12
 _SOLVED = 1e-9
 """The same after Newton's method, which ends at a residual, not at a fixed point."""
 
-Observer = Callable[[int, float, Sequence[Any]], bool]
-"""Called with the step number, the time and all values after every step; returns False to stop the run."""
+Rows = Sequence[Sequence[Any]] | NDArray[np.float64]
+Observer = Callable[[int, Rows], bool]
+"""Called after one or more steps with how many were taken and the rows (time, values) that were due; False stops."""
 
 
 @dataclass(frozen=True)
-class _Feed:
+class Feed:
     """Inputs of one type of one instance: where each value comes from, and how it is changed on the way.
 
     ``sources`` are indices into the values; ``ages`` say how many recorded points back to look (None: the live value).
@@ -47,13 +52,18 @@ class _Feed:
 
 
 @dataclass(frozen=True)
-class _Yield:
+class Yield:
     """Outputs of one type of one instance, and where they stand among the values."""
 
     channel: Channel
+    kind: Type
     begin: int
     end: int
-    is_real: bool
+
+    @property
+    def is_real(self) -> bool:
+        """Whether the values are real numbers, which must be finite."""
+        return self.kind == "Real"
 
 
 class Master:
@@ -85,15 +95,17 @@ class Master:
         self._starts = starts
         self._links = links
         index: dict[tuple[str, str], int] = {}
-        self._yields = {name: self._plan_outputs(slave, index) for name, slave in slaves.items()}
+        self.yields = {name: self._plan_outputs(slave, index) for name, slave in slaves.items()}
         deepest = max((link.delay for link in links), default=0)
-        self._history: deque[list[Any]] | None = deque(maxlen=deepest + 1) if deepest else None
-        self._feeds = {name: self._plan_inputs(slave, index) for name, slave in slaves.items()}
-        self._sequence = [slaves[name] for name in sequence]
+        self.depth = deepest + 1 if deepest else 0
+        """How many recorded points delayed connections look back on, the present one included."""
+        self._history: deque[list[Any]] = deque(maxlen=self.depth)
+        self.feeds = {name: self._plan_inputs(slave, index) for name, slave in slaves.items()}
+        self.sequence = [slaves[name] for name in sequence]
 
     # ---------------------------------------------------------------- plan
 
-    def _plan_outputs(self, slave: Slave, index: dict[tuple[str, str], int]) -> list[_Yield]:
+    def _plan_outputs(self, slave: Slave, index: dict[tuple[str, str], int]) -> list[Yield]:
         wanted = {link.source[1] for link in self._links if link.source[0] == slave.name}
         shown = [v for v in slave.interface.variables.values() if v.causality == "output" or v.name in wanted]
         plan = []
@@ -103,18 +115,18 @@ class Master:
             for name in names:
                 index[slave.name, name] = len(self.signals)
                 self.signals.append(f"{slave.name}.{name}")
-            plan.append(_Yield(slave.channel(kind, names), begin, len(self.signals), kind == "Real"))
+            plan.append(Yield(slave.channel(kind, names), kind, begin, len(self.signals)))
         self.values.extend([0.0] * (len(self.signals) - len(self.values)))
         return plan
 
-    def _plan_inputs(self, slave: Slave, index: dict[tuple[str, str], int]) -> list[_Feed]:
+    def _plan_inputs(self, slave: Slave, index: dict[tuple[str, str], int]) -> list[Feed]:
         mine = [link for link in self._links if link.target[0] == slave.name]
         variables = slave.interface.variables
         plan = []
         for kind in _types(variables[link.target[1]].type for link in mine):
             links = [link for link in mine if variables[link.target[1]].type == kind]
             plan.append(
-                _Feed(
+                Feed(
                     channel=slave.channel(kind, [link.target[1] for link in links]),
                     sources=tuple(index[link.source] for link in links),
                     plain=all((x.scale, x.offset, x.delay) == (1.0, 0.0, 0) for x in links),
@@ -182,25 +194,37 @@ class Master:
         solve_loops(self, begin, before)
 
     def _sweep(self) -> None:
-        for slave in self._sequence:
-            if self._feeds[slave.name]:
+        for slave in self.sequence:
+            if self.feeds[slave.name]:
                 self._write(slave.name)
                 self._read(slave)
 
     # ---------------------------------------------------------------- stepping
 
-    def run(self, start_time: float, step: float, count: int, observe: Observer) -> bool:
+    def run(self, start_time: float, step: float, count: int, every: int, observe: Observer) -> bool:
         """Take ``count`` communication steps; True unless the observer stopped the run.
+
+        The compiled kernel takes them where it can, with identical results.
+
+        Args:
+            start_time: in s.
+            step: in s.
+            count: number of steps.
+            every: a row is due after every so many steps, and after the last.
+            observe: given the rows.
 
         Raises:
             FmuError: a model failed, or a value is not finite; instance, variable and time are named.
         """
+        if can_run(self):
+            return CompiledLoop(self).run(start_time, step, count, every, observe)
         advance = self._gauss_seidel if self.algorithm == "gauss-seidel" else self._jacobi
         for k in range(count):
             advance(start_time + k * step, step)
             self._remember()
             self.steps = k + 1
-            if not observe(k + 1, start_time + (k + 1) * step, self.values):
+            due = self.steps % every == 0 or self.steps == count
+            if not observe(self.steps, [[start_time + self.steps * step, *self.values]] if due else ()):
                 return False
         return True
 
@@ -210,7 +234,7 @@ class Master:
             slave.terminate()
 
     def _gauss_seidel(self, time: float, step: float) -> None:
-        for slave in self._sequence:
+        for slave in self.sequence:
             self._write(slave.name)
             slave.step(time, step)
             self._read_finite(slave)
@@ -225,13 +249,13 @@ class Master:
 
     def _write(self, name: str) -> None:
         values = self.values
-        for feed in self._feeds[name]:
+        for feed in self.feeds[name]:
             if feed.plain:
                 feed.channel.set([values[k] for k in feed.sources])
             else:
                 feed.channel.set(self._changed(feed))
 
-    def _changed(self, feed: _Feed) -> list[Any]:
+    def _changed(self, feed: Feed) -> list[Any]:
         """Input values with delay, scale and offset applied."""
         result = []
         for k, scale, offset, age in zip(feed.sources, feed.scales, feed.offsets, feed.ages, strict=True):
@@ -245,27 +269,34 @@ class Master:
         return self._history[max(0, len(self._history) - 1 - age)][k]
 
     def _remember(self) -> None:
-        if self._history is not None:
+        if self.depth:
             self._history.append(list(self.values))
 
     def _read(self, slave: Slave) -> None:
-        for part in self._yields[slave.name]:
+        for part in self.yields[slave.name]:
             self.values[part.begin : part.end] = part.channel.get()
 
     def _read_finite(self, slave: Slave) -> None:
         """Read, and stop before anyone else is given what is not finite, so that the blame falls on its source."""
-        for part in self._yields[slave.name]:
+        for part in self.yields[slave.name]:
             found = part.channel.get()
             self.values[part.begin : part.end] = found
             # One sum instead of one test per value: it is finite unless a value is not (or all are astronomic).
             if part.is_real and not math.isfinite(sum(found)):
-                self._name_culprit(slave, part)
+                self.check_finite(slave)
 
-    def _name_culprit(self, slave: Slave, part: _Yield) -> None:
-        for k in range(part.begin, part.end):
-            if not math.isfinite(self.values[k]):
-                variable = self.signals[k].removeprefix(f"{slave.name}.")
-                raise FmuError(f"output {variable!r} is {self.values[k]!r}", instance=slave.name, time=slave.time)
+    def check_finite(self, slave: Slave) -> None:
+        """Raise if a real output of an instance is not finite, naming it."""
+        for part in self.yields[slave.name]:
+            for k in range(part.begin, part.end):
+                if part.is_real and not math.isfinite(self.values[k]):
+                    variable = self.signals[k].removeprefix(f"{slave.name}.")
+                    raise FmuError(f"output {variable!r} is {self.values[k]!r}", instance=slave.name, time=slave.time)
+
+    @property
+    def kinds(self) -> list[Type]:
+        """The type of each of the values."""
+        return [part.kind for parts in self.yields.values() for part in parts for _ in range(part.begin, part.end)]
 
 
 def _types(kinds: Any) -> tuple[Type, ...]:

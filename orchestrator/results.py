@@ -105,36 +105,55 @@ class Recorder:
 
     Numbers are written in the shortest form that reads back to the same bits. The file is flushed about every second,
     so that a run that is killed leaves all but its last second.
+
+    Args:
+        names: of the signals.
+        kinds: their FMI types; whole numbers are written as such, texts quoted where needed.
+        directory: where to write; None keeps everything in memory.
     """
 
-    def __init__(self, names: Sequence[str], directory: Path | None) -> None:
+    def __init__(self, names: Sequence[str], kinds: Sequence[str], directory: Path | None) -> None:
         self.names = list(names)
-        self._rows: list[list[Any]] = []
-        self._file = None
+        self._whole = [k + 1 for k, kind in enumerate(kinds) if kind not in ("Real", "String")]
+        self._texts = [k + 1 for k, kind in enumerate(kinds) if kind == "String"]
+        self._dtype: Any = object if self._texts else np.float64
+        self._blocks: list[NDArray[Any]] = []
+        self._rows: list[Sequence[Any]] = []
         self._written = 0
+        self._file = None
         self._flushed = clock.monotonic()
         if directory is not None:
             self._file = (directory / "results.csv").open("w", newline="", encoding="utf-8")
             csv.writer(self._file, lineterminator="\n").writerow(["time", *self.names])
             self._file.flush()
 
-    def record(self, time: float, values: Sequence[Any]) -> None:
-        """Append one point."""
-        self._rows.append([time, *values])
+    def extend(self, rows: Sequence[Sequence[Any]] | NDArray[np.float64]) -> None:
+        """Append rows of time and values."""
+        if isinstance(rows, np.ndarray):
+            self._seal()
+            self._blocks.append(rows)
+        else:
+            self._rows.extend(rows)
         if self._file is not None and clock.monotonic() - self._flushed > _FLUSH_SECONDS:
             self.flush()
 
     def flush(self) -> None:
         """Bring everything recorded so far to the disk."""
+        self._seal()
         if self._file is None:
             return
-        pending = self._rows[self._written :]
-        if any(isinstance(value, str) for row in pending[:1] for value in row):
-            csv.writer(self._file, lineterminator="\n").writerows([_texts(row) for row in pending])
-        else:
-            self._file.writelines(",".join(map(repr, row)) + "\n" for row in pending)
+        writer = csv.writer(self._file, lineterminator="\n")
+        for block in self._blocks[self._written :]:
+            rows = block.tolist()
+            for row in rows:
+                for k in self._whole:
+                    row[k] = int(row[k])
+            if self._texts:
+                writer.writerows([[x if isinstance(x, str) else repr(x) for x in row] for row in rows])
+            else:
+                self._file.writelines(",".join(map(repr, row)) + "\n" for row in rows)
         self._file.flush()
-        self._written = len(self._rows)
+        self._written = len(self._blocks)
         self._flushed = clock.monotonic()
 
     def close(self) -> None:
@@ -146,13 +165,16 @@ class Recorder:
 
     def columns(self) -> tuple[NDArray[np.float64], dict[str, NDArray[Any]]]:
         """Time and all signals as arrays; text columns as objects."""
-        by_column = list(zip(*self._rows, strict=True)) or [()] * (len(self.names) + 1)
-        columns = {}
-        for name, cells in zip(self.names, by_column[1:], strict=True):
-            is_text = bool(cells) and isinstance(cells[0], str)
-            columns[name] = np.array(cells, dtype=object if is_text else np.float64)
-        return np.array(by_column[0], dtype=np.float64), columns
+        self._seal()
+        table = np.concatenate(self._blocks) if self._blocks else np.empty((0, len(self.names) + 1), self._dtype)
+        columns = {
+            name: table[:, k] if k in self._texts else table[:, k].astype(np.float64)
+            for k, name in enumerate(self.names, 1)
+        }
+        return table[:, 0].astype(np.float64), columns
 
-
-def _texts(row: Sequence[Any]) -> list[str]:
-    return [value if isinstance(value, str) else repr(value) for value in row]
+    def _seal(self) -> None:
+        """Make one block of the single rows."""
+        if self._rows:
+            self._blocks.append(np.array(self._rows, dtype=self._dtype))
+            self._rows = []

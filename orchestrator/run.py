@@ -20,13 +20,13 @@ from .check import Checked, check
 from .errors import FmuError, RailcosimError
 from .fmu import Slave, forget_paths
 from .loading import Kind
-from .master import Master
+from .master import Master, Observer, Rows
 from .metrics import Metric, evaluate_metrics
 from .plots import draw
 from .published import PublishedRow, judge
 from .requirements import Verdict, judge_requirements
 from .results import Recorder, Results
-from .system import Algorithm, System
+from .system import Algorithm, Instance, System
 
 Status = Literal["completed", "interrupted", "failed"]
 Progress = Callable[[float, float], None]
@@ -125,6 +125,7 @@ def execute(
     with Workspace() as workspace:
         try:
             checked = check(system, workspace, kind)
+            system = checked.system
             if directory is not None:
                 _open_directory(directory, system, checked, kind)
             outcome = _simulate(system, checked, directory, progress, begin)
@@ -162,11 +163,19 @@ def _override(system: System, stop_time: float | None, step: float | None, algor
         changes["stop_time"] = stop_time
     if step is not None and step != system.step:
         changes.update(step=step, rescaled_from=system.rescaled_from or system.step)
+        changes["instances"] = {name: _rescaled(x, system.step, step) for name, x in system.instances.items()}
         if system.record is not None and system.record < step:
             changes["record"] = None
     if algorithm is not None and algorithm != system.algorithm:
         changes["algorithm"] = algorithm
     return replace(system, **changes, modified=True) if changes else system
+
+
+def _rescaled(instance: Instance, before: float, step: float) -> Instance:
+    """A sample time that was given as the old step follows the new one."""
+    if instance.start.get("sample_time") != before:
+        return instance
+    return replace(instance, start={**instance.start, "sample_time": step})
 
 
 def _open_directory(directory: Path, system: System, checked: Checked, kind: Kind) -> None:
@@ -179,60 +188,67 @@ def _open_directory(directory: Path, system: System, checked: Checked, kind: Kin
 
 def _simulate(system: System, checked: Checked, directory: Path | None, progress: Progress | None, begin: float) -> Run:
     slaves: dict[str, Slave] = {}
+    outcome = Run(system, _results(system, checked, None, "failed"), "failed", checked)
+    outcome.seconds = {"setup": 0.0, "stepping": 0.0, "steps": 0}
     recorder: Recorder | None = None
-    status: Status = "completed"
-    failure: FmuError | None = None
-    seconds: dict[str, float] = {"setup": 0.0, "stepping": 0.0, "steps": 0}
+    with _interruptible() as stopped:
+        try:
+            for name, model in checked.models.items():
+                slaves[name] = model.instantiate(name)
+            wiring = checked.wiring
+            master = Master(slaves, checked.order.sequence, wiring.links, wiring.starts, system.algorithm)
+            master.initialize(system.start_time, system.stop_time)
+            recorder = Recorder(master.signals, master.kinds, directory)
+            recorder.extend([[system.start_time, *master.values]])
+            outcome.seconds["setup"] = clock.perf_counter() - begin
+            observe = _observer(system, master, recorder, progress, stopped)
+            outcome.status = "completed" if _step(system, master, observe, outcome.seconds) else "interrupted"
+            master.terminate()
+        except FmuError as error:
+            outcome.status, outcome.error = "failed", error
+        except KeyboardInterrupt:  # a second Ctrl-C
+            outcome.status = "interrupted"
+        except BaseException as error:  # initial values that do not settle
+            if directory is not None:
+                record_file.abandon(directory, error)
+            raise
+        finally:
+            if recorder is not None:
+                recorder.close()
+            for slave in slaves.values():
+                slave.free()
+    outcome.results = _results(system, checked, recorder, outcome.status)
+    return outcome
+
+
+def _step(system: System, master: Master, observe: Observer, seconds: dict[str, float]) -> bool:
+    """The communication steps, with their wall time noted however they end."""
+    count = round((system.stop_time - system.start_time) / system.step)
+    every = 1 if system.record is None else round(system.record / system.step)
+    begin = clock.perf_counter()
     try:
-        for name, model in checked.models.items():
-            slaves[name] = model.instantiate(name)
-        master = Master(slaves, checked.order.sequence, checked.wiring.links, checked.wiring.starts, system.algorithm)
-        master.initialize(system.start_time, system.stop_time)
-        recorder = Recorder(master.signals, directory)
-        recorder.record(system.start_time, master.values)
-        seconds["setup"] = clock.perf_counter() - begin
-        stepping = clock.perf_counter()
-        with _interruptible() as stopped:
-            observe = _observer(system, recorder, progress, stopped)
-            count = round((system.stop_time - system.start_time) / system.step)
-            try:
-                status = "completed" if master.run(system.start_time, system.step, count, observe) else "interrupted"
-            finally:
-                seconds.update(stepping=clock.perf_counter() - stepping, steps=master.steps)
-        master.terminate()
-    except FmuError as error:
-        status, failure = "failed", error
-    except KeyboardInterrupt:  # a second Ctrl-C, or one before the first step
-        status = "interrupted"
-    except BaseException as error:  # initial values that do not settle
-        if directory is not None:
-            record_file.abandon(directory, error)
-        raise
+        return master.run(system.start_time, system.step, count, every, observe)
     finally:
-        if recorder is not None:
-            recorder.close()
-        for slave in slaves.values():
-            slave.free()
-    return Run(system, _results(system, checked, recorder, status), status, checked, error=failure, seconds=seconds)
+        seconds.update(stepping=clock.perf_counter() - begin, steps=master.steps)
 
 
 def _observer(
-    system: System, recorder: Recorder, progress: Progress | None, stopped: threading.Event
-) -> Callable[[int, float, Any], bool]:
-    every = 1 if system.record is None else round(system.record / system.step)
+    system: System, master: Master, recorder: Recorder, progress: Progress | None, stopped: threading.Event
+) -> Observer:
     last = round((system.stop_time - system.start_time) / system.step)
     percent = max(1, last // 100)
-    shown = clock.monotonic()
+    shown, next_percent = clock.monotonic(), percent
 
-    def observe(k: int, time: float, values: Any) -> bool:
-        nonlocal shown
-        go_on = not stopped.is_set()
-        if k % every == 0 or k == last or not go_on:
-            recorder.record(time, values)
-        if progress is not None and (k % percent == 0 or clock.monotonic() - shown > 0.1 or k == last):
-            shown = clock.monotonic()
+    def observe(k: int, rows: Rows) -> bool:
+        nonlocal shown, next_percent
+        recorder.extend(rows)
+        time = system.start_time + k * system.step
+        if stopped.is_set() and k < last and not (len(rows) and rows[-1][0] == time):
+            recorder.extend([[time, *master.values]])  # the point at which the run was stopped
+        if progress is not None and (k >= next_percent or clock.monotonic() - shown > 0.1 or k == last):
+            shown, next_percent = clock.monotonic(), k - k % percent + percent
             progress(time, system.stop_time)
-        return go_on
+        return not stopped.is_set()
 
     return observe
 

@@ -80,19 +80,17 @@ def _starts(system: System, instance: Instance, interface: Interface, wiring: Wi
     dropped = []
     for name, given in instance.start.items():
         scalars = interface.scalars(name)
+        where = f"{_place(system.origins.get(f'{instance.name}.{name}', instance.origin))}{instance.name}.{name}"
         if scalars is None and instance.swapped:
             dropped.append(name)
         elif scalars is None:
             valid = [v.name for v in interface.variables.values() if v.settable] + list(interface.arrays)
-            wiring.problems.append(
-                f"{_place(instance.origin)}{instance.name}.{name}: {interface.model} has no such variable"
-                f"{did_you_mean(name, valid)}"
-            )
+            wiring.problems.append(f"{where}: {interface.model} has no such variable{did_you_mean(name, valid)}")
         else:
             try:
                 values.update(_elements(instance, interface, name, scalars, given))
             except (ValueError, ExpressionError) as error:
-                wiring.problems.append(f"{_place(instance.origin)}{instance.name}.{name}: {error}")
+                wiring.problems.append(f"{where}: {error}")
     if dropped:
         wiring.notes.append(f"{instance.name}: {interface.model} has no {', '.join(dropped)}; dropped with the swap")
     _set_runtime(system, instance, interface, values)
@@ -168,9 +166,9 @@ def _set_runtime(system: System, instance: Instance, interface: Interface, value
         return
     if "seed" in interface.variables and "seed" not in values:
         values["seed"] = instance_seed(system.seed, instance.name)
-    if "sample_time" in interface.variables and system.rescaled_from is not None:
-        present = values.get("sample_time", interface.variables["sample_time"].start)
-        if present == system.rescaled_from:
+    if "sample_time" in interface.variables and "sample_time" not in values and system.rescaled_from is not None:
+        # A value that was given has been rescaled where the step was changed; this is the FMU's own.
+        if interface.variables["sample_time"].start == system.rescaled_from:
             values["sample_time"] = system.step
 
 

@@ -57,8 +57,8 @@ def run_python(*arguments, **environment):
     ("name", "complaint"),
     [
         ("ComfortCruse", "there is no component 'ComfortCruse'; did you mean 'ComfortCruise'?"),
-        ("Zeppelin", "there is no component 'Zeppelin'; there is ComfortCruise, Gust"),
-        ("Zeppelin", "a component of your own is written file.py:Class"),
+        ("Zeppelin", "there is no component 'Zeppelin'; there is "),
+        ("Zeppelin", "one of your own is written file.py:Class"),
         ("nowhere.py:C", "nowhere.py"),
     ],
 )
