@@ -77,6 +77,8 @@ class Component:
 
     source: ClassVar[str] = ""
     """Where the equations come from: author, year, equation numbers."""
+    equations: ClassVar[tuple[str, ...]] = ()
+    """What the methods compute, line by line: text, with formulas in LaTeX between dollar signs."""
     note: ClassVar[str] = ""
     """What a user must know wherever the component is shown (for example that it is reconstructed)."""
     requires: ClassVar[tuple[str, ...]] = ()

@@ -184,7 +184,7 @@ class TapeDeck:
         text = "\n".join([self._header(), *rows, "end", ""])
         part = path.with_name(path.name + ".part")
         try:
-            part.write_text(text, encoding="utf-8")
+            part.write_text(text, encoding="utf-8", newline="\n")
             os.replace(part, path)
         except OSError as error:
             raise ComponentError(f"{self.owner}.tape_file: {path} cannot be written: {error}") from error
@@ -207,15 +207,28 @@ def smooth(rows: Rows, cutoff: float, sample_time: float) -> Rows:
         cutoff: corner frequency in Hz; 0 returns a copy.
         sample_time: distance of the samples in s.
     """
-    if cutoff <= 0.0:
+    if cutoff <= 0.0 or len(rows) < 2:
         return rows.copy()
     gain = 1.0 - math.exp(-2.0 * math.pi * cutoff * sample_time)
     # Ten time constants of run-in leave less than 5e-5 of the start value in the result.
     pad = math.ceil(10.0 / gain)
-    padded = np.pad(rows, ((pad, pad), (0, 0)), mode="reflect", reflect_type="odd")
+    padded = _continued(rows, pad)
     for direction in (1, -1):
         padded = _low_pass(padded[::direction], gain)[::direction]
     return np.array(padded[pad : pad + len(rows)])
+
+
+def _continued(rows: Rows, pad: int) -> Rows:
+    """Rows with ``pad`` more on either side, by odd reflection at the ends as often as it takes.
+
+    Written out because NumPy's own has changed for pads longer than the rows, and fmus/runtime/tape.c does the same.
+    """
+    period = len(rows) - 1
+    turn, place = np.divmod(np.arange(-pad, len(rows) + pad), period)
+    rise = rows[-1] - rows[0]
+    straight = rows[place] + turn[:, None] * rise
+    mirrored = (2.0 * rows[-1] - rows[period - place]) + (turn[:, None] - 1) * rise
+    return np.where(turn[:, None] % 2 == 0, straight, mirrored)
 
 
 def _low_pass(rows: Rows, gain: float) -> Rows:

@@ -19,6 +19,8 @@ from .variables import ScalarVariable, scalar_variables
 
 Kind = Literal["python", "native"]
 TOOL = "railcosim"
+SOURCE = "all.c"
+"""The source file of a native FMU that includes the others. Named after the model it could hide one of them."""
 _ELEMENT = {float: "Real", int: "Integer", bool: "Boolean", str: "String"}
 NOTE_OF_KIND: dict[Kind, str] = {
     "python": "runs in the importing process's Python: needs Python 3.11+ and NumPy there",
@@ -107,14 +109,13 @@ def write(component: Component, kind: Kind, digest: str) -> bytes:
     if kind == "native":
         capabilities.set("providesDirectionalDerivative", "true")
         files = etree.SubElement(capabilities, "SourceFiles")
-        etree.SubElement(files, "File", name=f"{cls.__name__}.c")
+        etree.SubElement(files, "File", name=SOURCE)
     _write_units(root, {v.slot.unit for v in variables if v.slot.type is float} | {rate.unit for rate in rates})
     if kind == "native":
         categories = etree.SubElement(root, "LogCategories")
         for name, description in _LOG_CATEGORIES.items():
             etree.SubElement(categories, "Category", name=name, description=description)
-    step = cls.recommended_step or component.__dict__.get("sample_time") or component.__dict__.get("max_step") or 0.1
-    etree.SubElement(root, "DefaultExperiment", startTime="0", stepSize=_number(step))
+    etree.SubElement(root, "DefaultExperiment", startTime="0", stepSize=_number(default_step(component)))
     annotations = etree.SubElement(root, "VendorAnnotations")
     tool = etree.SubElement(annotations, "Tool", name=TOOL)
     etree.SubElement(tool, "component", **_annotation(component, kind, digest))
@@ -126,6 +127,12 @@ def write(component: Component, kind: Kind, digest: str) -> bytes:
     _write_structure(root, variables, rates, traced)
     text: bytes = etree.tostring(root, xml_declaration=True, encoding="UTF-8", pretty_print=True)
     return text
+
+
+def default_step(component: Component) -> float:
+    """The communication step in s for whoever has no other wish."""
+    values = component.__dict__
+    return float(type(component).recommended_step or values.get("sample_time") or values.get("max_step") or 0.1)
 
 
 def summary(cls: type[Component]) -> str:

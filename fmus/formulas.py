@@ -1,54 +1,88 @@
 r"""Formulas as inline SVG, so that a page shows them in any browser, offline and without scripts.
 
 matplotlib's mathtext lays them out: the part of LaTeX that it knows (no environments such as ``cases``). Letters become
-outlines: no font has to be there where the page is read, and the same formula gives the same bytes.
+outlines, each kept once per page: no font has to be there where the page is read, and the same formula gives the same
+bytes.
 """
 
 from __future__ import annotations
 
 import html
+from collections.abc import Iterable
+from typing import Any
 
 from ..components.component import ComponentError
 
-_SIZE = 11.0
+_SIZE = 15.0
 """Font size in px."""
-_PIECES = {0: "Z", 1: "M", 2: "L", 3: "Q", 4: "C", 79: "Z"}
+_PIECES = {1: "M", 2: "L", 3: "Q", 4: "C", 79: "Z"}
 """matplotlib's codes of a path's pieces, in SVG's letters."""
 
 
-def rendered(line: str) -> str:
-    """A line of text with formulas between dollar signs as HTML.
+class Formulas:
+    """The formulas of one page."""
 
-    Raises:
-        ComponentError: a formula that cannot be read.
-    """
-    parts = line.split("$")
-    if len(parts) % 2 == 0:
-        raise ComponentError(f"the equation {line!r} opens a formula with $ and does not close it")
-    return "".join(_svg(part) if k % 2 else html.escape(part) for k, part in enumerate(parts))
+    def __init__(self) -> None:
+        self._outlines: dict[str, str] = {}
+
+    def line(self, text: str) -> str:
+        """A line of text with formulas between dollar signs, as HTML.
+
+        Raises:
+            ComponentError: a formula that cannot be read.
+        """
+        parts = text.split("$")
+        if len(parts) % 2 == 0:
+            raise ComponentError(f"the equation {text!r} opens a formula with $ and does not close it")
+        return "".join(self._svg(part) if k % 2 else html.escape(part) for k, part in enumerate(parts))
+
+    def outlines(self) -> str:
+        """The letters that the lines so far refer to; it stands anywhere on their page."""
+        if not self._outlines:
+            return ""
+        letters = "".join(f'<path id="letter{k}" d="{d}"/>' for k, d in enumerate(self._outlines.values()))
+        return f'<svg width="0" height="0" style="position:absolute" aria-hidden="true"><defs>{letters}</defs></svg>'
+
+    def _svg(self, latex: str) -> str:
+        from matplotlib.font_manager import FontProperties  # noqa: PLC0415 (slow; a cache hit does not need it)
+        from matplotlib.textpath import TextToPath  # noqa: PLC0415
+
+        font, text = FontProperties(math_fontfamily="cm"), TextToPath()
+        try:
+            letters, outlines, bars = text.get_glyphs_mathtext(font, f"${latex}$")
+            extent = text.get_text_width_height_descent(f"${latex}$", font, ismath=True)
+        except ValueError as error:
+            reason = str(error).strip().splitlines()[-1]
+            raise ComponentError(f"the formula {latex!r} cannot be read: {reason}") from None
+        places = list(self._outlines)
+        drawn = []
+        for name, x, y, size in letters:
+            if name not in self._outlines:
+                self._outlines[name] = _path(*outlines[name])
+                places.append(name)
+            place = f"translate({_number(x)} {_number(-y)})" + (f"scale({_number(size)})" if size != 1.0 else "")
+            drawn.append(f'<use href="#letter{places.index(name)}" transform="{place}"/>')
+        drawn += (f'<path d="{_path(*bar)}"/>' for bar in bars)
+        # The layout is in units of which a font has FONT_SCALE to its size, the extent in points of the font's size.
+        width, height, depth = (float(x) / font.get_size_in_points() * _SIZE for x in extent)
+        unit = text.FONT_SCALE / _SIZE
+        box = " ".join(_number(x * unit) for x in (0.0, depth - height, width, height))
+        return (
+            f'<svg role="img" aria-label="{html.escape(latex)}" viewBox="{box}" width="{_number(width)}" '
+            f'height="{_number(height)}" style="vertical-align:{_number(-depth)}px" fill="currentColor">'
+            f"{''.join(drawn)}</svg>"
+        )
 
 
-def _svg(latex: str) -> str:
-    from matplotlib.font_manager import FontProperties  # noqa: PLC0415 (slow to import, and not needed on a cache hit)
-    from matplotlib.textpath import TextPath, TextToPath  # noqa: PLC0415
+def _path(points: Any, codes: Iterable[int]) -> str:
+    from matplotlib.path import Path  # noqa: PLC0415
 
-    font = FontProperties(size=_SIZE, math_fontfamily="cm")
-    try:
-        path = TextPath((0, 0), f"${latex}$", prop=font)
-        width, height, depth = TextToPath().get_text_width_height_descent(f"${latex}$", font, ismath=True)
-    except ValueError as error:
-        raise ComponentError(f"the formula {latex!r} cannot be read: {str(error).strip().splitlines()[-1]}") from None
-    drawn = "".join(_PIECES[int(code)] + _points(points) for points, code in path.iter_segments(simplify=False))
-    # 1.35: Computer Modern is drawn small beside a browser's sans serif of the same size.
-    scale = 1.35
-    box = f"0 {-(height - depth):.1f} {width:.1f} {height:.1f}"
-    return (
-        f'<svg role="img" aria-label="{html.escape(latex)}" viewBox="{box}" width="{width * scale:.1f}" '
-        f'height="{height * scale:.1f}" style="vertical-align:{-depth * scale:.1f}px">'
-        f'<path fill="currentColor" d="{drawn}"/></svg>'
-    )
+    pieces = []
+    for flat, code in Path(points, codes).iter_segments(simplify=False):
+        numbers = (f"{round(-v if k % 2 else v)}" for k, v in enumerate(flat.tolist()))
+        pieces.append(_PIECES[int(code)] + ("" if int(code) == 79 else " ".join(numbers)))
+    return "".join(pieces)
 
 
-def _points(flat: object) -> str:
-    numbers = [float(x) for x in flat]  # type: ignore[attr-defined]
-    return " ".join(f"{-y if k % 2 else y:.2f}".rstrip("0").rstrip(".") or "0" for k, y in enumerate(numbers))
+def _number(value: float) -> str:
+    return f"{round(value, 2):g}"

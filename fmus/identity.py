@@ -11,7 +11,7 @@ from pathlib import Path
 
 import numpy as np
 
-from ..components.component import Component
+from ..components.component import Component, ComponentError
 from .description import TOOL, Kind, arguments
 from .embed import embedded_files
 
@@ -21,7 +21,11 @@ _MADE_BY = ("*.py", "resources/*.png", "resources/*.txt", "runtime/*.[ch]")
 
 
 def source_digest(component: Component, kind: Kind) -> str:
-    """Hash of what an FMU is made from, without making it: sources, values, and everything that packages them."""
+    """Hash of what an FMU is made from, without making it: sources, values, and everything that packages them.
+
+    Raises:
+        ComponentError: the component cannot be embedded, or a package that makes this kind of FMU is not installed.
+    """
     files, module = embedded_files(type(component))
     parts = {name: text.encode() for name, text in files.items()}
     parts["/"] = f"{kind} {module} {type(component).__qualname__} {given_values(component)}".encode()
@@ -34,7 +38,13 @@ def _packaging(kind: Kind) -> bytes:
     """The part that is the same for every component: this package, and the versions of those it calls."""
     files = sorted(path for pattern in _MADE_BY for path in _FOLDER.glob(pattern))
     parts = {path.relative_to(_FOLDER).as_posix(): path.read_bytes() for path in files}
-    parts |= {f"/{name}": importlib.metadata.version(name).encode() for name in _MAKERS[kind]}
+    for name in _MAKERS[kind]:
+        try:
+            parts[f"/{name}"] = importlib.metadata.version(name).encode()
+        except importlib.metadata.PackageNotFoundError:
+            raise ComponentError(
+                f"a {kind} FMU needs {name}, which is not installed: pip install 'railcosim[{kind}]'"
+            ) from None
     return digest_of(parts).encode()
 
 

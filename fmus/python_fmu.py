@@ -12,15 +12,19 @@ import pythonfmu
 
 from ..components.component import Component
 from .description import write
-from .documentation import page
+from .documentation import files as documentation
 from .embed import embedded_files
 from .identity import digest_of, given_values
 
 _WRAPPERS = Path(pythonfmu.__file__).parent / "resources" / "binaries"
 
 
-def contents(component: Component) -> tuple[dict[str, bytes], str]:
-    """All files of the FMU by path, and the digest of what it is made of.
+def contents(component: Component, digest: str) -> dict[str, bytes]:
+    """All files of the FMU by path.
+
+    Args:
+        component: built; its values are the start values.
+        digest: hash of what the FMU is made from; it becomes the GUID.
 
     Raises:
         ComponentError: the component cannot be embedded.
@@ -35,12 +39,10 @@ def contents(component: Component) -> tuple[dict[str, bytes], str]:
     archive = {f"resources/{package}/{name}": text.encode() for name, text in files.items()}
     archive[f"resources/{slave}.py"] = _slave_module(package, module, cls.__qualname__, arguments).encode()
     archive["resources/slavemodule.txt"] = slave.encode()
-    archive["documentation/index.html"] = page(component, "python").encode()
     for library in sorted(_WRAPPERS.glob("*/*pythonfmu-export.*")):
         archive[f"binaries/{library.parent.name}/{cls.__name__}{library.suffix}"] = library.read_bytes()
-    digest = digest_of({**archive, "modelDescription.xml": write(component, "python", "")})
     archive["modelDescription.xml"] = write(component, "python", digest)
-    return archive, digest
+    return archive | documentation(component, "python")
 
 
 def _slave_module(package: str, module: str, name: str, arguments: str) -> str:

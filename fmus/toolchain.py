@@ -1,13 +1,14 @@
 """Compiling a native FMU: the system's C compiler for this machine, ziglang for every other platform.
 
-Flags are chosen so that the bits do not depend on the machine: a baseline processor, and no fused multiply-add. Nothing
-of the machine gets into a library either: names are relative, and neither times nor debug information are kept.
+Flags are chosen so that the bits do not depend on the machine: a baseline processor, no fused multiply-add, and no power
+turned into a product, which would round differently from the C library's, and with it from Python's. Nothing of the
+machine gets into a library either: names are relative, and neither times nor debug information are kept.
 
-Folders below ``binaries/``: FMI 2.0 knows ``linux64``, ``win64`` and ``darwin64`` and means 64-bit x86 by them; for other
-machines FMI 2.0.5 refers to the platform tuples of FMI 3.0, hence ``aarch64-linux``. Importers differ: on an Arm Mac they
-look into ``darwin64``, which therefore holds a universal library; on Arm Linux FMPy 0.3 and OpenModelica look into
-``linux64``, where an FMU for both machines has the x86 library. An FMU built for Arm Linux alone therefore carries its
-library under both names.
+Folders below ``binaries/``: FMI 2.0 knows ``linux64``, ``win64`` and ``darwin64`` and means 64-bit x86 by them; for
+other machines FMI 2.0.5 refers to the platform tuples of FMI 3.0, hence ``aarch64-linux``. Importers differ: on an Arm
+Mac they look into ``darwin64``, which therefore holds a universal library; on Arm Linux FMPy 0.3 and OpenModelica look
+into ``linux64``, where an FMU for both machines has the x86 library. An FMU built for Arm Linux alone therefore carries
+its library under both names.
 """
 
 from __future__ import annotations
@@ -21,7 +22,7 @@ import shutil
 import subprocess
 import sys
 import tempfile
-from collections.abc import Sequence
+from collections.abc import Iterable
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -29,7 +30,10 @@ import fmpy
 
 from ..components.component import ComponentError, nearest
 
-FLAGS = ("-std=c11", "-O2", "-ffp-contract=off", "-fvisibility=hidden", "-g0", "-Wall", "-Wextra", "-Wconversion")
+FLAGS = (
+    *("-std=c11", "-O2", "-ffp-contract=off", "-fno-builtin-pow", "-fvisibility=hidden", "-g0"),
+    *("-Wall", "-Wextra", "-Wconversion"),
+)
 CL_FLAGS = ("/nologo", "/std:c11", "/O2", "/fp:precise", "/W3", "/D_CRT_SECURE_NO_WARNINGS", "/LD")
 _HEADERS = Path(fmpy.__file__).parent / "c-code"
 
@@ -72,22 +76,22 @@ def here() -> str:
     return "aarch64-linux" if platform.machine().lower() in ("aarch64", "arm64") else "linux64"
 
 
-def named(text: str) -> tuple[str, ...]:
-    """The platforms that a comma-separated list names; ``all`` is every one.
+def chosen(names: Iterable[str]) -> tuple[str, ...]:
+    """The platforms of those names in a fixed order; ``all`` is every one, nothing is this machine's.
 
     Raises:
         CompilerError: an unknown name; the message suggests the nearest one.
     """
-    names = tuple(dict.fromkeys(word.strip() for word in text.split(",") if word.strip()))
-    for name in names:
+    wanted = tuple(names) or (here(),)
+    for name in wanted:
         if name not in (*PLATFORMS, "all"):
             raise CompilerError(f"there is no platform {nearest(name, [*PLATFORMS, 'all'])}")
-    return tuple(name for name in PLATFORMS if name in names or "all" in names)
+    return tuple(name for name in PLATFORMS if name in wanted or "all" in wanted)
 
 
-def folders(platforms: Sequence[str]) -> dict[str, tuple[str, ...]]:
+def folders(platforms: Iterable[str]) -> dict[str, tuple[str, ...]]:
     """For each of an FMU's platforms, the folders below ``binaries/`` that hold its library."""
-    found = {name: (PLATFORMS[name].folder,) for name in platforms}
+    found: dict[str, tuple[str, ...]] = {name: (PLATFORMS[name].folder,) for name in platforms}
     if "aarch64-linux" in found and "linux64" not in found:
         found["aarch64-linux"] += ("linux64",)
     return found
@@ -206,5 +210,5 @@ def _run(command: list[str], folder: Path, environment: dict[str, str] | None = 
     done = subprocess.run(command, cwd=folder, env=environment, capture_output=True, text=True, check=False)
     if done.returncode:
         what = "ziglang" if "ziglang" in command else command[0]
-        said = (done.stderr or done.stdout).strip()[-2000:]
-        raise CompilerError(f"{what} failed (exit code {done.returncode}):\n{said}")
+        said = (done.stderr or done.stdout).strip().splitlines()
+        raise CompilerError("\n".join([f"{what} failed (exit code {done.returncode}):", *said[-20:]]))

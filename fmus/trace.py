@@ -1,4 +1,4 @@
-"""Tracing: a component's equations, run on symbols, become CasADi functions and from them C.
+"""Tracing: a component's equations, run on symbols, become CasADi expressions and from them C.
 
 The values of an instance stand in one vector: every scalar variable at its value reference, then the cells of the tapes,
 then those of the random numbers. Time and the length of a sample are the vector ``clock``.
@@ -6,19 +6,22 @@ then those of the random numbers. Time and the length of a sample are the vector
 
 from __future__ import annotations
 
+import contextlib
 import functools
-import re
-from collections.abc import Callable, Iterable
+import traceback
+from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass
-from typing import Any
+from pathlib import Path
+from typing import Any, NoReturn
 
 import casadi as ca
 import numpy as np
 
-from ..components.component import Component, Slot
+from ..components.component import Component, ComponentError, Slot
 from ..components.declarations import Memory, Output, State, Tape
 from ..components.maths import SymbolArray, elementwise
 from ..components.tracing import TracingError
+from .ccode import function
 from .variables import scalar_variables
 
 _FUNCTIONS = {
@@ -32,7 +35,9 @@ _FUNCTIONS = {
     "floor": ca.floor,
     "abs": ca.fabs,
 }
-_REMEDY = "use railcosim.components.maths (where, tanh, clip, logical_and, ...) instead"
+_REMEDY = "on values use operators, slices, reshaping and railcosim.components.maths, nothing else"
+_NOT_THE_AUTHORS = (Path(__file__).parent, Path(__file__).parents[1] / "components", Path(np.__file__).parent)
+"""Folders whose files are never to blame: this package, `maths` and its neighbours, NumPy."""
 
 
 class Symbol:
@@ -57,7 +62,10 @@ class Symbol:
         return Symbol(ca.if_else(self.sx, _expression(then), _expression(otherwise)))
 
     def _refuse(self, *_: Any) -> Any:
-        raise TracingError(f"a value was asked for its truth or turned into a plain number; {_REMEDY}")
+        raise TracingError(
+            "a value was asked for its truth or turned into a plain number: use railcosim.components.maths "
+            "(where, tanh, clip, logical_and, ...) instead of if, and, or, float() or the math module"
+        )
 
     def _refuse_division(self, *_: Any) -> Any:
         raise TracingError("// and % cannot be traced: Python and C round them differently; use maths.floor")
@@ -115,6 +123,19 @@ for _name, _operation in {
     setattr(Symbol, f"__{_name}__", _binary(_operation))
 
 
+class Text:
+    """Stands in for a text: a native FMU carries texts, but its equations cannot read them."""
+
+    __hash__ = None  # type: ignore[assignment]
+
+    def _refuse(self, *_: Any) -> Any:
+        raise TracingError("a text is read, which only a Python FMU can: use a boolean or an integer to choose")
+
+    __eq__ = __ne__ = __lt__ = __le__ = __gt__ = __ge__ = _refuse
+    __add__ = __radd__ = __mul__ = __rmul__ = __mod__ = __getitem__ = __contains__ = __iter__ = __getattr__ = _refuse
+    __bool__ = __len__ = __str__ = __repr__ = __format__ = __int__ = __float__ = _refuse
+
+
 @dataclass(frozen=True)
 class Layout:
     """Where everything stands among the values: the first place and the number of each kind."""
@@ -137,8 +158,9 @@ class Traced:
     """A component as C.
 
     Attributes:
-        code: the C functions ``<prefix>_outputs``, ``_derivatives``, ``_update``, ``_initial``, ``_keep``,
-            ``_directional``; those that would compute nothing are left out.
+        code: the C functions ``<prefix>_outputs``, ``_derivatives``, ``_update``, ``_initial``, ``_keep``, and of the
+            outputs and rates, and of ``initial``, the derivatives along a direction, ``_directional`` and
+            ``_initial_directional``; those that would compute nothing are left out.
         layout: where the values stand.
         initial: names of the scalars that ``initial`` computes, in the order of its results.
         reinitialised: names of the states that ``update`` may re-initialise.
@@ -174,11 +196,17 @@ def trace(component: Component, prefix: str) -> Traced:
     Raises:
         TracingError: an equation cannot be traced; component, method and construct are named.
     """
-    before = ca.GlobalOptions.getSimplificationOnTheFly()
-    # Rearranged operations would round differently from the Python they came from.
-    ca.GlobalOptions.setSimplificationOnTheFly(False)
-    try:
+    with _simplification(False):  # rearranged operations would round differently from the Python they came from
         return _Tracer(component, prefix).trace()
+
+
+@contextlib.contextmanager
+def _simplification(wanted: bool) -> Iterator[None]:
+    """CasADi's simplification of each operation as it is recorded: a global option of its own."""
+    before = ca.GlobalOptions.getSimplificationOnTheFly()
+    ca.GlobalOptions.setSimplificationOnTheFly(wanted)
+    try:
+        yield
     finally:
         ca.GlobalOptions.setSimplificationOnTheFly(before)
 
@@ -197,7 +225,9 @@ class _Tracer:
         place = self.probe.__dict__
         references = {v.name: v.reference for v in scalar_variables(self.probe)}
         for slot in self.probe.slots.values():
-            if slot.type is not str and slot.scalars[0] in references:
+            if slot.type is str:
+                place[slot.name] = _arranged([Text() for _ in slot.scalars], slot.shape)
+            elif slot.scalars and slot.scalars[0] in references:
                 place[slot.name] = self._cells([references[name] for name in slot.scalars], slot.shape)
         at = self.layout.tape[0]
         for slot in self.probe.of(Tape):
@@ -211,28 +241,22 @@ class _Tracer:
         place["time"] = Symbol(self.clock[0])
 
     def _cells(self, references: Iterable[int], shape: tuple[int, ...]) -> Any:
-        cells = [Symbol(self.values[k]) for k in references]
-        if not shape:
-            return cells[0]
-        array = np.empty(len(cells), dtype=object)
-        array[:] = cells
-        return array.reshape(shape).view(SymbolArray)
+        return _arranged([Symbol(self.values[k]) for k in references], shape)
 
     def trace(self) -> Traced:
         outputs = self._results("outputs", [*self.probe.of(Output)])
         derivatives = self._results("derivatives", [*self.probe.of(State)])
-        started = self._returned("initial")
-        computed = [slot for slot in self.probe.of(State, Memory) if slot.name in started]
+        kept = [*self.probe.of(State, Memory)]
+        started = self._returned("initial", kept)
+        computed = [slot for slot in kept if slot.name in started]
         initial = self._flat(started, computed, "initial")
+        remembered = [*self.probe.of(Memory), *self.probe.of(Tape)]
         self.probe.__dict__["_step"] = Symbol(self.clock[1])
-        updated = self._returned("update")
-        again = [slot for slot in self.probe.of(State) if slot.name in updated]
-        update = self._flat(updated, [*self.probe.of(Memory), *self.probe.of(Tape), *again], "update")
+        updated = self._returned("update", [*remembered, *self.probe.of(State)])
         del self.probe.__dict__["_step"]
-        keep = [_expression(self._returned("keep"))]
-        seed = ca.SX.sym("seed", self.layout.values)
-        differentiated = [*outputs, *derivatives]
-        directional = ca.jtimes(ca.vertcat(*differentiated), self.values, seed) if differentiated else None
+        again = [slot for slot in self.probe.of(State) if slot.name in updated]
+        update = self._flat(updated, [*remembered, *again], "update")
+        keep = [_expression(self._call("keep"))]
         functions = {
             "outputs": outputs,
             "derivatives": derivatives,
@@ -240,32 +264,60 @@ class _Tracer:
             "update": update if self.probe.is_sampled else [],
             "keep": keep if self.layout.tape[1] else [],
         }
-        generator = ca.CodeGenerator("equations.c", {"casadi_int": "int"})
-        for name, results in functions.items():
-            if results:
-                generator.add(self._function(name, [self.clock, self.values], ca.vertcat(*results)))
-        if differentiated:
-            generator.add(self._function("directional", [self.clock, self.values, seed], directional))
+        arguments = [("clock", self.clock), ("values", self.values)]
+        code = [function(f"{self.prefix}_{name}", arguments, column) for name, column in functions.items() if column]
+        for name, column in {"directional": [*outputs, *derivatives], "initial_directional": initial}.items():
+            if column:
+                code.append(self._directional(name, arguments, column))
         return Traced(
-            _tidy(generator.dump()),
+            "\n".join(code),
             self.layout,
             tuple(name for slot in computed for name in slot.scalars),
             tuple(name for slot in again for name in slot.scalars),
         )
 
-    def _function(self, name: str, arguments: list[Any], column: Any) -> Any:
-        return ca.Function(f"{self.prefix}_{name}", arguments, [ca.densify(column)], {"cse": True})
+    def _directional(self, name: str, arguments: list[tuple[str, Any]], column: list[Any]) -> str:
+        """The derivative of expressions along a direction in the space of the values, ``seed``."""
+        seed = ca.SX.sym("seed", self.layout.values)
+        # Simplified, or x**2 at a negative x gives NaN: its rule adds 0 * log(x) for an exponent that does not vary.
+        with _simplification(True):
+            derivative = ca.densify(ca.jtimes(ca.vertcat(*column), self.values, seed))
+            results = [derivative[k] for k in range(len(column))]
+            return function(f"{self.prefix}_{name}", [*arguments, ("seed", seed)], results)
 
     def _results(self, method: str, slots: list[Slot]) -> list[Any]:
-        return self._flat(self._returned(method), slots, method) if slots else []
+        return self._flat(self._returned(method, slots), slots, method)
 
-    def _returned(self, method: str) -> Any:
+    def _call(self, method: str) -> Any:
         try:
             return getattr(self.probe, method)()
-        except TracingError as error:
-            raise TracingError(f"{self.name}.{method}: {error}") from error
-        except (TypeError, AttributeError, ValueError, NotImplementedError) as error:
-            raise TracingError(f"{self.name}.{method} cannot be traced: {error}; {_REMEDY}") from error
+        except Exception as error:
+            self._refuse(method, error)
+
+    def _returned(self, method: str, slots: list[Slot]) -> dict[str, Any]:
+        """What a method returns; only values of these slots."""
+        returned = self._call(method)
+        if not isinstance(returned, dict):
+            raise TracingError(f"{self.name}.{method} returns {returned!r}; it must return a dict")
+        names = [slot.name for slot in slots]
+        unknown = sorted(returned.keys() - set(names))
+        if unknown:
+            raise TracingError(f"{self.name}.{method} returns {unknown}; it may return {sorted(names)}")
+        return returned
+
+    def _refuse(self, method: str, error: Exception) -> NoReturn:
+        """Say which method of which component did what: the author's own line."""
+        what = f"{self.name}.{method} cannot be traced"
+        remedy = "" if isinstance(error, ComponentError) else f"; {_REMEDY}"
+        frames = [
+            frame
+            for frame in traceback.extract_tb(error.__traceback__)
+            if Path(frame.filename).parent not in _NOT_THE_AUTHORS
+            and not Path(frame.filename).is_relative_to(_NOT_THE_AUTHORS[-1])
+        ]
+        if frames:
+            what += f" at {Path(frames[-1].filename).name}:{frames[-1].lineno}, '{frames[-1].line}'"
+        raise TracingError(f"{what}: {error}{remedy}") from error
 
     def _flat(self, returned: dict[str, Any], slots: list[Slot], method: str) -> list[Any]:
         cells: list[Any] = []
@@ -279,26 +331,18 @@ class _Tracer:
                 raise TracingError(
                     f"{self.name}.{method}: {slot.name!r} has shape {array.shape}, declared {slot.shape}"
                 )
-            cells += [_expression(cell) for cell in array.flat]
+            try:
+                cells += [_expression(cell) for cell in array.flat]
+            except TracingError as error:
+                raise TracingError(f"{self.name}.{method}: {slot.name!r}: {error}") from None
         return cells
 
 
-_HELPER = re.compile(r"^casadi_real (casadi_\w+\([^)]*\) \{\n.*?^\}\n)", re.MULTILINE | re.DOTALL)
-_FUNCTION = re.compile(
-    r"^/\* (?P<name>\w+):.*? \*/\nstatic int casadi_f\d+\([^)]*\) \{\n(?P<body>.*?)^\}\n", re.MULTILINE | re.DOTALL
-)
-
-
-def _tidy(code: str) -> str:
-    """The equations alone out of what CasADi writes, with internal linkage: models are linked into one program.
-
-    The rest of its file is an interface for CasADi itself (names, sparsity, reference counts), which nobody calls here.
-    """
-    helpers = [f"static double {text}" for text in _HELPER.findall(code)]
-    functions = [
-        f"static int {match['name']}(const double **arg, double **res)\n{{\n{match['body']}}}\n"
-        for match in _FUNCTION.finditer(code)
-    ]
-    unused = "  (void)arg;\n  (void)res;\n  return 0;\n"
-    text = "\n".join([*helpers, *(f.replace("  return 0;\n", unused) for f in functions)])
-    return text.replace("casadi_real", "double").replace("casadi_int", "int")
+def _arranged(cells: list[Any], shape: tuple[int, ...]) -> Any:
+    """Cells in the shape of their slot."""
+    if not shape:
+        return cells[0]
+    array = np.empty(len(cells), dtype=object)
+    for k, cell in enumerate(cells):  # one by one: NumPy would look for numbers inside each of a list
+        array[k] = cell
+    return array.reshape(shape).view(SymbolArray)

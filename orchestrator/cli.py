@@ -34,6 +34,8 @@ from .results import Results
 from .run import Run, execute
 from .scenario import load, shipped
 from .skeleton import write_skeleton
+from .validate import TIMEOUT, show_report
+from .validate import validate as validate_fmu
 
 OK, FAILED, WRONG_INPUT, FMU_FAILED, INTERRUPTED = 0, 1, 2, 3, 130
 
@@ -371,6 +373,20 @@ def pack(
         console.say(out, f"note: {note}", "yellow")
     shown = f"{len(packed.exposed)} variables, for {', '.join(packed.platforms)}"
     console.say(out, f"{packed.path}: {len(system.instances)} FMUs as one, {shown}", whole=True)
+
+
+@app.command()
+def validate(
+    fmu: Annotated[Path, typer.Argument(help="Any FMI 2.0 co-simulation FMU, ours or not.")],
+    timeout: Annotated[float, typer.Option(min=0.1, help="Longest time for one probe, in s.")] = TIMEOUT,
+) -> None:
+    """Check any FMU: archive, description, and probes that cannot take this program down.
+
+    Exit codes: 0 nothing failed; 1 something did; 2 the file is no FMU that could be used.
+    """
+    report = validate_fmu(fmu, timeout=timeout)
+    show_report(console.console(), report)
+    raise typer.Exit(OK if report.passed else FAILED)
 
 
 @app.command()

@@ -7,13 +7,13 @@ signals), `Master` steps in Python with identical results.
 from __future__ import annotations
 
 import time as clock
-from collections.abc import Callable
-from typing import TYPE_CHECKING, Any
+from collections.abc import Iterable
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
-from .fmu import FmuChannel, FmuSlave, Slave
+from .fmu import FmuChannel, FmuSlave
 
 try:
     from . import kernel
@@ -21,12 +21,13 @@ except ImportError:  # installed without a C compiler
     kernel = None  # type: ignore[assignment]
 
 if TYPE_CHECKING:
-    from .master import Feed, Master, Yield
+    from .master import Feed, Master, Observer, Yield
 
 _SET, _STEP, _GET = 0, 1, 2
-_NOT_FINITE = -1
 _BLOCK_SECONDS = 0.05
 """Wall time a block is meant to take: short enough for Ctrl-C and a progress bar, long enough to cost nothing."""
+_GROWTH = 64
+"""How many times longer than the last a block may be: the first is a single step, of which nothing is known."""
 _MOST_VALUES = 4_000_000
 """Numbers a block may record, so that its buffer stays small."""
 
@@ -51,56 +52,64 @@ class CompiledLoop:
         self._channels: list[tuple[int, int, int, int, int]] = []
         self._entries: list[tuple[int, int, float, float]] = []
         self._references: list[int] = []
-        self._owners: list[tuple[Slave, str]] = []
-        slaves = list(master.slaves.values())
-        sets = {slave.name: [self._set(slave, feed) for feed in master.feeds[slave.name]] for slave in slaves}
-        gets = {slave.name: [self._get(slave, part) for part in master.yields[slave.name]] for slave in slaves}
-        place = {slave.name: k for k, slave in enumerate(slaves)}
-        operations: list[tuple[int, int]] = []
-        if master.algorithm == "gauss-seidel":
-            for slave in master.sequence:
-                operations += [(_SET, c) for c in sets[slave.name]]
-                operations.append((_STEP, place[slave.name]))
-                operations += [(_GET, c) for c in gets[slave.name]]
-        else:
-            operations += [(_SET, c) for slave in slaves for c in sets[slave.name]]
-            operations += [(_STEP, place[slave.name]) for slave in slaves]
-            operations += [(_GET, c) for slave in slaves for c in gets[slave.name]]
-        self._slaves = slaves
-        self._operations = np.array(operations, dtype=_OPERATION)
-        addresses = [slave.step_addresses for slave in slaves if isinstance(slave, FmuSlave)]
+        self._operations: list[tuple[int, int]] = []
+        self._culprits: list[tuple[FmuSlave, str]] = []
+        self._instances: list[tuple[int, int]] = []
+        slaves = {name: slave for name, slave in master.slaves.items() if isinstance(slave, FmuSlave)}
+        sweep = [slave.name for slave in master.sequence]
+        # Instance by instance, or all of one operation before the first of the next.
+        parts = [[name] for name in sweep] if master.algorithm == "gauss-seidel" else [list(slaves)]
+        for names in parts:
+            for name in names:
+                self._add_sets(slaves[name], master.feeds[name])
+            for name in names:
+                self._add_step(slaves[name])
+            for name in names:
+                self._add_gets(slaves[name], master.yields[name])
         self._plan = (
-            self._operations,
+            np.array(self._operations, dtype=_OPERATION),
             np.array(self._channels, dtype=_CHANNEL),
-            np.array(addresses, dtype=_INSTANCE),
+            np.array(self._instances, dtype=_INSTANCE),
             np.array(self._entries, dtype=_ENTRY),
             np.array(self._references, dtype=np.uint32),
         )
 
-    def _set(self, slave: Slave, feed: Feed) -> int:
-        entries = [
-            (place, -1 if age is None else age, scale if feed.is_real else 1.0, offset if feed.is_real else 0.0)
-            for place, age, scale, offset in zip(feed.sources, feed.ages, feed.scales, feed.offsets, strict=True)
-        ]
-        return self._add(slave, feed.channel, entries, feed.is_real, 0)
+    def _add_sets(self, slave: FmuSlave, feeds: Iterable[Feed]) -> None:
+        for feed in feeds:
+            ages = (-1 if age is None else age for age in feed.ages)
+            # What is no real number is never scaled.
+            changes = zip(feed.scales, feed.offsets, strict=True) if feed.is_real else ((1.0, 0.0) for _ in feed.ages)
+            entries = [(k, age, *change) for k, age, change in zip(feed.sources, ages, changes, strict=True)]
+            assert isinstance(feed.channel, FmuChannel)
+            self._add_channel(_SET, slave, feed.channel, entries, feed.is_real)
 
-    def _get(self, slave: Slave, part: Yield) -> int:
-        entries = [(place, -1, 1.0, 0.0) for place in range(part.begin, part.end)]
-        return self._add(slave, part.channel, entries, part.is_real, 1)
+    def _add_gets(self, slave: FmuSlave, parts: Iterable[Yield]) -> None:
+        for part in parts:
+            entries = [(place, -1, 1.0, 0.0) for place in range(part.begin, part.end)]
+            assert isinstance(part.channel, FmuChannel)
+            self._add_channel(_GET, slave, part.channel, entries, part.is_real)
 
-    def _add(
-        self, slave: Slave, channel: Any, entries: list[tuple[int, int, float, float]], is_real: bool, direction: int
-    ) -> int:
-        assert isinstance(channel, FmuChannel)
-        begin = len(self._entries)
+    def _add_channel(
+        self,
+        kind: int,
+        slave: FmuSlave,
+        channel: FmuChannel,
+        entries: list[tuple[int, int, float, float]],
+        is_real: bool,
+    ) -> None:
+        call = channel.calls[kind == _GET]
+        self._operations.append((kind, len(self._channels)))
+        self._culprits.append((slave, call))
+        self._channels.append((*slave.addresses(call), len(self._entries), len(entries), int(is_real)))
         self._entries += entries
         self._references += channel.references
-        function, component = channel.addresses[direction]
-        self._channels.append((function, component, begin, len(entries), int(is_real)))
-        self._owners.append((slave, channel.calls[direction]))
-        return len(self._channels) - 1
 
-    def run(self, start_time: float, step: float, count: int, every: int, observe: Callable[[int, NDArray[np.float64]], bool]) -> bool:
+    def _add_step(self, slave: FmuSlave) -> None:
+        self._operations.append((_STEP, len(self._instances)))
+        self._culprits.append((slave, "fmi2DoStep"))
+        self._instances.append(slave.addresses("fmi2DoStep"))
+
+    def run(self, start_time: float, step: float, count: int, every: int, observe: Observer) -> bool:
         """Take ``count`` communication steps in blocks; True unless the observer stopped the run.
 
         Raises:
@@ -108,12 +117,12 @@ class CompiledLoop:
         """
         master = self._master
         values = np.array(master.values, dtype=np.float64)
-        history = np.tile(values, (master.depth, 1)) if master.depth > 1 else np.empty((0, len(values)))
-        newest, done, block = max(0, len(history) - 1), 0, 1
+        history = np.tile(values, (master.depth, 1))
+        newest, done, block = max(0, master.depth - 1), 0, 1
         width = len(values) + 1
         while done < count:
-            block = min(block, count - done)
-            rows = np.empty((block // every + 2, width))
+            block = min(block, count - done, max(1, _MOST_VALUES // width) * every)
+            rows = np.empty((_rows_due(done, block, every, count), width))
             begin = clock.perf_counter()
             taken, written, failed, status, newest = kernel.run(
                 *self._plan, values, history, newest, rows, every, start_time, step, done, block, count
@@ -122,20 +131,25 @@ class CompiledLoop:
             done += taken
             master.steps = done
             master.values[:] = values.tolist()
+            goes_on = observe(done, rows[:written]) if taken else True
             if failed >= 0:
-                observe(done, rows[:written])
                 self._raise(failed, status, start_time + done * step, step)
-            if not observe(done, rows[:written]):
-                return False
-            faster = _BLOCK_SECONDS / max(seconds, 1e-6)
-            block = max(1, min(int(taken * min(faster, 16.0)), max(1, _MOST_VALUES // width) * every))
-        return True
+            if not goes_on:
+                break
+            block = max(1, int(taken * min(_BLOCK_SECONDS / max(seconds, 1e-9), _GROWTH)))
+        for slave in master.slaves.values():
+            slave.time = start_time + done * step
+        return done == count
 
     def _raise(self, failed: int, status: int, time: float, step: float) -> None:
-        kind, index = self._operations[failed]
-        slave, call = (self._slaves[index], "fmi2DoStep") if kind == _STEP else self._owners[index]
-        slave.time = time + step if kind == _GET else time
-        if status == _NOT_FINITE:
-            self._master.check_finite(slave)
-        assert isinstance(slave, FmuSlave)
+        """Raise what `Master` does; a failed operation with a status that is no failure left a value that is not finite."""
+        slave, call = self._culprits[failed]
+        slave.time = time + step if call.startswith("fmi2Get") else time
         slave.check(call, status)
+        self._master.check_finite(slave)
+
+
+def _rows_due(done: int, block: int, every: int, count: int) -> int:
+    """How many of the next steps are recorded: every so many, and the last."""
+    end = done + block
+    return end // every - done // every + int(end == count and count % every != 0)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import copy
 import ctypes
 import functools
 import inspect
@@ -94,6 +95,62 @@ _LOGGER = fmi2.fmi2CallbackLoggerTYPE(_log)
 """One for all FMUs: FMPy's proxy, which fills a message's arguments in, knows only the logger it was given last."""
 
 
+_SIGNATURES: dict[str, list[Any]] = {
+    "fmi2DoStep": [ctypes.c_void_p, ctypes.c_double, ctypes.c_double, ctypes.c_int],
+    **{
+        f"fmi2{verb}{suffix}": [ctypes.c_void_p, ctypes.c_void_p, ctypes.c_size_t, ctypes.c_void_p]
+        for verb in ("Set", "Get")
+        for suffix in ("Real", "Integer", "Boolean", "String")
+    },
+}
+"""What is called at every step: FMPy's own methods check and log in Python at each call, so there the library's functions
+are called directly."""
+
+
+class _Library:
+    """A loaded library with its functions bound, shared by all instances of one FMU: FMPy binds for each anew."""
+
+    def __init__(self, path: Path, interface: Interface, folder: Path) -> None:
+        make: Any = fmi2.FMU2Slave
+        here = os.getcwd()
+        try:
+            self.fmu = make(
+                guid=interface.guid,
+                unzipDirectory=str(folder),
+                modelIdentifier=interface.identifier,
+                libraryPath=str(path),
+            )
+        finally:
+            os.chdir(here)
+        self.path = path
+        self.users = 0
+        self.functions = {name: self._function(name, types) for name, types in _SIGNATURES.items()}
+        self.addresses = {name: address(function) for name, function in self.functions.items()}
+
+    def _function(self, name: str, argtypes: list[Any]) -> Any:
+        function = self.fmu.dll[name]
+        function.argtypes, function.restype = argtypes, ctypes.c_int
+        return function
+
+
+_LIBRARIES: dict[Path, _Library] = {}
+"""The libraries in use, by path."""
+
+
+def _open_library(path: Path, interface: Interface, folder: Path) -> _Library:
+    if path not in _LIBRARIES:
+        _LIBRARIES[path] = _Library(path, interface, folder)
+    _LIBRARIES[path].users += 1
+    return _LIBRARIES[path]
+
+
+def _close_library(it: _Library) -> None:
+    it.users -= 1
+    if not it.users:
+        del _LIBRARIES[it.path]
+        it.fmu.freeLibrary()
+
+
 def _callbacks(environment: int, log: deque[str]) -> Any:
     _LOGS[environment] = log
     callbacks = fmi2.fmi2CallbackFunctions()
@@ -123,16 +180,10 @@ class FmuSlave:
         self.time = 0.0
         self.log: deque[str] = deque(maxlen=_LOG_LINES)
         self._dead = False
-        here = os.getcwd()
         try:
-            make: Any = fmi2.FMU2Slave
-            self._fmu = make(
-                guid=interface.guid,
-                unzipDirectory=str(folder),
-                modelIdentifier=interface.identifier,
-                instanceName=name,
-                libraryPath=str(library(folder, interface, interface.model)),
-            )
+            self._library: _Library | None = _open_library(library(folder, interface, interface.model), interface, folder)
+            self._fmu = copy.copy(self._library.fmu)
+            self._fmu.instanceName = name
             self._callbacks = _callbacks(id(self), self.log)
             # pythonfmu passes even its errors on only while debug logging is on; others then flood us with details.
             talks = bool(interface.vendor) or "pythonfmu" in interface.generator.lower()
@@ -140,20 +191,13 @@ class FmuSlave:
         except Exception as error:
             _LOGS.pop(id(self), None)
             raise FmuError(f"cannot be instantiated: {error}", instance=name, log=list(self.log)) from error
-        finally:
-            os.chdir(here)
-        self._component = self._fmu.component
-        self._do_step = self._function("fmi2DoStep", [ctypes.c_void_p, ctypes.c_double, ctypes.c_double, ctypes.c_int])
-
-    def _function(self, name: str, argtypes: list[Any]) -> Any:
-        # FMPy's own methods check and log in Python at every call; in the step loop we call the library directly.
-        function = getattr(self._fmu.dll, name)
-        function.argtypes, function.restype = argtypes, ctypes.c_int
-        return function
+        self.functions, self._addresses = self._library.functions, self._library.addresses
+        self.pointer = int(self._fmu.component)
+        self._do_step = self.functions["fmi2DoStep"]
 
     def check(self, call: str, status: int) -> None:
         """Raise unless the status of a call is ok or warning."""
-        if status <= _WARNING:
+        if 0 <= status <= _WARNING:
             return
         self._dead = status == _FATAL
         what = "discarded the step" if (call, status) == ("fmi2DoStep", 2) else f"{call} failed"
@@ -164,7 +208,7 @@ class FmuSlave:
 
     def _call(self, name: str, *arguments: Any) -> None:
         try:
-            getattr(self._fmu, name)(self._component, *arguments)
+            getattr(self._fmu, name)(self.pointer, *arguments)
         except Exception as error:
             self.check(name, getattr(error, "status", _FATAL))
 
@@ -188,20 +232,14 @@ class FmuSlave:
     def step(self, time: float, length: float) -> None:
         """Advance from ``time`` by ``length``, both in s."""
         self.time = time
-        status = self._do_step(self._component, time, length, 1)
+        status = self._do_step(self.pointer, time, length, 1)
         if status:
             self.check("fmi2DoStep", status)
         self.time = time + length
 
-    @property
-    def pointer(self) -> int:
-        """The instance, as the library knows it."""
-        return int(self._component)
-
-    @property
-    def step_addresses(self) -> tuple[int, int]:
-        """Where fmi2DoStep and the instance stand in memory, for the kernel."""
-        return address(self._do_step), self.pointer
+    def addresses(self, call: str) -> tuple[int, int]:
+        """Where a function and the instance stand in memory, for the kernel."""
+        return self._addresses[call], self.pointer
 
     def terminate(self) -> None:
         """End the run."""
@@ -213,28 +251,27 @@ class FmuSlave:
         An FMU made with pythonfmu 0.7 has dropped its Python objects by then, and drops them again when freed: the
         process would crash.
         """
-        if not self._dead:
-            self._fmu.freeInstance()
+        if not self._dead and self._library is not None:
+            self._fmu.fmi2FreeInstance(self.pointer)
+            _close_library(self._library)
+            self._library = None
         _LOGS.pop(id(self), None)
 
 
 class FmuChannel:
     """Some variables of one type of an FMU: value references and a buffer, prepared once.
 
-    ``calls`` names the functions that set and get; ``addresses`` gives (function, instance) for each, for the kernel.
+    ``calls`` names the functions that set and get.
     """
 
     def __init__(self, slave: FmuSlave, kind: Type, references: Sequence[int]) -> None:
         count = len(references)
         suffix = _SUFFIX.get(kind, kind)
-        signature = [ctypes.c_void_p, ctypes.c_void_p, ctypes.c_size_t, ctypes.c_void_p]
         self._slave = slave
-        self._component = slave._component
+        self._component = slave.pointer
         self.calls = f"fmi2Set{suffix}", f"fmi2Get{suffix}"
-        self._set = slave._function(self.calls[0], signature)
-        self._get = slave._function(self.calls[1], signature)
-        self.references = list(references)
-        self.addresses = [(address(function), slave.pointer) for function in (self._set, self._get)]
+        self._set, self._get = (slave.functions[call] for call in self.calls)
+        self.references = references
         self._references = (ctypes.c_uint * count)(*references)
         self._values = (_C_TYPES[kind] * count)()
         self._count = count

@@ -4,7 +4,10 @@
    with the same arithmetic, so that the two give the same bits. A channel is some variables of one type of one instance:
    where their value references stand, and where their values come from or go to. All values are real numbers here;
    integers and truth values are exact in them. Python builds the plan, and takes over between blocks for progress,
-   flushing and interruption. */
+   flushing and interruption.
+
+   Every block begins by turning the plan into calls, where all of it is checked, and runs of like calls into groups: what
+   is the same for a whole group stands in registers, and what is left of a call is the instance and a place. */
 
 #define PY_SSIZE_T_CLEAN
 #define Py_LIMITED_API 0x030B0000
@@ -16,11 +19,15 @@
 #include <string.h>
 
 typedef int (*DoStep)(void *component, double time, double step, int no_set_state);
-typedef int (*ExchangeReal)(void *component, const unsigned int *references, size_t count, double *values);
-typedef int (*ExchangeInteger)(void *component, const unsigned int *references, size_t count, int *values);
+typedef int (*SetReal)(void *component, const unsigned int *references, size_t count, const double *values);
+typedef int (*GetReal)(void *component, const unsigned int *references, size_t count, double *values);
+typedef int (*SetInteger)(void *component, const unsigned int *references, size_t count, const int *values);
+typedef int (*GetInteger)(void *component, const unsigned int *references, size_t count, int *values);
 
 enum { OPERATION_SET = 0, OPERATION_STEP = 1, OPERATION_GET = 2 };
-enum { NOT_FINITE = -1 };
+enum { WARNING = 1 }; /* the last status of the standard that is no failure */
+
+/* ------------------------------------------------------------------------------------- the plan, as Python writes it */
 
 typedef struct {
     uint64_t function;  /* address of fmi2SetReal, fmi2GetInteger, ... */
@@ -36,7 +43,7 @@ typedef struct {
 } Instance;
 
 typedef struct {
-    int64_t place; /* among the values */
+    int64_t place; /* among the values; the outputs of a channel stand side by side */
     int64_t age;   /* how many recorded points back to read; -1: the live value */
     double scale;
     double offset;
@@ -47,179 +54,435 @@ typedef struct {
     int32_t index; /* of the channel or instance */
 } Operation;
 
+/* ------------------------------------------------------------------------------------------------ the plan, as it runs */
+
+typedef enum { STEP, SET_REALS_IN_PLACE, SET_REALS, SET_INTEGERS, GET_REALS, GET_INTEGERS } Kind;
+
+/* One operation. */
 typedef struct {
-    const Operation *operations;
-    size_t operation_count;
-    const Channel *channels;
-    const Instance *instances;
-    const Entry *entries;
+    void *component;
+    double *values;       /* where they are read or written in place */
+    const Entry *entries; /* where they are gathered from */
+} Call;
+
+/* Calls of one kind, one after the other, of one function with the same value references. */
+typedef struct {
+    Kind kind;
+    uintptr_t function;
     const unsigned int *references;
+    size_t count; /* of the references */
+    Call *begin;
+    Call *end;
+} Group;
+
+typedef struct {
+    Call *calls;
+    Group *groups;
+    size_t group_count;
+    double *reals; /* scratch for the largest channel */
+    int *integers;
     double *values;
     size_t value_count;
     double *history; /* the last `depth` recorded points, a ring */
     size_t depth;
     size_t newest; /* the ring's newest row */
-    double *reals; /* scratch for one channel */
-    int *integers;
 } Plan;
+
+/* ---------------------------------------------------------------------------------------------------------- stepping */
+
+static int is_failure(int status)
+{
+    return status < 0 || status > WARNING;
+}
 
 static double read_entry(const Plan *plan, const Entry *entry)
 {
-    double value;
-    if (entry->age < 0) {
-        value = plan->values[entry->place];
-    } else {
-        size_t row = (plan->newest + plan->depth - (size_t)entry->age) % plan->depth;
-        value = plan->history[row * plan->value_count + (size_t)entry->place];
+    const double *row = plan->values;
+    if (entry->age >= 0) {
+        size_t age = (size_t)entry->age;
+        row = plan->history + (plan->newest + (plan->newest < age ? plan->depth : 0) - age) * plan->value_count;
     }
+    double value = row[entry->place];
     return entry->scale == 1.0 && entry->offset == 0.0 ? value : entry->scale * value + entry->offset;
 }
 
-static int set_channel(const Plan *plan, const Channel *channel)
+/* Each of these takes a group's calls; it returns the one that failed, or the end. A failure with a status that is none is
+   a value that is not finite. */
+
+static const Call *take_steps(const Group *group, double time, double step, int *status)
 {
-    const Entry *entries = plan->entries + channel->begin;
-    const unsigned int *references = plan->references + channel->begin;
-    void *component = (void *)(uintptr_t)channel->component;
-    size_t count = (size_t)channel->count;
-    if (channel->is_real) {
+    DoStep do_step = (DoStep)group->function;
+    const Call *end = group->end;
+    for (const Call *call = group->begin; call < end; call++) {
+        int found = do_step(call->component, time, step, 1);
+        if (is_failure(found)) {
+            *status = found;
+            return call;
+        }
+    }
+    return end;
+}
+
+static const Call *set_reals_in_place(const Group *group, int *status)
+{
+    SetReal set = (SetReal)group->function;
+    const unsigned int *references = group->references;
+    size_t count = group->count;
+    const Call *end = group->end;
+    for (const Call *call = group->begin; call < end; call++) {
+        int found = set(call->component, references, count, call->values);
+        if (is_failure(found)) {
+            *status = found;
+            return call;
+        }
+    }
+    return end;
+}
+
+static const Call *set_reals(const Plan *plan, const Group *group, int *status)
+{
+    SetReal set = (SetReal)group->function;
+    for (const Call *call = group->begin; call < group->end; call++) {
+        for (size_t k = 0; k < group->count; k++) {
+            plan->reals[k] = read_entry(plan, &call->entries[k]);
+        }
+        *status = set(call->component, group->references, group->count, plan->reals);
+        if (is_failure(*status)) {
+            return call;
+        }
+    }
+    return group->end;
+}
+
+static const Call *set_integers(const Plan *plan, const Group *group, int *status)
+{
+    SetInteger set = (SetInteger)group->function;
+    for (const Call *call = group->begin; call < group->end; call++) {
+        for (size_t k = 0; k < group->count; k++) {
+            plan->integers[k] = (int)read_entry(plan, &call->entries[k]);
+        }
+        *status = set(call->component, group->references, group->count, plan->integers);
+        if (is_failure(*status)) {
+            return call;
+        }
+    }
+    return group->end;
+}
+
+static const Call *get_reals(const Group *group, int *status)
+{
+    GetReal get = (GetReal)group->function;
+    const unsigned int *references = group->references;
+    size_t count = group->count;
+    const Call *end = group->end;
+    for (const Call *call = group->begin; call < end; call++) {
+        int found = get(call->component, references, count, call->values);
+        int finite = 1;
         for (size_t k = 0; k < count; k++) {
-            plan->reals[k] = read_entry(plan, &entries[k]);
+            finite &= isfinite(call->values[k]) != 0;
         }
-        return ((ExchangeReal)(uintptr_t)channel->function)(component, references, count, plan->reals);
+        if (is_failure(found) || !finite) {
+            *status = found;
+            return call;
+        }
     }
-    for (size_t k = 0; k < count; k++) {
-        plan->integers[k] = (int)read_entry(plan, &entries[k]);
-    }
-    return ((ExchangeInteger)(uintptr_t)channel->function)(component, references, count, plan->integers);
+    return end;
 }
 
-/* Outputs of a channel stand side by side among the values. */
-static int get_channel(const Plan *plan, const Channel *channel)
+static const Call *get_integers(const Plan *plan, const Group *group, int *status)
 {
-    double *target = plan->values + plan->entries[channel->begin].place;
-    const unsigned int *references = plan->references + channel->begin;
-    void *component = (void *)(uintptr_t)channel->component;
-    size_t count = (size_t)channel->count;
-    int status;
-    if (channel->is_real) {
-        status = ((ExchangeReal)(uintptr_t)channel->function)(component, references, count, target);
-        for (size_t k = 0; k < count && status <= 1; k++) {
-            if (!isfinite(target[k])) {
-                return NOT_FINITE;
-            }
+    GetInteger get = (GetInteger)group->function;
+    for (const Call *call = group->begin; call < group->end; call++) {
+        *status = get(call->component, group->references, group->count, plan->integers);
+        if (is_failure(*status)) {
+            return call;
         }
-        return status;
+        for (size_t k = 0; k < group->count; k++) {
+            call->values[k] = (double)plan->integers[k];
+        }
     }
-    status = ((ExchangeInteger)(uintptr_t)channel->function)(component, references, count, plan->integers);
-    for (size_t k = 0; k < count; k++) {
-        target[k] = (double)plan->integers[k];
-    }
-    return status;
+    return group->end;
 }
 
-/* One communication step; the index of the operation that failed, or -1. */
+static const Call *take_group(const Plan *plan, const Group *group, double time, double step, int *status)
+{
+    switch (group->kind) {
+    case STEP: return take_steps(group, time, step, status);
+    case SET_REALS_IN_PLACE: return set_reals_in_place(group, status);
+    case SET_REALS: return set_reals(plan, group, status);
+    case SET_INTEGERS: return set_integers(plan, group, status);
+    case GET_REALS: return get_reals(group, status);
+    default: return get_integers(plan, group, status);
+    }
+}
+
+/* One communication step; the operation that failed, or -1. */
 static int64_t advance(const Plan *plan, double time, double step, int *status)
 {
-    for (size_t n = 0; n < plan->operation_count; n++) {
-        const Operation *operation = &plan->operations[n];
-        if (operation->kind == OPERATION_STEP) {
-            const Instance *instance = &plan->instances[operation->index];
-            *status = ((DoStep)(uintptr_t)instance->function)((void *)(uintptr_t)instance->component, time, step, 1);
-        } else if (operation->kind == OPERATION_SET) {
-            *status = set_channel(plan, &plan->channels[operation->index]);
-        } else {
-            *status = get_channel(plan, &plan->channels[operation->index]);
-        }
-        if (*status > 1 || *status == NOT_FINITE) {
-            return (int64_t)n;
+    const Group *end = plan->groups + plan->group_count;
+    for (const Group *group = plan->groups; group < end; group++) {
+        const Call *call = take_group(plan, group, time, step, status);
+        if (call < group->end) {
+            return call - plan->calls;
         }
     }
     return -1;
 }
 
-static int has_size(const Py_buffer *buffer, size_t count, size_t size, const char *name)
+static void remember(Plan *plan)
 {
-    if (buffer->len == (Py_ssize_t)(count * size)) {
-        return 1;
+    if (plan->depth > 0) {
+        plan->newest = plan->newest + 1 < plan->depth ? plan->newest + 1 : 0;
+        memcpy(plan->history + plan->newest * plan->value_count, plan->values, plan->value_count * sizeof(double));
     }
-    PyErr_Format(PyExc_ValueError, "kernel: %s has %zd bytes, expected %zu", name, buffer->len, count * size);
-    return 0;
+}
+
+/* Which steps to take, and where their rows go. */
+typedef struct {
+    double start;
+    double step;
+    long long first; /* number of the first step */
+    long long count;
+    long long every;
+    long long last; /* number of the step that is recorded whatever `every` says */
+    double *rows;
+    size_t capacity;
+} Block;
+
+typedef struct {
+    long long done;
+    size_t written;
+    int64_t failed;
+    int status;
+} Outcome;
+
+static Outcome take_block(Plan *plan, const Block *block)
+{
+    Outcome outcome = {0, 0, -1, 0};
+    size_t width = plan->value_count + 1;
+    long long k = block->first, wait = block->every - k % block->every;
+    for (; outcome.done < block->count; outcome.done++) {
+        int is_due = wait == 1 || k + 1 == block->last;
+        if (is_due && outcome.written == block->capacity) {
+            break;
+        }
+        outcome.failed = advance(plan, block->start + (double)k * block->step, block->step, &outcome.status);
+        if (outcome.failed >= 0) {
+            break;
+        }
+        k++;
+        wait = wait > 1 ? wait - 1 : block->every;
+        remember(plan);
+        if (is_due) {
+            double *row = block->rows + outcome.written * width;
+            row[0] = block->start + (double)k * block->step;
+            memcpy(row + 1, plan->values, plan->value_count * sizeof(double));
+            outcome.written++;
+        }
+    }
+    return outcome;
+}
+
+/* --------------------------------------------------------------------------------------------- from arrays to a plan */
+
+/* Buffers in the sequence of the arguments, and the size of what they hold; `values` and what follows is written. */
+enum { OPERATIONS, CHANNELS, INSTANCES, ENTRIES, REFERENCES, VALUES, HISTORY, ROWS, N_BUFFERS };
+static const char *const buffer_names[N_BUFFERS] = {
+    "operations", "channels", "instances", "entries", "references", "values", "history", "rows",
+};
+static const size_t buffer_sizes[N_BUFFERS] = {
+    sizeof(Operation), sizeof(Channel),  sizeof(Instance), sizeof(Entry),
+    sizeof(unsigned),  sizeof(double),   sizeof(double),   sizeof(double),
+};
+
+static size_t length(const Py_buffer *buffers, int which)
+{
+    return (size_t)buffers[which].len / buffer_sizes[which];
+}
+
+/* NULL with an exception unless every buffer can be what it is said to be. */
+static int check_buffers(const Py_buffer *buffers)
+{
+    for (int n = 0; n < N_BUFFERS; n++) {
+        size_t alignment = buffer_sizes[n] < sizeof(double) ? sizeof(int) : sizeof(double);
+        if (buffers[n].len > 0 &&
+            ((size_t)buffers[n].len % buffer_sizes[n] != 0 || (uintptr_t)buffers[n].buf % alignment != 0)) {
+            PyErr_Format(PyExc_ValueError, "kernel: %s is no aligned array of elements of %zu bytes", buffer_names[n],
+                         buffer_sizes[n]);
+            return 0;
+        }
+    }
+    if (length(buffers, REFERENCES) != length(buffers, ENTRIES)) {
+        PyErr_SetString(PyExc_ValueError, "kernel: there must be a reference for each of the entries");
+        return 0;
+    }
+    size_t value_count = length(buffers, VALUES);
+    if (value_count > 0 && length(buffers, HISTORY) % value_count != 0) {
+        PyErr_SetString(PyExc_ValueError, "kernel: the history must be whole rows of values");
+        return 0;
+    }
+    return 1;
+}
+
+static int is_within(int64_t begin, int64_t count, size_t length)
+{
+    return begin >= 0 && count >= 0 && (uint64_t)begin <= length && (uint64_t)count <= length - (uint64_t)begin;
+}
+
+/* Whether a channel's entries can be read (or, written, stand side by side among the values). */
+static int entries_fit(const Plan *plan, const Entry *entries, int64_t count, int is_written)
+{
+    for (int64_t k = 0; k < count; k++) {
+        const Entry *entry = &entries[k];
+        if (!is_within(entry->place, 1, plan->value_count) || entry->age < -1 ||
+            (entry->age >= 0 && (uint64_t)entry->age >= plan->depth) ||
+            (is_written && entry->place != entries[0].place + k)) {
+            return 0;
+        }
+    }
+    return 1;
+}
+
+/* Whether the values stand among the live ones as they are to be set. */
+static int are_in_place(const Entry *entries, int64_t count)
+{
+    for (int64_t k = 0; k < count; k++) {
+        if (entries[k].age >= 0 || entries[k].scale != 1.0 || entries[k].offset != 0.0 ||
+            entries[k].place != entries[0].place + k) {
+            return 0;
+        }
+    }
+    return count > 0;
+}
+
+/* One operation as a group of a single call; 0 if it points outside the plan. */
+static int resolve(const Plan *plan, const Py_buffer *buffers, const Operation *operation, Group *group, Call *call)
+{
+    *group = (Group){.begin = call, .end = call + 1};
+    *call = (Call){0};
+    if (operation->kind == OPERATION_STEP) {
+        if (!is_within(operation->index, 1, length(buffers, INSTANCES))) {
+            return 0;
+        }
+        const Instance *instance = (const Instance *)buffers[INSTANCES].buf + operation->index;
+        group->kind = STEP;
+        group->function = (uintptr_t)instance->function;
+        call->component = (void *)(uintptr_t)instance->component;
+        return group->function != 0;
+    }
+    int is_get = operation->kind == OPERATION_GET;
+    if ((!is_get && operation->kind != OPERATION_SET) ||
+        !is_within(operation->index, 1, length(buffers, CHANNELS))) {
+        return 0;
+    }
+    const Channel *channel = (const Channel *)buffers[CHANNELS].buf + operation->index;
+    if (!is_within(channel->begin, channel->count, length(buffers, ENTRIES))) {
+        return 0;
+    }
+    const Entry *entries = (const Entry *)buffers[ENTRIES].buf + channel->begin;
+    if (!entries_fit(plan, entries, channel->count, is_get)) {
+        return 0;
+    }
+    int in_place = channel->is_real && (is_get || are_in_place(entries, channel->count));
+    group->kind = in_place ? (is_get ? GET_REALS : SET_REALS_IN_PLACE)
+                           : (is_get ? GET_INTEGERS : channel->is_real ? SET_REALS : SET_INTEGERS);
+    group->function = (uintptr_t)channel->function;
+    group->references = (const unsigned int *)buffers[REFERENCES].buf + channel->begin;
+    group->count = (size_t)channel->count;
+    call->component = (void *)(uintptr_t)channel->component;
+    call->values = plan->values + (channel->count > 0 && (in_place || is_get) ? entries[0].place : 0);
+    call->entries = entries;
+    return group->function != 0;
+}
+
+static int are_alike(const Group *a, const Group *b)
+{
+    return a->kind == b->kind && a->function == b->function && a->count == b->count &&
+           (a->count == 0 || memcmp(a->references, b->references, a->count * sizeof *a->references) == 0);
+}
+
+static void free_plan(Plan *plan)
+{
+    free(plan->calls);
+    free(plan->groups);
+    free(plan->reals);
+    free(plan->integers);
+}
+
+/* 0 with an exception if the plan is not sound. */
+static int make_plan(Plan *plan, const Py_buffer *buffers, Py_ssize_t newest)
+{
+    const Operation *operations = buffers[OPERATIONS].buf;
+    size_t count = length(buffers, OPERATIONS), largest = 1;
+    plan->values = buffers[VALUES].buf;
+    plan->value_count = length(buffers, VALUES);
+    plan->history = buffers[HISTORY].buf;
+    plan->depth = plan->value_count ? length(buffers, HISTORY) / plan->value_count : 0;
+    plan->newest = (size_t)newest;
+    plan->calls = calloc(count + 1, sizeof *plan->calls);
+    plan->groups = calloc(count + 1, sizeof *plan->groups);
+    if (plan->calls == NULL || plan->groups == NULL) {
+        PyErr_NoMemory();
+        return 0;
+    }
+    for (size_t n = 0; n < count; n++) {
+        Group *group = &plan->groups[plan->group_count];
+        if (!resolve(plan, buffers, &operations[n], group, &plan->calls[n])) {
+            PyErr_Format(PyExc_ValueError, "kernel: operation %zu does not fit the plan", n);
+            return 0;
+        }
+        largest = group->count > largest ? group->count : largest;
+        if (n > 0 && are_alike(group - 1, group)) {
+            group[-1].end++;
+        } else {
+            plan->group_count++;
+        }
+    }
+    plan->reals = malloc(largest * sizeof *plan->reals);
+    plan->integers = malloc(largest * sizeof *plan->integers);
+    if (plan->reals == NULL || plan->integers == NULL) {
+        PyErr_NoMemory();
+        return 0;
+    }
+    return 1;
 }
 
 PyDoc_STRVAR(run_doc,
     "run(operations, channels, instances, entries, references, values, history, newest, rows, every,\n"
     "    start, step, first, count, last) -> (done, written, failed, status, newest)\n\n"
     "Take up to `count` communication steps from number `first`. Rows (time, values) are written for every `every`-th\n"
-    "step and for step number `last`. `failed` is the operation that ended the block, -1 if none did; its status is the\n"
-    "FMI status, or -1 for a value that is not finite.");
+    "step and for step number `last`; the block ends before a row for which there is no room. `failed` is the operation\n"
+    "that ended the block, -1 if none did, and `status` its FMI status; of ok or warning, a value is not finite.");
 
 static PyObject *run(PyObject *module, PyObject *arguments)
 {
-    enum { OPERATIONS, CHANNELS, INSTANCES, ENTRIES, REFERENCES, VALUES, HISTORY, ROWS, N_BUFFERS };
     Py_buffer b[N_BUFFERS];
+    Block block;
     Py_ssize_t newest;
-    long long every, first, count, last;
-    double start, step;
     PyObject *result = NULL;
     (void)module;
     if (!PyArg_ParseTuple(arguments, "y*y*y*y*y*w*w*nw*LddLLL:run", &b[OPERATIONS], &b[CHANNELS], &b[INSTANCES],
-                          &b[ENTRIES], &b[REFERENCES], &b[VALUES], &b[HISTORY], &newest, &b[ROWS], &every, &start, &step,
-                          &first, &count, &last)) {
+                          &b[ENTRIES], &b[REFERENCES], &b[VALUES], &b[HISTORY], &newest, &b[ROWS], &block.every,
+                          &block.start, &block.step, &block.first, &block.count, &block.last)) {
         return NULL;
     }
-    size_t value_count = (size_t)b[VALUES].len / sizeof(double);
-    size_t entry_count = (size_t)b[ENTRIES].len / sizeof(Entry);
-    size_t width = value_count + 1;
-    size_t capacity = (size_t)b[ROWS].len / (width * sizeof(double));
-    Plan plan = {
-        .operations = b[OPERATIONS].buf,
-        .operation_count = (size_t)b[OPERATIONS].len / sizeof(Operation),
-        .channels = b[CHANNELS].buf,
-        .instances = b[INSTANCES].buf,
-        .entries = b[ENTRIES].buf,
-        .references = b[REFERENCES].buf,
-        .values = b[VALUES].buf,
-        .value_count = value_count,
-        .history = b[HISTORY].buf,
-        .depth = value_count ? (size_t)b[HISTORY].len / (value_count * sizeof(double)) : 0,
-        .newest = (size_t)newest,
-        .reals = malloc((entry_count + 1) * sizeof(double)),
-        .integers = malloc((entry_count + 1) * sizeof(int)),
-    };
-    if (plan.reals == NULL || plan.integers == NULL) {
-        PyErr_NoMemory();
-    } else if (every < 1 || (plan.depth > 0 && plan.newest >= plan.depth)) {
-        PyErr_SetString(PyExc_ValueError, "kernel: every and newest must fit the plan");
-    } else if (has_size(&b[REFERENCES], entry_count, sizeof(unsigned int), "references")) {
-        double *rows = b[ROWS].buf;
-        size_t written = 0;
-        long long done = 0;
-        int64_t failed = -1;
-        int status = 0;
-        Py_BEGIN_ALLOW_THREADS
-        while (done < count && written < capacity) {
-            long long k = first + done;
-            failed = advance(&plan, start + (double)k * step, step, &status);
-            if (failed >= 0) {
-                break;
-            }
-            done++;
-            k++;
-            if (plan.depth > 0) {
-                plan.newest = (plan.newest + 1) % plan.depth;
-                memcpy(plan.history + plan.newest * value_count, plan.values, value_count * sizeof(double));
-            }
-            if (k % every == 0 || k == last) {
-                rows[written * width] = start + (double)k * step;
-                memcpy(rows + written * width + 1, plan.values, value_count * sizeof(double));
-                written++;
-            }
+    Plan plan = {0};
+    if (check_buffers(b) && make_plan(&plan, b, newest)) {
+        if (block.every < 1 || block.first < 0 || block.count < 0 || block.count > INT64_MAX - block.first ||
+            newest < 0 || (plan.depth > 0 && plan.newest >= plan.depth)) {
+            PyErr_SetString(PyExc_ValueError, "kernel: every, first, count and newest must fit the plan");
+        } else {
+            Outcome outcome;
+            block.rows = b[ROWS].buf;
+            block.capacity = length(b, ROWS) / (plan.value_count + 1);
+            Py_BEGIN_ALLOW_THREADS
+            outcome = take_block(&plan, &block);
+            Py_END_ALLOW_THREADS
+            result = Py_BuildValue("(LnLin)", outcome.done, (Py_ssize_t)outcome.written, (long long)outcome.failed,
+                                   outcome.status, (Py_ssize_t)plan.newest);
         }
-        Py_END_ALLOW_THREADS
-        result = Py_BuildValue("(LnLin)", done, (Py_ssize_t)written, (long long)failed, status, (Py_ssize_t)plan.newest);
     }
-    free(plan.reals);
-    free(plan.integers);
+    free_plan(&plan);
     for (int n = 0; n < N_BUFFERS; n++) {
         PyBuffer_Release(&b[n]);
     }

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 from collections import deque
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -89,24 +89,28 @@ class Master:
         self.algorithm = algorithm
         self.signals: list[str] = []
         """Names of the values, in the order in which they are recorded."""
-        self.values: list[Any] = []
         self.steps = 0
         """Communication steps taken."""
         self._starts = starts
-        self._links = links
         index: dict[tuple[str, str], int] = {}
-        self.yields = {name: self._plan_outputs(slave, index) for name, slave in slaves.items()}
+        wanted: dict[str, set[str]] = {name: set() for name in slaves}
+        incoming: dict[str, list[Link]] = {name: [] for name in slaves}
+        for link in links:
+            wanted[link.source[0]].add(link.source[1])
+            incoming[link.target[0]].append(link)
+        self.yields = {name: self._plan_outputs(slave, wanted[name], index) for name, slave in slaves.items()}
+        self.values: list[Any] = [0.0] * len(self.signals)
         deepest = max((link.delay for link in links), default=0)
         self.depth = deepest + 1 if deepest else 0
         """How many recorded points delayed connections look back on, the present one included."""
         self._history: deque[list[Any]] = deque(maxlen=self.depth)
-        self.feeds = {name: self._plan_inputs(slave, index) for name, slave in slaves.items()}
+        self.feeds = {name: self._plan_inputs(slave, incoming[name], index) for name, slave in slaves.items()}
         self.sequence = [slaves[name] for name in sequence]
 
     # ---------------------------------------------------------------- plan
 
-    def _plan_outputs(self, slave: Slave, index: dict[tuple[str, str], int]) -> list[Yield]:
-        wanted = {link.source[1] for link in self._links if link.source[0] == slave.name}
+    def _plan_outputs(self, slave: Slave, wanted: Collection[str], index: dict[tuple[str, str], int]) -> list[Yield]:
+        """Every output, and whatever else is connected."""
         shown = [v for v in slave.interface.variables.values() if v.causality == "output" or v.name in wanted]
         plan = []
         for kind in _types(v.type for v in shown):
@@ -116,11 +120,9 @@ class Master:
                 index[slave.name, name] = len(self.signals)
                 self.signals.append(f"{slave.name}.{name}")
             plan.append(Yield(slave.channel(kind, names), kind, begin, len(self.signals)))
-        self.values.extend([0.0] * (len(self.signals) - len(self.values)))
         return plan
 
-    def _plan_inputs(self, slave: Slave, index: dict[tuple[str, str], int]) -> list[Feed]:
-        mine = [link for link in self._links if link.target[0] == slave.name]
+    def _plan_inputs(self, slave: Slave, mine: Sequence[Link], index: Mapping[tuple[str, str], int]) -> list[Feed]:
         variables = slave.interface.variables
         plan = []
         for kind in _types(variables[link.target[1]].type for link in mine):

@@ -14,7 +14,9 @@ from numpy.typing import NDArray
 
 from .errors import ExpressionError, WindowError
 from .expressions import ELEMENTWISE, Expression, Function, Signals, parse
+from .platoon import PLATOON
 from .syntax import Call, Node, Number, Operation, Reference
+from .windows import Window, scalar, time_windows, window_of
 
 Array = NDArray[np.float64]
 
@@ -31,135 +33,28 @@ COMFORT_SCALE = (
 )
 
 
-@dataclass(frozen=True)
-class _Window:
-    """The rows (n, T) of a signal, the points of time (T,) and which of them, and of the intervals, count."""
-
-    rows: Array
-    time: Array
-    points: NDArray[np.bool_]  # (T,)
-    intervals: NDArray[np.bool_]  # (T-1,): both ends count and nothing between them is excluded
-
-    @property
-    def kept(self) -> Array:
-        return np.asarray(self.rows[:, self.points])
-
-    def reduce(self, rule: "Callable[[_Window], Any]") -> float:
-        """The rule's result, or NaN when there is a NaN among the points that count."""
-        return np.nan if np.isnan(self.kept).any() else float(rule(self))
-
-    def integral(self) -> Array:
-        """Trapezoid rule over the intervals that count, one value a row."""
-        areas = 0.5 * (self.rows[:, 1:] + self.rows[:, :-1]) * np.diff(self.time)
-        return np.asarray(areas[:, self.intervals].sum(axis=1))
-
-    def mean(self) -> Array:
-        """Time-weighted mean of each row."""
-        duration = np.diff(self.time)[self.intervals].sum()
-        return self.integral() / duration if duration > 0 else np.asarray(self.kept.mean(axis=1))
-
-    def times(self) -> Array:
-        """The times that count at which some row is not zero."""
-        return np.asarray(self.time[self.points][(self.kept != 0).any(axis=0)])
-
-    def slopes(self) -> Array:
-        """Difference quotients over the intervals that count, shape (n, intervals)."""
-        slopes = np.diff(self.rows, axis=1)[:, self.intervals] / np.diff(self.time)[self.intervals]
-        if not slopes.size:
-            raise WindowError("jerk needs two neighbouring recorded points in the window")
-        return np.asarray(slopes)
-
-
-def scalar(value: Any, what: str) -> float:
-    """A number out of an argument that must not vary over time.
-
-    Raises:
-        ExpressionError: it does, or it is a list or NaN.
-    """
-    numbers = np.asarray(value, dtype=np.float64).ravel()
-    if isinstance(value, list) or numbers.size == 0 or not np.all(numbers == numbers[0]):
-        raise ExpressionError(f"{what} must be one number, not a list or a signal that varies")
-    return float(numbers[0])
-
-
-def time_windows(outside: Any) -> list[tuple[float, float]]:
-    """The closed intervals [s] of an `outside` argument: `[210, 240]` or `[[0, 1], [210, 240]]`.
-
-    Raises:
-        ExpressionError: it is neither, or an interval ends before it starts.
-    """
-    pairs = outside if isinstance(outside, list) and all(isinstance(x, list) for x in outside) else [outside]
-    windows = []
-    for pair in pairs:
-        if not isinstance(pair, list) or len(pair) != 2:
-            raise ExpressionError("outside takes a window [from, to] or a list of them, as in outside = [210, 240]")
-        first, last = (scalar(end, "an end of outside") for end in pair)
-        if first > last:
-            raise ExpressionError(f"outside = [{first:g}, {last:g}] ends before it starts; swap the two")
-        windows.append((first, last))
-    return windows
-
-
-def select(
-    signals: Signals, after: float | None, until: float | None, outside: Sequence[tuple[float, float]]
-) -> NDArray[np.bool_]:
-    """Which recorded points lie in after <= t <= until and in none of the closed intervals `outside`; shape (T,).
-
-    A millionth of a step is forgiven, because 3 * 0.1 is not 0.3.
-    """
-    time, slack = signals.time, 1e-6 * signals.step
-    points = np.ones(time.shape, dtype=np.bool_)
-    if after is not None:
-        points &= time >= after - slack
-    if until is not None:
-        points &= time <= until + slack
-    for first, last in outside:
-        points &= ~((time >= first - slack) & (time <= last + slack))
-    return points
-
-
-def _window(signals: Signals, x: Any, after: Any = None, until: Any = None, outside: Any = None) -> _Window:
-    start = None if after is None else scalar(after, "after")
-    end = None if until is None else scalar(until, "until")
-    excluded = [] if outside is None else time_windows(outside)
-    if isinstance(x, list):
-        raise ExpressionError("a reducer works on a signal, not on a list")
-    time = signals.time
-    last = float(time[-1]) if time.size else -np.inf
-    if end is not None and end > last + 1e-6 * signals.step:
-        raise WindowError(f"the window lasts until {end:g} s but the recorded points end at {last:g} s")
-    points = select(signals, start, end, excluded)
-    if not points.any():
-        raise WindowError("no recorded point lies in the window; widen it, or record more often")
-    intervals = points[:-1] & points[1:]
-    for a, b in excluded:
-        intervals &= ~((time[:-1] <= b) & (time[1:] >= a))
-    values = np.atleast_2d(np.asarray(x, dtype=np.float64))
-    return _Window(np.broadcast_to(values, (values.shape[0], time.size)), time, points, intervals)
-
-
 def _largest(values: Array) -> float:
     """The value of largest magnitude with its sign: one number for rows that each have one."""
     return float(values[np.argmax(np.abs(values))])
 
 
-def _spread(window: _Window) -> float:
+def _spread(window: Window) -> float:
     return float((window.kept.max(axis=0) - window.kept.min(axis=0)).max())
 
 
-def _duration(window: _Window) -> float:
+def _duration(window: Window) -> float:
     return float(replace(window, rows=(window.rows != 0).astype(np.float64)).integral().max())
 
 
-def _rms(window: _Window) -> float:
+def _rms(window: Window) -> float:
     return float(np.sqrt(replace(window, rows=np.square(window.rows)).mean().max()))
 
 
-def _plain(rule: Callable[[_Window], Any]) -> Callable[..., float]:
+def _plain(rule: Callable[[Window], Any]) -> Callable[..., float]:
     """The common form of a reducer: one signal and the three window arguments."""
 
     def reducer(signals: Signals, x: Any, *, after: Any = None, until: Any = None, outside: Any = None) -> float:
-        return _window(signals, x, after, until, outside).reduce(rule)
+        return window_of(signals, x, after, until, outside).reduce(rule)
 
     return reducer
 
@@ -167,7 +62,7 @@ def _plain(rule: Callable[[_Window], Any]) -> Callable[..., float]:
 def _traction_energy(
     signals: Signals, force: Array, speed: Array, *, after: Any = None, until: Any = None, outside: Any = None
 ) -> float:
-    window = _window(signals, np.maximum(force * speed, 0.0), after, until, outside)
+    window = window_of(signals, np.maximum(force * speed, 0.0), after, until, outside)
     return window.reduce(lambda w: w.integral().sum())
 
 
@@ -182,7 +77,7 @@ def _at(signals: Signals, x: Any, t: Any) -> float:
     slack = 1e-6 * signals.step
     if not time.size or not time[0] - slack <= moment <= time[-1] + slack:
         raise WindowError(f"no recorded points around t = {moment:g} s")
-    values = np.array([np.interp(moment, time, row) for row in _window(signals, x).rows])
+    values = np.array([np.interp(moment, time, row) for row in window_of(signals, x).rows])
     return np.nan if np.isnan(values).any() else _largest(values)
 
 
@@ -191,24 +86,24 @@ def _settling_time(
 ) -> float:
     limit = scalar(band, "the band of settling_time")
 
-    def settled(window: _Window) -> float:
+    def settled(window: Window) -> float:
         times = window.time[window.points]
         beyond = np.flatnonzero((np.abs(window.kept) > limit).any(axis=0))
         first = int(beyond[-1]) + 1 if beyond.size else 0
         return float(times[first]) if first < times.size else np.inf
 
-    return _window(signals, x, after, until, outside).reduce(settled)
+    return window_of(signals, x, after, until, outside).reduce(settled)
 
 
 def _overshoot(
     signals: Signals, x: Array, reference: Array, *, after: Any = None, until: Any = None, outside: Any = None
 ) -> float:
-    def beyond(window: _Window) -> float:
+    def beyond(window: Window) -> float:
         # the side a row starts on tells which way is "over"; from a start on the reference both are
         side = -np.sign(window.kept[:, :1])
         return float(np.where(side == 0, np.abs(window.kept), side * window.kept).max(initial=0.0))
 
-    return _window(signals, x - reference, after, until, outside).reduce(beyond)
+    return window_of(signals, x - reference, after, until, outside).reduce(beyond)
 
 
 def _mean_jerk(
@@ -219,7 +114,7 @@ def _mean_jerk(
         raise ExpressionError("the window of mean_jerk must be longer than 0 s")
     excluded = [] if outside is None else time_windows(outside)
 
-    def steepest(seen: _Window) -> float:
+    def steepest(seen: Window) -> float:
         time = seen.time
         starts = seen.points & (time + width <= time[seen.points][-1] + slack)
         for a, b in excluded:
@@ -229,7 +124,7 @@ def _mean_jerk(
         later = np.array([np.interp(time[starts] + width, time, row) for row in seen.rows])
         return float(np.abs(later - seen.rows[:, starts]).max() / width)
 
-    return _window(signals, x, after, until, outside).reduce(steepest)
+    return window_of(signals, x, after, until, outside).reduce(steepest)
 
 
 def _at_sample(signals: Signals, x: Array) -> Array:
@@ -242,7 +137,7 @@ def _at_sample(signals: Signals, x: Array) -> Array:
 
 
 EVERY_STEP = "at_sample needs every communication step recorded; set record = step, or leave record out"
-_PLAIN: dict[str, tuple[str, Callable[[_Window], Any]]] = {  # name: unit, rule
+_PLAIN: dict[str, tuple[str, Callable[[Window], Any]]] = {  # name: unit, rule
     "min": ("same", lambda w: w.kept.min()),
     "max": ("same", lambda w: w.kept.max()),
     "peak": ("same", lambda w: np.abs(w.kept).max()),
@@ -271,6 +166,7 @@ REDUCERS: dict[str, Function] = {
     for name, (unit, call) in {
         **{name: (unit, _plain(rule)) for name, (unit, rule) in _PLAIN.items()},
         **_OTHERS,
+        **PLATOON,
     }.items()
 }
 FUNCTIONS: dict[str, Function] = {

@@ -15,8 +15,9 @@ from numpy.typing import NDArray
 
 from .errors import ExpressionError, WindowError, did_you_mean
 from .expressions import CONSTANTS, Expression, Scope, Signals, evaluate, evaluate_constant, parse
-from .metrics import EVERY_STEP, FUNCTIONS, select
+from .metrics import EVERY_STEP, FUNCTIONS
 from .syntax import Call, Name, Node, Number, Operation, Reference, walk
+from .windows import select
 
 QUANTIFIERS = ("always", "eventually", "finally")
 CLAUSES = ("from", "until", "outside")

@@ -12,6 +12,7 @@ class CruiseController(DavisResistance, ABC):
     """A cruise controller of one train that hears the trains ahead and behind, and the leader.
 
     A missing neighbour (``has_ahead`` false, and so on) contributes nothing: its position and speed are not read.
+    Values that came by radio carry their age; what the shipped controllers do about old ones: `GuardedCruise`.
     """
 
     position = Input("m", description="position of the own train")
@@ -23,6 +24,9 @@ class CruiseController(DavisResistance, ABC):
     behind_speed = Input("m/s", optional=True, description="speed of the train behind")
     leader_position = Input("m", optional=True, description="position of the first train")
     leader_speed = Input("m/s", optional=True, description="speed of the first train")
+    ahead_age = Input("s", optional=True, description="how old what is known of the train ahead is")
+    behind_age = Input("s", optional=True, description="how old what is known of the train behind is")
+    leader_age = Input("s", optional=True, description="how old what is known of the first train is")
     line_resistance = Input("N/kg", optional=True, description="resistance of slope, curve and tunnel per mass")
     has_ahead = Input("1", False, optional=True, description="whether there is a train ahead")
     has_behind = Input("1", False, optional=True, description="whether there is a train behind")

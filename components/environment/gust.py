@@ -18,6 +18,10 @@ class Gust(Component):
     """
 
     source = "window: Wang et al. 2020, section 4; size: chosen"
+    equations = (
+        r"$a(t) = -A$ for $t_1 \leq t < t_2$, else $a(t) = 0$,",
+        r"with acceleration $a$, size $A$, start_time $t_1$ and stop_time $t_2$.",
+    )
 
     size = Parameter("m/s2", 0.5, description="retarding force per mass in the window; negative pushes")
     start_time = Parameter("s", 210.0, description="begin of the window")

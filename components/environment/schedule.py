@@ -16,6 +16,12 @@ class Schedule(Component):
     Before the first breakpoint it has the first value, after the last one the last.
     """
 
+    equations = (
+        r"$y(t) = y_k$ for $t_k \leq t < t_{k+1}$, or where interpolate is set",
+        r"$y(t) = y_k + (y_{k+1} - y_k)\,\dfrac{t - t_k}{t_{k+1} - t_k}$,",
+        r"with the breakpoints $(t_k, y_k)$ given by times and values; $y(t) = y_1$ before the first of them.",
+    )
+
     unit = Data("m/s", description="unit of the signal")
     points = Size(1, description="number of breakpoints")
 

@@ -18,6 +18,12 @@ class PointMassTrain(DavisResistance, Train):
     """
 
     source = "Wang et al. 2020, eqs. 1-2, Tables 2-3"
+    equations = (
+        r"$\dot{s} = v, \qquad m\,\dot{v} = F - m R(v) - m\,r + m\,w, \qquad R(v) = c_0 + c_1 v + c_2 v^2$",
+        r"with position $s$, speed $v$, mass $m$, line_resistance $r$, disturbance $w$ and the applied force",
+        r"$F = \min(\max(f, -F_\mathrm{b}), F_\mathrm{t})$ where limit_force is set, else $F = f$,",
+        r"of the force asked for $f$, braking_limit $F_\mathrm{b}$ and traction_limit $F_\mathrm{t}$.",
+    )
 
     mass = Parameter("kg", 400e3, minimum=1.0, description="mass of the train")
     limit_force = Parameter("1", False, description="whether the two force limits act")

@@ -1,5 +1,6 @@
 /* The FMI 2.0 functions: who may call what and when, and the way between value references and values. */
 
+#include <float.h>
 #include <stdlib.h>
 #include <string.h>
 
@@ -13,7 +14,7 @@ static const char *phase_name(Phase phase)
     case PHASE_INITIALIZATION: return "in initialization mode";
     case PHASE_RUNNING: return "running";
     case PHASE_TERMINATED: return "terminated";
-    default: return "in error";
+    default: return "in error; it can be reset, restored to a saved state, or freed";
     }
 }
 
@@ -53,7 +54,7 @@ const char *fmi2GetVersion(void)
 static void refuse_instance(const fmi2CallbackFunctions *functions, fmi2String name, const char *why)
 {
     if (functions != NULL && functions->logger != NULL) {
-        functions->logger(functions->componentEnvironment, name, fmi2Error, log_categories[0], why);
+        functions->logger(functions->componentEnvironment, name, fmi2Error, log_categories[LOG_ERROR], why);
     }
 }
 
@@ -72,7 +73,8 @@ fmi2Component fmi2Instantiate(fmi2String instanceName, fmi2Type fmuType, fmi2Str
         return NULL;
     }
     if (fmuGUID == NULL || strcmp(fmuGUID, MODEL_GUID) != 0) {
-        refuse_instance(functions, instanceName, MODEL_NAME ": the GUID is not " MODEL_GUID ": model description and binary differ");
+        refuse_instance(functions, instanceName,
+                        MODEL_NAME ": the GUID is not " MODEL_GUID ": model description and binary differ");
         return NULL;
     }
     Instance *s = calloc(1, sizeof *s);
@@ -81,7 +83,10 @@ fmi2Component fmi2Instantiate(fmi2String instanceName, fmi2Type fmuType, fmi2Str
         return NULL;
     }
     strncpy(s->name, instanceName, sizeof s->name - 1);
-    s->callbacks = functions;
+    if (functions != NULL) {
+        s->logger = functions->logger;
+        s->environment = functions->componentEnvironment;
+    }
     s->debug = loggingOn != fmi2False;
     restart(s);
     tell_event(s, "instantiated");
@@ -101,19 +106,22 @@ void fmi2FreeInstance(fmi2Component c)
 fmi2Status fmi2SetDebugLogging(fmi2Component c, fmi2Boolean loggingOn, size_t nCategories, const fmi2String categories[])
 {
     Instance *s = enter(c, ANY_PHASE, "fmi2SetDebugLogging");
-    if (s == NULL || (nCategories > 0 && categories == NULL)) {
+    if (s == NULL) {
         return fmi2Error;
+    }
+    if (nCategories > 0 && categories == NULL) {
+        return fail(s, "fmi2SetDebugLogging: NULL for an array of %lu", (unsigned long)nCategories);
     }
     bool events = nCategories == 0;
     for (size_t k = 0; k < nCategories; k++) {
         bool known = false;
-        for (size_t n = 0; n < sizeof log_categories / sizeof log_categories[0] && categories[k] != NULL; n++) {
+        for (int n = 0; n < N_LOG_CATEGORIES && categories[k] != NULL; n++) {
             known = known || strcmp(categories[k], log_categories[n]) == 0;
         }
         if (!known) {
             return fail(s, "there is no log category %.100s", categories[k] == NULL ? "NULL" : categories[k]);
         }
-        events = events || strcmp(categories[k], log_categories[2]) == 0;
+        events = events || strcmp(categories[k], log_categories[LOG_EVENTS]) == 0;
     }
     s->debug = loggingOn != fmi2False && events;
     return fmi2OK;
@@ -128,8 +136,8 @@ fmi2Status fmi2SetupExperiment(fmi2Component c, fmi2Boolean toleranceDefined, fm
     if (s == NULL) {
         return fmi2Error;
     }
-    if (!isfinite(startTime) || (stopTimeDefined && !(stopTime > startTime))) {
-        return fail(s, "the experiment from %g s to %g s has no duration", startTime, stopTime);
+    if (!isfinite(startTime) || (stopTimeDefined && !(stopTime >= startTime))) {
+        return fail(s, "fmi2SetupExperiment: there is no experiment from %g s to %g s", startTime, stopTime);
     }
     s->time = s->start_time = s->last_successful_time = startTime;
     s->has_stop_time = stopTimeDefined != fmi2False;
@@ -156,7 +164,8 @@ fmi2Status fmi2ExitInitializationMode(fmi2Component c)
     }
     for (int n = 0; n < N_VARIABLES; n++) {
         Role role = model_variables[n].role;
-        if ((role == ROLE_FIXED || role == ROLE_TUNABLE) && check_bounds(s, n) != fmi2OK) {
+        if ((role == ROLE_FIXED || role == ROLE_TUNABLE) &&
+            check_bounds(s, &model_variables[n], s->values[n]) != fmi2OK) {
             return broken(s);
         }
     }
@@ -178,8 +187,11 @@ fmi2Status fmi2Terminate(fmi2Component c)
     s->phase = PHASE_TERMINATED;
 #if N_TAPE > 0
     const char *path = s->texts[model_variables[TAPE_FILE].text];
-    if (path[0] != '\0' && (tape_commit(s) != fmi2OK || tape_save(s, path) != fmi2OK)) {
-        return broken(s);
+    if (path[0] != '\0') {
+        tape_commit(s);
+        if (tape_save(s, path) != fmi2OK) {
+            return broken(s);
+        }
     }
 #endif
     return fmi2OK;
@@ -311,68 +323,70 @@ fmi2Status fmi2GetString(fmi2Component c, const fmi2ValueReference vr[], size_t 
     return fmi2OK;
 }
 
-/* Whether a variable may be set now. */
-static fmi2Status check_settable(Instance *s, fmi2ValueReference reference, Type type, const char *call)
+enum { SETTABLE = PHASE_INSTANTIATED | PHASE_INITIALIZATION | PHASE_RUNNING };
+
+/* The variable behind a value reference if it may be set now, or NULL with a message. */
+static const Variable *settable(Instance *s, fmi2ValueReference reference, Type type, const char *call)
 {
     if (is_rate(reference, type)) {
-        return fail(s, "%s: a rate is computed and cannot be set", call);
+        fail(s, "%s: a rate is computed and cannot be set", call);
+        return NULL;
     }
     const Variable *variable = find(s, reference, type, call);
     if (variable == NULL) {
-        return fmi2Error;
+        return NULL;
     }
     if (variable->role == ROLE_OUTPUT || variable->role == ROLE_COMPUTED) {
-        return fail(s, "%s: %s is computed and cannot be set", call, variable->name);
+        fail(s, "%s: %s is computed and cannot be set", call, variable->name);
+        return NULL;
     }
     if ((variable->role == ROLE_FIXED || variable->role == ROLE_START) && s->phase == PHASE_RUNNING) {
-        return fail(s, "%s: %s is %s; it can only be set before the run begins", call, variable->name,
-                    variable->role == ROLE_FIXED ? "a fixed parameter" : "a start value");
+        fail(s, "%s: %s is %s; it can only be set before the run begins", call, variable->name,
+             variable->role == ROLE_FIXED ? "a fixed parameter" : "a start value");
+        return NULL;
     }
-    return fmi2OK;
+    return variable;
 }
 
-static fmi2Status begin_set(Instance *s, const fmi2ValueReference vr[], size_t nvr, const void *value, Type type,
-                            const char *call)
+/* Whether a variable may be set now, to this number; a tunable parameter is held to its bounds at once. */
+static fmi2Status check_value(Instance *s, fmi2ValueReference reference, Type type, double value, const char *call)
+{
+    const Variable *variable = settable(s, reference, type, call);
+    if (variable == NULL) {
+        return fmi2Error;
+    }
+    if (!isfinite(value)) {
+        return fail(s, "%s: %s takes a finite number, not %g", call, variable->name, value);
+    }
+    return s->phase == PHASE_RUNNING && variable->role == ROLE_TUNABLE ? check_bounds(s, variable, value) : fmi2OK;
+}
+
+static fmi2Status begin_set(Instance *s, const fmi2ValueReference vr[], size_t nvr, const void *value, const char *call)
 {
     if (s == NULL) {
         return fmi2Error;
     }
-    if (nvr > 0 && (vr == NULL || value == NULL)) {
-        return fail(s, "%s: NULL for an array of %lu", call, (unsigned long)nvr);
-    }
-    for (size_t k = 0; k < nvr; k++) {
-        if (check_settable(s, vr[k], type, call) != fmi2OK) {
-            return fmi2Error;
-        }
-    }
-    return fmi2OK;
+    return nvr > 0 && (vr == NULL || value == NULL)
+               ? fail(s, "%s: NULL for an array of %lu", call, (unsigned long)nvr)
+               : fmi2OK;
 }
 
-/* Put one number among the values; a tunable parameter is held to its bounds at once. */
-static fmi2Status assign(Instance *s, fmi2ValueReference reference, double value)
+static void assign(Instance *s, fmi2ValueReference reference, double value)
 {
-    double before = s->values[reference];
     s->values[reference] = value;
     s->fresh = s->prepared = false;
-    if (s->phase == PHASE_RUNNING && model_variables[reference].role == ROLE_TUNABLE &&
-        check_bounds(s, (int)reference) != fmi2OK) {
-        s->values[reference] = before;
-        return fmi2Error;
-    }
-    return fmi2OK;
 }
 
-enum { SETTABLE = PHASE_INSTANTIATED | PHASE_INITIALIZATION | PHASE_RUNNING };
-
+/* All values are looked at before the first is taken: a refused call changes nothing. */
 fmi2Status fmi2SetReal(fmi2Component c, const fmi2ValueReference vr[], size_t nvr, const fmi2Real value[])
 {
     Instance *s = enter(c, SETTABLE, "fmi2SetReal");
-    fmi2Status status = begin_set(s, vr, nvr, value, TYPE_REAL, "fmi2SetReal");
+    fmi2Status status = begin_set(s, vr, nvr, value, "fmi2SetReal");
     for (size_t k = 0; k < nvr && status == fmi2OK; k++) {
-        if (!isfinite(value[k])) {
-            return fail(s, "fmi2SetReal: %s takes a finite number, not %g", model_variables[vr[k]].name, value[k]);
-        }
-        status = assign(s, vr[k], value[k]);
+        status = check_value(s, vr[k], TYPE_REAL, value[k], "fmi2SetReal");
+    }
+    for (size_t k = 0; k < nvr && status == fmi2OK; k++) {
+        assign(s, vr[k], value[k]);
     }
     return status;
 }
@@ -380,9 +394,12 @@ fmi2Status fmi2SetReal(fmi2Component c, const fmi2ValueReference vr[], size_t nv
 fmi2Status fmi2SetInteger(fmi2Component c, const fmi2ValueReference vr[], size_t nvr, const fmi2Integer value[])
 {
     Instance *s = enter(c, SETTABLE, "fmi2SetInteger");
-    fmi2Status status = begin_set(s, vr, nvr, value, TYPE_INTEGER, "fmi2SetInteger");
+    fmi2Status status = begin_set(s, vr, nvr, value, "fmi2SetInteger");
     for (size_t k = 0; k < nvr && status == fmi2OK; k++) {
-        status = assign(s, vr[k], (double)value[k]);
+        status = check_value(s, vr[k], TYPE_INTEGER, (double)value[k], "fmi2SetInteger");
+    }
+    for (size_t k = 0; k < nvr && status == fmi2OK; k++) {
+        assign(s, vr[k], (double)value[k]);
     }
     return status;
 }
@@ -390,9 +407,12 @@ fmi2Status fmi2SetInteger(fmi2Component c, const fmi2ValueReference vr[], size_t
 fmi2Status fmi2SetBoolean(fmi2Component c, const fmi2ValueReference vr[], size_t nvr, const fmi2Boolean value[])
 {
     Instance *s = enter(c, SETTABLE, "fmi2SetBoolean");
-    fmi2Status status = begin_set(s, vr, nvr, value, TYPE_BOOLEAN, "fmi2SetBoolean");
+    fmi2Status status = begin_set(s, vr, nvr, value, "fmi2SetBoolean");
     for (size_t k = 0; k < nvr && status == fmi2OK; k++) {
-        status = assign(s, vr[k], value[k] != fmi2False ? 1.0 : 0.0);
+        status = check_value(s, vr[k], TYPE_BOOLEAN, 0.0, "fmi2SetBoolean");
+    }
+    for (size_t k = 0; k < nvr && status == fmi2OK; k++) {
+        assign(s, vr[k], value[k] != fmi2False ? 1.0 : 0.0);
     }
     return status;
 }
@@ -400,14 +420,20 @@ fmi2Status fmi2SetBoolean(fmi2Component c, const fmi2ValueReference vr[], size_t
 fmi2Status fmi2SetString(fmi2Component c, const fmi2ValueReference vr[], size_t nvr, const fmi2String value[])
 {
     Instance *s = enter(c, SETTABLE, "fmi2SetString");
-    fmi2Status status = begin_set(s, vr, nvr, value, TYPE_STRING, "fmi2SetString");
+    fmi2Status status = begin_set(s, vr, nvr, value, "fmi2SetString");
     for (size_t k = 0; k < nvr && status == fmi2OK; k++) {
-        const Variable *variable = &model_variables[vr[k]];
-        if (value[k] == NULL || strlen(value[k]) >= MAX_TEXT) {
-            return fail(s, "fmi2SetString: %s takes a text of at most %d characters", variable->name, MAX_TEXT - 1);
+        const Variable *variable = settable(s, vr[k], TYPE_STRING, "fmi2SetString");
+        if (variable == NULL) {
+            return fmi2Error;
         }
-        memset(s->texts[variable->text], 0, MAX_TEXT);
-        memcpy(s->texts[variable->text], value[k], strlen(value[k]));
+        if (value[k] == NULL || strlen(value[k]) >= MAX_TEXT) {
+            return fail(s, "fmi2SetString: %s takes a text of at most %d bytes", variable->name, MAX_TEXT - 1);
+        }
+    }
+    for (size_t k = 0; k < nvr && status == fmi2OK; k++) {
+        char *text = s->texts[model_variables[vr[k]].text];
+        memset(text, 0, MAX_TEXT); /* equal states are equal bytes */
+        memcpy(text, value[k], strlen(value[k]));
         s->fresh = s->prepared = false;
     }
     return status;
@@ -424,14 +450,17 @@ fmi2Status fmi2DoStep(fmi2Component c, fmi2Real currentCommunicationPoint, fmi2R
     if (s == NULL) {
         return fmi2Error;
     }
+    /* A communication point is told with a few roundings; the last step of a time that was summed up may end far more
+       of them past the stop time. */
+    double rounding = 1e-6 * h + 4.0 * DBL_EPSILON * fabs(s->time);
     if (!(h > 0.0) || !isfinite(h)) {
         return fail(s, "fmi2DoStep: a communication step must be positive, not %g s", h);
     }
-    if (!(fabs(currentCommunicationPoint - s->time) <= 1e-6 * h)) {
+    if (!(fabs(currentCommunicationPoint - s->time) <= rounding)) {
         return fail(s, "fmi2DoStep: the communication point %.17g s does not continue the last one, %.17g s",
                     currentCommunicationPoint, s->time);
     }
-    if (s->has_stop_time && currentCommunicationPoint + h > s->stop_time + 1e-6 * h) {
+    if (s->has_stop_time && currentCommunicationPoint + h > s->stop_time + 1e-3 * h + rounding) {
         return fail(s, "fmi2DoStep: the step to %.17g s goes past the stop time %.17g s", currentCommunicationPoint + h,
                     s->stop_time);
     }
@@ -482,7 +511,7 @@ fmi2Status fmi2GetStatus(fmi2Component c, const fmi2StatusKind kind, fmi2Status 
     Instance *s = enter(c, ANY_PHASE, "fmi2GetStatus");
     (void)value;
     (void)kind;
-    return s == NULL ? fmi2Error : fail(s, "fmi2GetStatus: steps are not asynchronous");
+    return s == NULL ? fmi2Error : no_status(s, "fmi2GetStatus: steps are not asynchronous");
 }
 
 fmi2Status fmi2GetRealStatus(fmi2Component c, const fmi2StatusKind kind, fmi2Real *value)
@@ -492,7 +521,7 @@ fmi2Status fmi2GetRealStatus(fmi2Component c, const fmi2StatusKind kind, fmi2Rea
         return fmi2Error;
     }
     if (kind != fmi2LastSuccessfulTime || value == NULL) {
-        return fail(s, "fmi2GetRealStatus: only fmi2LastSuccessfulTime is known");
+        return no_status(s, "fmi2GetRealStatus: only fmi2LastSuccessfulTime is known");
     }
     *value = s->last_successful_time;
     return fmi2OK;
@@ -503,7 +532,7 @@ fmi2Status fmi2GetIntegerStatus(fmi2Component c, const fmi2StatusKind kind, fmi2
     Instance *s = enter(c, ANY_PHASE, "fmi2GetIntegerStatus");
     (void)kind;
     (void)value;
-    return s == NULL ? fmi2Error : fail(s, "fmi2GetIntegerStatus: no such status");
+    return s == NULL ? fmi2Error : no_status(s, "fmi2GetIntegerStatus: there is none");
 }
 
 fmi2Status fmi2GetBooleanStatus(fmi2Component c, const fmi2StatusKind kind, fmi2Boolean *value)
@@ -513,7 +542,7 @@ fmi2Status fmi2GetBooleanStatus(fmi2Component c, const fmi2StatusKind kind, fmi2
         return fmi2Error;
     }
     if (kind != fmi2Terminated || value == NULL) {
-        return fail(s, "fmi2GetBooleanStatus: only fmi2Terminated is known");
+        return no_status(s, "fmi2GetBooleanStatus: only fmi2Terminated is known");
     }
     *value = fmi2False; /* the model never ends a run by itself */
     return fmi2OK;
@@ -524,7 +553,7 @@ fmi2Status fmi2GetStringStatus(fmi2Component c, const fmi2StatusKind kind, fmi2S
     Instance *s = enter(c, ANY_PHASE, "fmi2GetStringStatus");
     (void)kind;
     (void)value;
-    return s == NULL ? fmi2Error : fail(s, "fmi2GetStringStatus: no such status");
+    return s == NULL ? fmi2Error : no_status(s, "fmi2GetStringStatus: there is none");
 }
 
 /* ----------------------------------------------------------------------------------------------------- saved states */
@@ -532,12 +561,15 @@ fmi2Status fmi2GetStringStatus(fmi2Component c, const fmi2StatusKind kind, fmi2S
 fmi2Status fmi2GetFMUstate(fmi2Component c, fmi2FMUstate *state)
 {
     Instance *s = enter(c, ANY_PHASE, "fmi2GetFMUstate");
-    if (s == NULL || state == NULL) {
+    if (s == NULL) {
         return fmi2Error;
+    }
+    if (state == NULL) {
+        return fail(s, "fmi2GetFMUstate: NULL instead of a place for the state");
     }
     /* A state handed in is overwritten, and its memory reused where it fits. */
     State *block = *state;
-    if (block == NULL || block->size != state_size(s)) {
+    if (block == NULL || block->head.size != state_size(s)) {
         free(block);
         *state = block = malloc(state_size(s));
         if (block == NULL) {
@@ -579,7 +611,7 @@ fmi2Status fmi2SerializedFMUstateSize(fmi2Component c, fmi2FMUstate state, size_
     if (state == NULL || size == NULL) {
         return fail(s, "fmi2SerializedFMUstateSize: NULL is no state");
     }
-    *size = ((const State *)state)->size;
+    *size = ((const State *)state)->head.size;
     return fmi2OK;
 }
 
@@ -589,18 +621,22 @@ fmi2Status fmi2SerializeFMUstate(fmi2Component c, fmi2FMUstate state, fmi2Byte b
     if (s == NULL) {
         return fmi2Error;
     }
-    if (state == NULL || bytes == NULL || size < ((const State *)state)->size) {
-        return fail(s, "fmi2SerializeFMUstate: a state of %lu bytes needs room",
-                    state == NULL ? 0UL : (unsigned long)((const State *)state)->size);
+    if (state == NULL || bytes == NULL) {
+        return fail(s, "fmi2SerializeFMUstate: NULL is no state");
     }
-    memcpy(bytes, state, ((const State *)state)->size);
+    size_t needed = ((const State *)state)->head.size;
+    if (size < needed) {
+        return fail(s, "fmi2SerializeFMUstate: the state has %lu bytes, there is room for %lu", (unsigned long)needed,
+                    (unsigned long)size);
+    }
+    memcpy(bytes, state, needed);
     return fmi2OK;
 }
 
 fmi2Status fmi2DeSerializeFMUstate(fmi2Component c, const fmi2Byte bytes[], size_t size, fmi2FMUstate *state)
 {
     Instance *s = enter(c, ANY_PHASE, "fmi2DeSerializeFMUstate");
-    State head;
+    StateHead head;
     if (s == NULL) {
         return fmi2Error;
     }
@@ -608,9 +644,7 @@ fmi2Status fmi2DeSerializeFMUstate(fmi2Component c, const fmi2Byte bytes[], size
         return fail(s, "fmi2DeSerializeFMUstate: %lu bytes are no saved state", (unsigned long)size);
     }
     memcpy(&head, bytes, sizeof head);
-    head.guid[sizeof head.guid - 1] = '\0';
-    if (strcmp(head.guid, MODEL_GUID) != 0 || head.version != STATE_VERSION || head.size > size || head.tape_rows < 0 ||
-        head.size != sizeof head + tape_bytes(head.tape_rows)) {
+    if (!is_ours(&head, size)) {
         return fail(s, "fmi2DeSerializeFMUstate: the bytes are no saved state of this model");
     }
     State *block = malloc(head.size);
@@ -618,7 +652,6 @@ fmi2Status fmi2DeSerializeFMUstate(fmi2Component c, const fmi2Byte bytes[], size
         return fail(s, "out of memory for a saved state");
     }
     memcpy(block, bytes, head.size);
-    free(*state);
     *state = block;
     return fmi2OK;
 }
@@ -636,10 +669,30 @@ static int unknown_place(fmi2ValueReference reference)
 }
 
 /* A state or memory that is shown as an output depends on itself alone. */
-static bool is_shown(fmi2ValueReference reference)
+static bool is_kept(fmi2ValueReference reference)
 {
-    int place = (int)reference - FIRST_STATE;
-    return place >= 0 && place < N_STATES + N_MEMORY && model_variables[reference].type == TYPE_REAL;
+    int state = (int)reference - FIRST_STATE, memory = (int)reference - FIRST_MEMORY;
+    bool kept = (state >= 0 && state < N_STATES) || (memory >= 0 && memory < N_MEMORY);
+    return kept && model_variables[reference].type == TYPE_REAL;
+}
+
+/* The direction at the present values. In initialization mode a start that is computed moves with what it follows from. */
+static fmi2Status complete_direction(Instance *s)
+{
+#if N_INITIAL > 0
+    if (s->phase == PHASE_INITIALIZATION) {
+        const double clock[2] = {s->time, s->step};
+        forget_computed_starts(s);
+        MODEL_INITIAL_DIRECTIONAL(clock, s->values, s->direction, s->scratch);
+        for (int k = 0; k < N_INITIAL; k++) {
+            s->direction[model_initial_targets[k]] = s->scratch[k];
+        }
+        return compute_starts(s);
+    }
+#else
+    (void)s;
+#endif
+    return fmi2OK;
 }
 
 fmi2Status fmi2GetDirectionalDerivative(fmi2Component c, const fmi2ValueReference vUnknown_ref[], size_t nUnknown,
@@ -647,7 +700,6 @@ fmi2Status fmi2GetDirectionalDerivative(fmi2Component c, const fmi2ValueReferenc
                                         fmi2Real dvUnknown[])
 {
     Instance *s = enter(c, READABLE, "fmi2GetDirectionalDerivative");
-    double seed[N_VALUES];
     if (s == NULL) {
         return fmi2Error;
     }
@@ -658,29 +710,30 @@ fmi2Status fmi2GetDirectionalDerivative(fmi2Component c, const fmi2ValueReferenc
     if (refresh(s) != fmi2OK) {
         return fmi2Error;
     }
-    memset(seed, 0, sizeof seed);
+    memset(s->direction, 0, sizeof s->direction);
     for (size_t k = 0; k < nKnown; k++) {
-        if (find(s, vKnown_ref[k], TYPE_REAL, "fmi2GetDirectionalDerivative") == NULL) {
+        const Variable *known = find(s, vKnown_ref[k], TYPE_REAL, "fmi2GetDirectionalDerivative");
+        if (known == NULL) {
             return fmi2Error;
         }
-        if (model_variables[vKnown_ref[k]].role == ROLE_OUTPUT) {
-            return fail(s, "fmi2GetDirectionalDerivative: %s is computed; it is no known",
-                        model_variables[vKnown_ref[k]].name);
+        if (known->role == ROLE_OUTPUT || (known->role == ROLE_COMPUTED && s->phase == PHASE_INITIALIZATION)) {
+            return fail(s, "fmi2GetDirectionalDerivative: %s is computed; it is no known", known->name);
         }
-        seed[vKnown_ref[k]] = dvKnown[k];
+        s->direction[vKnown_ref[k]] = dvKnown[k];
+    }
+    if (complete_direction(s) != fmi2OK) {
+        return fmi2Error;
     }
 #if N_OUTPUTS + N_STATES > 0
     const double clock[2] = {s->time, s->step};
-    const double *arguments[3] = {clock, s->values, seed};
-    double *results[1] = {s->scratch};
-    MODEL_DIRECTIONAL(arguments, results);
+    MODEL_DIRECTIONAL(clock, s->values, s->direction, s->scratch);
 #endif
     for (size_t k = 0; k < nUnknown; k++) {
         int place = unknown_place(vUnknown_ref[k]);
         if (place >= 0) {
             dvUnknown[k] = s->scratch[place];
-        } else if (is_shown(vUnknown_ref[k])) {
-            dvUnknown[k] = seed[vUnknown_ref[k]];
+        } else if (is_kept(vUnknown_ref[k])) {
+            dvUnknown[k] = s->direction[vUnknown_ref[k]];
         } else {
             return fail(s, "fmi2GetDirectionalDerivative: value reference %u is neither a real output nor a rate",
                         vUnknown_ref[k]);

@@ -38,6 +38,9 @@ typedef struct {
 
 enum { MAX_TEXT = 1024, MAX_MESSAGE = 1024 };
 
+/* One method's equations: `clock` is the time and the length of the sample. */
+typedef void Equations(const double *restrict clock, const double *restrict values, double *restrict result);
+
 /* Length of an array that may be empty: C has no arrays of length zero. */
 #define AT_LEAST_ONE(n) ((n) > 0 ? (n) : 1)
 
@@ -51,12 +54,16 @@ typedef enum {
     PHASE_ERROR = 16
 } Phase;
 
-/* The tape: two buffers of `rows` times N_TAPE numbers, allocated together when the initial state is prepared. */
+/* The tape: two buffers of `rows` times N_TAPE numbers, and a line to filter one column in; allocated together when the
+   initial state is prepared. */
 typedef struct {
     int rows;
     double sample_time;
+    double gain; /* of the low-pass between trips; 0 is off */
+    int pad;     /* samples of run-in on either side of a filtered column */
     double *committed;
     double *recording;
+    double *line;
     int first; /* first and last sample recorded on the present trip; first is -1 when there is none */
     int last;
     bool has_trip;
@@ -76,14 +83,23 @@ typedef struct {
     double step; /* length of the present sample, for the equations of update */
     double held[AT_LEAST_ONE(N_OUTPUTS)];
     double scratch[AT_LEAST_ONE(N_SCRATCH)];
+    double direction[N_VALUES]; /* of a directional derivative */
     double slopes[4][AT_LEAST_ONE(N_STATES)];
     double states[AT_LEAST_ONE(N_STATES)];
     char texts[AT_LEAST_ONE(N_TEXTS)][MAX_TEXT];
     Tape tape;
-    const fmi2CallbackFunctions *callbacks;
+    fmi2CallbackLogger logger;
+    fmi2ComponentEnvironment environment;
     bool debug;
     char name[MAX_TEXT];
     char message[MAX_MESSAGE];
 } Instance;
+
+/* Evaluate one method's equations with the present time and values. */
+static inline void call_equations(const Instance *s, Equations equations, double *result)
+{
+    const double clock[2] = {s->time, s->step};
+    equations(clock, s->values, result);
+}
 
 #endif

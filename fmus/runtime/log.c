@@ -4,7 +4,8 @@
 #include <stdio.h>
 #include <string.h>
 
-static const char *const log_categories[] = {"logStatusError", "logStatusWarning", "logEvents"};
+enum { LOG_ERROR, LOG_WARNING, LOG_EVENTS, N_LOG_CATEGORIES };
+static const char *const log_categories[N_LOG_CATEGORIES] = {"logStatusError", "logStatusWarning", "logEvents"};
 
 /* The importer reads a message as a printf format, and #r12# in it as a reference to a variable: double both signs. */
 static void escape(const char *from, char *to, size_t size)
@@ -19,14 +20,14 @@ static void escape(const char *from, char *to, size_t size)
     to[used] = '\0';
 }
 
-static void send(const Instance *s, fmi2Status status, const char *category, const char *text)
+static void send(const Instance *s, fmi2Status status, int category, const char *text)
 {
     char escaped[2 * MAX_MESSAGE];
-    if (s->callbacks == NULL || s->callbacks->logger == NULL) {
+    if (s->logger == NULL) {
         return;
     }
     escape(text, escaped, sizeof escaped);
-    s->callbacks->logger(s->callbacks->componentEnvironment, s->name, status, category, escaped);
+    s->logger(s->environment, s->name, status, log_categories[category], escaped);
 }
 
 /* Say what is wrong; the result is fmi2Error, for the caller to return. The remedy belongs into the message. */
@@ -40,13 +41,20 @@ static fmi2Status fail(Instance *s, const char *format, ...)
     int used = snprintf(s->message, sizeof s->message, "%s: ", MODEL_NAME);
     vsnprintf(s->message + used, sizeof s->message - (size_t)used, format, arguments);
     va_end(arguments);
-    send(s, fmi2Error, log_categories[0], s->message);
+    send(s, fmi2Error, LOG_ERROR, s->message);
     return fmi2Error;
+}
+
+/* The standard's answer to a question about the status that has none; nothing is wrong. */
+static fmi2Status no_status(const Instance *s, const char *text)
+{
+    send(s, fmi2Discard, LOG_WARNING, text);
+    return fmi2Discard;
 }
 
 static void tell_event(const Instance *s, const char *text)
 {
     if (s->debug) {
-        send(s, fmi2OK, log_categories[2], text);
+        send(s, fmi2OK, LOG_EVENTS, text);
     }
 }

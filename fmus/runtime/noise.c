@@ -88,11 +88,15 @@ static fmi2Status draw(Instance *s)
             return fail(s, "%s must be positive: a random number is held that long", model_variables[noise->hold].name);
         }
         /* A time that is a whole number of holds belongs to the new one whatever the rounding of k * step. */
-        int64_t index = (int64_t)floor(s->time / hold + 1e-6);
+        double interval = floor(s->time / hold + 1e-6);
+        if (!(fabs(interval) < 0x1p63)) {
+            return fail(s, "%s = %g s is too short: a random number is held that long",
+                        model_variables[noise->hold].name, hold);
+        }
+        uint64_t seed = (uint64_t)(int64_t)s->values[SEED], index = (uint64_t)(int64_t)interval;
         for (int k = 0; k < noise->count; k++) {
             uint64_t stream = noise->stream + ((uint64_t)k << 32);
-            s->values[noise->first + k] =
-                random_number(noise->normal, (uint64_t)(int64_t)s->values[SEED], stream, (uint64_t)index);
+            s->values[noise->first + k] = random_number(noise->normal, seed, stream, index);
         }
     }
     return fmi2OK;

@@ -4,16 +4,17 @@
 #include <math.h>
 #include <string.h>
 
-/* Evaluate one group of equations into a result; they take arrays of pointers. */
-static void call_equations(const Instance *s, Equations function, double *result)
+/* What a variable of this type can hold: whole numbers of 32 bits, truth values. */
+static bool fits(Type type, double value)
 {
-    const double clock[2] = {s->time, s->step};
-    const double *arguments[2] = {clock, s->values};
-    double *results[1] = {result};
-    function(arguments, results);
+    switch (type) {
+    case TYPE_INTEGER: return value == rint(value) && value >= -2147483648.0 && value <= 2147483647.0;
+    case TYPE_BOOLEAN: return value == 0.0 || value == 1.0;
+    default: return true;
+    }
 }
 
-/* Every result must be finite, and whole where its variable is an integer. */
+/* Every result must be finite, and one that its variable can hold. */
 static fmi2Status check_results(Instance *s, const char *method, int first, int count, const double *result)
 {
     for (int k = 0; k < count; k++) {
@@ -22,9 +23,9 @@ static fmi2Status check_results(Instance *s, const char *method, int first, int 
             return fail(s, "%s: '%s' is %g at t = %.17g s; guard the arguments it comes from", method, variable->name,
                         result[k], s->time);
         }
-        if (variable->type != TYPE_REAL && result[k] != rint(result[k])) {
-            return fail(s, "%s: '%s' is %.17g at t = %.17g s, not a whole number", method, variable->name, result[k],
-                        s->time);
+        if (!fits(variable->type, result[k])) {
+            return fail(s, "%s: '%s' is %.17g at t = %.17g s, which is no %s", method, variable->name, result[k],
+                        s->time, variable->type == TYPE_INTEGER ? "32-bit integer" : "boolean");
         }
     }
     return fmi2OK;
@@ -62,19 +63,17 @@ static fmi2Status evaluate(Instance *s, double elapsed)
     return fmi2OK;
 }
 
-/* Bring what follows from parameters, start values and inputs up to date with them. */
-static fmi2Status prepare(Instance *s)
-{
-    if (s->prepared) {
-        return fmi2OK;
-    }
 #if N_INITIAL > 0
+static void forget_computed_starts(Instance *s)
+{
     for (int k = 0; k < N_INITIAL; k++) {
         s->values[model_initial_targets[k]] = model_variables[model_initial_targets[k]].start;
     }
-    if (draw(s) != fmi2OK) {
-        return fmi2Error;
-    }
+}
+
+static fmi2Status compute_starts(Instance *s)
+{
+    forget_computed_starts(s);
     call_equations(s, MODEL_INITIAL, s->scratch);
     for (int k = 0; k < N_INITIAL; k++) {
         int target = model_initial_targets[k];
@@ -82,6 +81,23 @@ static fmi2Status prepare(Instance *s)
             return fmi2Error;
         }
         s->values[target] = s->scratch[k];
+    }
+    return fmi2OK;
+}
+#endif
+
+/* Bring what follows from parameters, start values and inputs up to date with them. */
+static fmi2Status prepare(Instance *s)
+{
+    if (s->prepared) {
+        return fmi2OK;
+    }
+    if (draw(s) != fmi2OK) {
+        return fmi2Error;
+    }
+#if N_INITIAL > 0
+    if (compute_starts(s) != fmi2OK) {
+        return fmi2Error;
     }
 #endif
 #if N_TAPE > 0
@@ -93,11 +109,9 @@ static fmi2Status prepare(Instance *s)
     return fmi2OK;
 }
 
-/* Parameters must lie within their declared bounds. */
-static fmi2Status check_bounds(Instance *s, int reference)
+/* A parameter must lie within its declared bounds. */
+static fmi2Status check_bounds(Instance *s, const Variable *variable, double value)
 {
-    const Variable *variable = &model_variables[reference];
-    double value = s->values[reference];
     if (variable->type != TYPE_STRING && (value < variable->minimum || value > variable->maximum)) {
         return fail(s, "%s = %g is outside [%g, %g]", variable->name, value, variable->minimum, variable->maximum);
     }
@@ -116,6 +130,9 @@ static fmi2Status integrate(Instance *s, double begin, double length)
 {
     double longest = s->values[MAX_STEP];
     double parts = longest > 0.0 ? ceil(length / longest - 1e-9) : 1.0;
+    if (!(parts < 2147483647.0)) {
+        return fail(s, "max_step = %g s is too short for a step of %g s", longest, length);
+    }
     int count = parts > 1.0 ? (int)parts : 1;
     double h = length / (double)count, half = 0.5 * h, sixth = h / 6.0;
     double *x = s->values + FIRST_STATE, *start = s->states;
@@ -158,11 +175,12 @@ static fmi2Status samples(Instance *s, double length, int *count, double *period
 {
     double declared = s->values[SAMPLE_TIME];
     double n = declared == 0.0 ? 1.0 : rint(length / declared);
+    if (declared != 0.0 && !(n >= 1.0 && n < 2147483647.0 && fabs(n * declared - length) <= 1e-6 * declared)) {
+        return fail(s, "the communication step %.17g s is not a whole multiple of sample_time = %.17g s", length,
+                    declared);
+    }
     *count = (int)n;
     *period = length / n;
-    if (declared != 0.0 && (n < 1.0 || fabs(n * declared - length) > 1e-6 * declared)) {
-        return fail(s, "the communication step %.17g s is not a whole multiple of sample_time = %.17g s", length, declared);
-    }
     return fmi2OK;
 }
 
@@ -213,8 +231,8 @@ static fmi2Status advance(Instance *s, double length)
 {
     double begin = s->time;
 #if IS_SAMPLED
-    int count;
-    double period;
+    int count = 1;
+    double period = length;
     if (samples(s, length, &count, &period) != fmi2OK) {
         return fmi2Error;
     }
@@ -246,9 +264,12 @@ static fmi2Status advance(Instance *s, double length)
     return fmi2OK;
 }
 
-/* Outputs as the present inputs make them. */
+/* Outputs as the present inputs make them; after an error the values stay as they are, to be looked at. */
 static fmi2Status refresh(Instance *s)
 {
+    if (s->phase == PHASE_ERROR) {
+        return fmi2OK;
+    }
     if (s->phase == PHASE_INITIALIZATION && prepare(s) != fmi2OK) {
         return fmi2Error;
     }

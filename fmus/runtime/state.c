@@ -3,13 +3,19 @@
 #include <stdlib.h>
 #include <string.h>
 
-enum { STATE_VERSION = 1 };
+enum { STATE_VERSION = 2 };
 
-/* The block's fixed part; the tape's two buffers follow it. */
+/* What tells a block from any other; small enough to be copied to the stack and looked at. */
 typedef struct {
     char guid[64];
     size_t size;
     int version;
+    int tape_rows;
+} StateHead;
+
+/* The block's fixed part; the tape's two buffers follow it. */
+typedef struct {
+    StateHead head;
     Phase phase;
     double time;
     double start_time;
@@ -18,14 +24,12 @@ typedef struct {
     bool has_stop_time;
     bool fresh;
     bool prepared;
-    double values[N_VALUES];
-    char texts[AT_LEAST_ONE(N_TEXTS)][MAX_TEXT];
-    int tape_rows;
-    int tape_first;
-    int tape_last;
     bool tape_has_trip;
     int tape_trip;
-    double tape_sample_time;
+    int tape_first;
+    int tape_last;
+    double values[N_VALUES];
+    char texts[AT_LEAST_ONE(N_TEXTS)][MAX_TEXT];
 } State;
 
 static size_t tape_bytes(int rows)
@@ -38,13 +42,20 @@ static size_t state_size(const Instance *s)
     return sizeof(State) + tape_bytes(s->tape.rows);
 }
 
+static bool is_ours(const StateHead *head, size_t size)
+{
+    return head->version == STATE_VERSION && strncmp(head->guid, MODEL_GUID, sizeof head->guid) == 0 &&
+           head->tape_rows >= 0 && head->size == sizeof(State) + tape_bytes(head->tape_rows) && head->size <= size;
+}
+
 /* Fill a block of state_size() bytes, padding included, so that equal states are equal bytes. */
 static void save_state(const Instance *s, State *state)
 {
     memset(state, 0, sizeof *state);
-    strncpy(state->guid, MODEL_GUID, sizeof state->guid - 1);
-    state->size = state_size(s);
-    state->version = STATE_VERSION;
+    strncpy(state->head.guid, MODEL_GUID, sizeof state->head.guid - 1);
+    state->head.size = state_size(s);
+    state->head.version = STATE_VERSION;
+    state->head.tape_rows = s->tape.rows;
     state->phase = s->phase;
     state->time = s->time;
     state->start_time = s->start_time;
@@ -53,14 +64,12 @@ static void save_state(const Instance *s, State *state)
     state->has_stop_time = s->has_stop_time;
     state->fresh = s->fresh;
     state->prepared = s->prepared;
-    memcpy(state->values, s->values, sizeof state->values);
-    memcpy(state->texts, s->texts, sizeof state->texts);
-    state->tape_rows = s->tape.rows;
-    state->tape_first = s->tape.first;
-    state->tape_last = s->tape.last;
     state->tape_has_trip = s->tape.has_trip;
     state->tape_trip = s->tape.trip;
-    state->tape_sample_time = s->tape.sample_time;
+    state->tape_first = s->tape.first;
+    state->tape_last = s->tape.last;
+    memcpy(state->values, s->values, sizeof state->values);
+    memcpy(state->texts, s->texts, sizeof state->texts);
     if (s->tape.rows > 0) {
         memcpy(state + 1, s->tape.committed, tape_bytes(s->tape.rows));
     }
@@ -68,17 +77,19 @@ static void save_state(const Instance *s, State *state)
 
 static fmi2Status restore_state(Instance *s, const State *state)
 {
-    if (strcmp(state->guid, MODEL_GUID) != 0 || state->version != STATE_VERSION) {
+    if (!is_ours(&state->head, state->head.size)) {
         return fail(s, "the saved state belongs to another model");
     }
+    memcpy(s->values, state->values, sizeof s->values);
+    memcpy(s->texts, state->texts, sizeof s->texts);
 #if N_TAPE > 0
-    if (state->tape_rows == 0) {
+    if (state->head.tape_rows == 0) {
         tape_free(&s->tape);
-    } else if (tape_allocate(s, state->tape_rows) != fmi2OK) {
+    } else if (tape_allocate(s, state->head.tape_rows) != fmi2OK) {
         return fmi2Error;
     }
-    if (state->tape_rows > 0) {
-        memcpy(s->tape.committed, state + 1, tape_bytes(state->tape_rows));
+    if (state->head.tape_rows > 0) {
+        memcpy(s->tape.committed, state + 1, tape_bytes(state->head.tape_rows));
     }
 #endif
     s->phase = state->phase;
@@ -89,12 +100,9 @@ static fmi2Status restore_state(Instance *s, const State *state)
     s->has_stop_time = state->has_stop_time;
     s->fresh = state->fresh;
     s->prepared = state->prepared;
-    memcpy(s->values, state->values, sizeof s->values);
-    memcpy(s->texts, state->texts, sizeof s->texts);
-    s->tape.first = state->tape_first;
-    s->tape.last = state->tape_last;
     s->tape.has_trip = state->tape_has_trip;
     s->tape.trip = state->tape_trip;
-    s->tape.sample_time = state->tape_sample_time;
+    s->tape.first = state->tape_first;
+    s->tape.last = state->tape_last;
     return fmi2OK;
 }

@@ -1,7 +1,7 @@
 /* The tape: memory along one trip that the next trip reads at the same sample. components/tape.py says it in Python;
    the file format is the same, so that a file written by either kind of FMU is read by the other. */
 
-#include <locale.h>
+#include <errno.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
@@ -14,8 +14,6 @@ static bool waiting(const Instance *s, double trip_time)
 }
 
 /* The sample along the trip into *index; -1 while waiting. */
-static void call_equations(const Instance *s, Equations function, double *result);
-
 static fmi2Status tape_index(Instance *s, double trip_time, int *index)
 {
     const Tape *tape = &s->tape;
@@ -60,37 +58,31 @@ static fmi2Status tape_record(Instance *s, double trip_time, const double *row)
     return fmi2OK;
 }
 
-/* A sample of one column continued beyond its ends by odd reflection. */
-static double reflected(const double *column, int count, int n)
+/* A sample of one column of `count` > 1, continued beyond its ends by odd reflection as often as it takes. */
+static double continued(const double *column, int count, int n)
 {
-    double shift = 0.0, sign = 1.0;
-    while (n < 0 || n >= count) {
-        int edge = n < 0 ? 0 : count - 1;
-        shift += sign * 2.0 * column[(size_t)edge * N_TAPE];
-        sign = -sign;
-        n = 2 * edge - n;
+    int period = count - 1;
+    int turn = n >= 0 ? n / period : -((period - 1 - n) / period);
+    int place = n - turn * period;
+    double last = column[(size_t)period * N_TAPE];
+    double rise = last - column[0];
+    if (turn % 2 == 0) {
+        return column[(size_t)place * N_TAPE] + (double)turn * rise;
     }
-    return shift + sign * column[(size_t)n * N_TAPE];
+    return (2.0 * last - column[(size_t)(period - place) * N_TAPE]) + (double)(turn - 1) * rise;
 }
 
 /* First-order low-pass run forward and backward over each column of the trip's samples. */
-static fmi2Status smooth(Instance *s, const double *from, double *to, int count)
+static void smooth(const Tape *tape, const double *from, double *to, int count)
 {
-    double cutoff = s->values[TAPE_CUTOFF];
-    if (cutoff <= 0.0 || count < 2) {
-        memmove(to, from, (size_t)count * N_TAPE * sizeof(double));
-        return fmi2OK;
-    }
-    double gain = 1.0 - exp(-2.0 * 3.14159265358979323846 * cutoff * s->tape.sample_time);
-    int pad = (int)ceil(10.0 / gain);
-    int length = count + 2 * pad;
-    double *line = malloc((size_t)length * sizeof(double));
-    if (line == NULL) {
-        return fail(s, "out of memory while filtering the tape");
+    double gain = tape->gain, *line = tape->line;
+    int length = count + 2 * tape->pad;
+    if (gain <= 0.0 || count < 2) {
+        return; /* the samples are in place already */
     }
     for (int column = 0; column < N_TAPE; column++) {
         for (int n = 0; n < length; n++) {
-            line[n] = reflected(from + column, count, n - pad);
+            line[n] = continued(from + column, count, n - tape->pad);
         }
         double value = line[0];
         for (int n = 0; n < length; n++) {
@@ -103,11 +95,9 @@ static fmi2Status smooth(Instance *s, const double *from, double *to, int count)
             line[n] = value;
         }
         for (int n = 0; n < count; n++) {
-            to[(size_t)n * N_TAPE + (size_t)column] = line[n + pad];
+            to[(size_t)n * N_TAPE + (size_t)column] = line[n + tape->pad];
         }
     }
-    free(line);
-    return fmi2OK;
 }
 
 static bool keep_trip(Instance *s)
@@ -118,20 +108,17 @@ static bool keep_trip(Instance *s)
 }
 
 /* End a trip: if anything was recorded and is to be kept, the filtered rows become the ones that are read. */
-static fmi2Status tape_commit(Instance *s)
+static void tape_commit(Instance *s)
 {
     Tape *tape = &s->tape;
     size_t size = (size_t)tape->rows * N_TAPE * sizeof(double);
     if (tape->first >= 0 && keep_trip(s)) {
         size_t offset = (size_t)tape->first * N_TAPE;
         memcpy(tape->committed, tape->recording, size);
-        if (smooth(s, tape->recording + offset, tape->committed + offset, tape->last - tape->first + 1) != fmi2OK) {
-            return fmi2Error;
-        }
+        smooth(tape, tape->recording + offset, tape->committed + offset, tape->last - tape->first + 1);
     }
     memcpy(tape->recording, tape->committed, size);
     tape->first = tape->last = -1;
-    return fmi2OK;
 }
 
 /* Notice a new trip. */
@@ -152,75 +139,94 @@ static fmi2Status tape_follow(Instance *s)
                        "trip_time is negative (the wait before a departure)", tape->trip, trip, trip_time);
     }
     tape->trip = trip;
-    return tape_commit(s);
+    tape_commit(s);
+    return fmi2OK;
 }
 
 /* -------------------------------------------------------------------------------------------------------- the file */
 
-static char decimal_point(void)
+enum { REAL_TEXT = 40 };
+
+/* What the host's locale writes for the decimal point; it may have several bytes. */
+static void decimal_point(char point[REAL_TEXT])
 {
-    const struct lconv *convention = localeconv();
-    return convention != NULL && convention->decimal_point != NULL ? convention->decimal_point[0] : '.';
+    snprintf(point, REAL_TEXT, "%.1f", 0.5);
+    size_t length = strlen(point) - 2;
+    memmove(point, point + 1, length);
+    point[length] = '\0';
 }
 
-/* The shortest decimal text that reads back to the same bits, with a decimal point whatever the host's locale. */
-static void format_real(double value, char *text, size_t size)
+/* The shortest decimal text that reads back to the same bits, in the form and with the point that Python writes. */
+static void format_real(double value, char text[REAL_TEXT])
 {
-    int precision = 1;
+    /* A decimal of up to 15 digits survives the way to a double and back; behind it then stand zeros. */
+    int decimals = 14;
     do {
-        snprintf(text, size, "%.*g", precision, value);
-    } while (strtod(text, NULL) != value && ++precision <= 17);
-    char *point = strchr(text, decimal_point());
-    if (point != NULL) {
-        *point = '.';
+        snprintf(text, REAL_TEXT, "%.*e", decimals, value);
+    } while (strtod(text, NULL) != value && ++decimals <= 16);
+    const char *end = strchr(text, 'e');
+    int exponent = atoi(end + 1);
+    while (decimals > 0 && *--end == '0') {
+        decimals--;
     }
-    if (strpbrk(text, ".en") == NULL && strlen(text) + 3 < size) {
-        strcat(text, ".0");
+    if (exponent >= -4 && exponent < 16) {
+        snprintf(text, REAL_TEXT, "%.*f", decimals - exponent > 1 ? decimals - exponent : 1, value);
+    } else {
+        snprintf(text, REAL_TEXT, "%.*e", decimals, value);
+    }
+    char point[REAL_TEXT];
+    decimal_point(point);
+    char *found = strstr(text, point);
+    if (found != NULL) {
+        *found = '.';
+        memmove(found + 1, found + strlen(point), strlen(found + strlen(point)) + 1);
     }
 }
 
-static bool read_real(char *text, char **end, double *value)
+/* The next number of a row. It must be followed by `separator`, and be finite. */
+static bool read_real(FILE *file, char separator, double *value)
 {
-    size_t length = strcspn(text, " \n");
-    for (size_t k = 0; k < length; k++) {
-        if (text[k] == '.') {
-            text[k] = decimal_point();
+    char text[2 * REAL_TEXT], point[REAL_TEXT], *end;
+    size_t used = 0;
+    int c = fgetc(file);
+    decimal_point(point);
+    for (; c != ' ' && c != '\r' && c != '\n' && c != EOF; c = fgetc(file)) {
+        if (used >= REAL_TEXT) {
+            return false;
+        }
+        if (c == '.') {
+            strcpy(text + used, point);
+            used += strlen(point);
+        } else {
+            text[used++] = (char)c;
         }
     }
-    *value = strtod(text, end);
-    return *end == text + length && length > 0 && isfinite(*value);
+    text[used] = '\0';
+    if (c == '\r') {
+        c = fgetc(file);
+    }
+    *value = strtod(text, &end);
+    return c == separator && used > 0 && *end == '\0' && isfinite(*value);
 }
 
 static void tape_header(const Instance *s, char *text, size_t size)
 {
-    char sample_time[32];
-    format_real(s->tape.sample_time, sample_time, sizeof sample_time);
+    char sample_time[REAL_TEXT];
+    format_real(s->tape.sample_time, sample_time);
     snprintf(text, size, "railcosim tape 1 component=%s sample_time=%s rows=%d columns=%d", MODEL_NAME, sample_time,
              s->tape.rows, N_TAPE);
 }
 
-static bool tape_rows(FILE *file, Tape *tape)
+static bool read_rows(FILE *file, const Tape *tape)
 {
-    enum { LINE = 32 * N_TAPE + 64 };
-    char line[LINE];
-    for (int n = 0; n < tape->rows; n++) {
-        if (fgets(line, LINE, file) == NULL) {
-            return false;
-        }
-        char *at = line;
-        for (int column = 0; column < N_TAPE; column++) {
-            if (!read_real(at, &at, &tape->committed[(size_t)n * N_TAPE + (size_t)column])) {
-                return false;
-            }
-            if (*at == ' ') {
-                at++;
-            }
-        }
-        if (*at != '\n') {
+    char line[8];
+    for (int n = 0; n < tape->rows * N_TAPE; n++) {
+        if (!read_real(file, (n + 1) % N_TAPE == 0 ? '\n' : ' ', &tape->committed[n])) {
             return false;
         }
     }
-    return fgets(line, LINE, file) != NULL && strcmp(line, "end\n") == 0 && fgetc(file) == EOF;
+    return fgets(line, sizeof line, file) != NULL && (strcmp(line, "end\n") == 0 || strcmp(line, "end\r\n") == 0) &&
+           fgetc(file) == EOF;
 }
 
 static fmi2Status tape_load(Instance *s, const char *path)
@@ -228,20 +234,20 @@ static fmi2Status tape_load(Instance *s, const char *path)
     char expected[MAX_MESSAGE / 2], found[MAX_MESSAGE / 2];
     FILE *file = fopen(path, "rb");
     if (file == NULL) {
-        return fmi2OK; /* nothing learned yet */
+        return errno == ENOENT ? fmi2OK /* nothing learned yet */ : fail(s, "tape_file: %.300s cannot be read", path);
     }
     tape_header(s, expected, sizeof expected);
     if (fgets(found, sizeof found, file) == NULL || strncmp(found, "railcosim tape 1", 16) != 0) {
         fclose(file);
         return fail(s, "tape_file: %.300s is not a tape file; remove it to start anew", path);
     }
-    found[strcspn(found, "\n")] = '\0';
+    found[strcspn(found, "\r\n")] = '\0';
     if (strcmp(found, expected) != 0) {
         fclose(file);
         return fail(s, "tape_file: %.200s does not fit this instance: it says '%.250s', expected '%.250s'", path, found,
                     expected);
     }
-    bool whole = tape_rows(file, &s->tape);
+    bool whole = read_rows(file, &s->tape);
     fclose(file);
     if (!whole) {
         return fail(s, "tape_file: %.300s is corrupt: a row is incomplete, missing or not finite; remove it to start anew",
@@ -264,7 +270,7 @@ static fmi2Status tape_save(Instance *s, const char *path)
     bool good = fprintf(file, "%s\n", text) > 0;
     for (int n = 0; n < s->tape.rows && good; n++) {
         for (int column = 0; column < N_TAPE && good; column++) {
-            format_real(s->tape.committed[(size_t)n * N_TAPE + (size_t)column], text, sizeof text);
+            format_real(s->tape.committed[(size_t)n * N_TAPE + (size_t)column], text);
             good = fprintf(file, "%s%c", text, column + 1 < N_TAPE ? ' ' : '\n') > 0;
         }
     }
@@ -287,20 +293,31 @@ static void tape_free(Tape *tape)
     tape->first = tape->last = -1;
 }
 
+/* Room for `rows` samples, and for the filter that the parameters ask for; the same memory again if it fits. */
 static fmi2Status tape_allocate(Instance *s, int rows)
 {
     Tape *tape = &s->tape;
-    if (tape->rows != rows) {
-        double sample_time = tape->sample_time;
+    double sample_time = s->values[SAMPLE_TIME], cutoff = s->values[TAPE_CUTOFF];
+    double gain = cutoff > 0.0 ? 1.0 - exp(-2.0 * 3.14159265358979323846 * cutoff * sample_time) : 0.0;
+    /* Ten time constants of run-in leave less than 5e-5 of the start value in the result. */
+    double pad = cutoff > 0.0 ? ceil(10.0 / gain) : 0.0;
+    if (!(pad < 1e8)) {
+        return fail(s, "tape_cutoff = %g Hz is too low to filter samples %g s apart", cutoff, sample_time);
+    }
+    if (tape->rows != rows || tape->pad != (int)pad) {
+        size_t cells = (size_t)rows * N_TAPE;
         tape_free(tape);
-        tape->sample_time = sample_time;
-        tape->committed = malloc(2 * (size_t)rows * N_TAPE * sizeof(double));
+        tape->committed = malloc((2 * cells + (size_t)rows + 2 * (size_t)pad) * sizeof(double));
         if (tape->committed == NULL) {
             return fail(s, "out of memory for a tape of %d samples", rows);
         }
+        tape->recording = tape->committed + cells;
+        tape->line = tape->recording + cells;
         tape->rows = rows;
-        tape->recording = tape->committed + (size_t)rows * N_TAPE;
+        tape->pad = (int)pad;
     }
+    tape->sample_time = sample_time;
+    tape->gain = gain;
     return fmi2OK;
 }
 
@@ -308,15 +325,13 @@ static fmi2Status tape_allocate(Instance *s, int rows)
 static fmi2Status tape_prepare(Instance *s)
 {
     Tape *tape = &s->tape;
-    double sample_time = s->values[SAMPLE_TIME];
-    if (!(sample_time > 0.0)) {
+    if (!(s->values[SAMPLE_TIME] > 0.0)) {
         return fail(s, "sample_time must be set: a tape is recorded on a fixed grid");
     }
-    double rows = rint(s->values[TAPE_DURATION] / sample_time) + 1.0;
-    if (!(rows * N_TAPE < 1e9)) {
-        return fail(s, "a tape of %g samples is too long; check tape_duration and sample_time", rows);
+    double rows = rint(s->values[TAPE_DURATION] / s->values[SAMPLE_TIME]) + 1.0;
+    if (!(rows >= 1.0 && rows * N_TAPE < 1e9)) {
+        return fail(s, "a tape of %g samples cannot be; check tape_duration and sample_time", rows);
     }
-    tape->sample_time = sample_time;
     if (tape_allocate(s, (int)rows) != fmi2OK) {
         return fmi2Error;
     }

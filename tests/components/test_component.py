@@ -14,6 +14,7 @@ from railcosim.components import (
     Output,
     Parameter,
     PointMassTrain,
+    Schedule,
     Size,
     State,
     Tape,
@@ -98,7 +99,7 @@ def test_runtime_parameters_belong_only_where_they_govern_something(samples):
     assert {"sample_time", "tape_file", "tape_duration", "tape_cutoff"} <= set(samples.Learner.declarations)
     assert {"sample_time", "seed"} <= set(samples.Dice.declarations)
     assert "seed" not in samples.Learner.declarations
-    assert not {"sample_time", "max_step", "seed"} & set(ComfortCruise.declarations)
+    assert not {"sample_time", "max_step", "seed"} & set(Schedule.declarations)
     assert samples.Counter.declarations["sample_time"].start == 0.1
 
 

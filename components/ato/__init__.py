@@ -1,0 +1,1 @@
+"""Automatic train operation: controllers that learn from trip to trip, and their rivals."""

@@ -1,0 +1,161 @@
+"""Train-to-train radio: what one train hears of another, and how old it is."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+from ..component import Component, Values
+from ..declarations import Data, Input, Memory, Noise, Output, Parameter, Size
+from ..maths import floor, logical_and, logical_not, logical_or, where
+
+_ROUNDING = 1e-6
+"""Of a refresh period, and s: what is due at a communication point belongs to it, whatever the rounding."""
+_NEVER = 1e300
+"""s: when a lost message arrives."""
+
+
+def read_outages(data: Any) -> list[tuple[float, float]]:
+    """Outage windows from their data, a list of ``[begin, end]`` in s.
+
+    Raises:
+        ValueError: no such list, or a window that ends before it begins.
+    """
+    if not isinstance(data, Sequence) or isinstance(data, str):
+        raise ValueError(f"outages are a list of [begin, end] in s, not {data!r}")
+    windows = []
+    for row in data:
+        if not isinstance(row, Sequence) or isinstance(row, str) or len(row) != 2:
+            raise ValueError(f"an outage is [begin, end] in s, not {row!r}")
+        begin, end = (_time(value) for value in row)
+        if not begin < end:
+            raise ValueError(f"the outage {list(row)} ends before it begins")
+        windows.append((begin, end))
+    return windows
+
+
+def _time(value: Any) -> float:
+    if isinstance(value, bool) or not isinstance(value, int | float):
+        raise ValueError(f"a time of an outage is a number in s, not {value!r}")
+    return float(value)
+
+
+class RadioLink(Component):
+    """A one-way radio link that repeats a train's position and speed, late and not always.
+
+    A message leaves every ``refresh`` seconds and is on its way for ``delay`` plus a uniform share of ``jitter``. It is
+    lost with probability ``loss`` while the channel is good, ``burst_loss`` while it is bad; before each message the
+    channel goes bad with probability ``burst_begin`` and good with ``burst_end`` (Gilbert 1960, Elliott 1963), so that
+    bursts last 1 / burst_end messages on average and the channel is bad for burst_begin / (burst_begin + burst_end) of
+    the time. Messages that leave during an outage (begin included, end not), or while ``sending`` is false, are lost as
+    well. A message overtaken by a newer one is dropped. What was true at the start is known at the start.
+
+    Without delay, jitter and losses, and refreshed at every step, the link is a wire. ``overrun`` says that more
+    messages were under way than ``messages``, so that one was forgotten before it arrived.
+    """
+
+    source = "burst losses: Gilbert 1960, Elliott 1963; the rest is ours"
+    equations = (
+        r"Of the messages that have arrived, $t_k + \mathrm{delay} + \mathrm{jitter}\; u_k \leq t$, the one sent last"
+        r" is heard; $\mathrm{age} = t - t_k$.",
+        r"Losses: probability loss in the good state, burst_loss in the bad one; good $\rightarrow$ bad with"
+        r" burst_begin, bad $\rightarrow$ good with burst_end, once a message.",
+    )
+
+    messages = Size(16, description="how many messages can be under way")
+    outages = Data([], convert=read_outages, description="windows [begin, end] in s in which every message is lost")
+
+    sent_position = Input("m", description="position the sender reports")
+    sent_speed = Input("m/s", description="speed the sender reports")
+    sending = Input("1", True, optional=True, description="whether the sender transmits")
+
+    refresh = Parameter("s", 0.1, minimum=1e-6, description="period of the messages; longer than a step, or one a step")
+    offset = Parameter("s", 0.0, minimum=0.0, description="time of the first message")
+    delay = Parameter("s", 0.0, minimum=0.0, description="shortest time a message is under way")
+    jitter = Parameter("s", 0.0, minimum=0.0, description="further time under way, uniform from 0 to this")
+    loss = Parameter("1", 0.0, minimum=0.0, maximum=1.0, description="probability of losing a message, channel good")
+    burst_begin = Parameter("1", 0.0, minimum=0.0, maximum=1.0, description="probability of going bad, per message")
+    burst_end = Parameter("1", 0.5, minimum=0.0, maximum=1.0, description="probability of becoming good, per message")
+    burst_loss = Parameter("1", 1.0, minimum=0.0, maximum=1.0, description="probability of a loss, channel bad")
+
+    luck = Noise(refresh, "uniform", description="whether a message is lost")
+    weather = Noise(refresh, "uniform", description="whether the channel changes")
+    haste = Noise(refresh, "uniform", description="how much of the jitter a message takes")
+
+    number = Memory("1", -1.0, description="number of the last message sent")
+    bad = Memory("1", False, output=True, description="whether the channel is in its bad state")
+    overrun = Memory("1", False, output=True, description="whether a message was forgotten under way")
+    last_position = Memory("m", 0.0, description="position in the message heard last")
+    last_speed = Memory("m/s", 0.0, description="speed in the message heard last")
+    last_time = Memory("s", 0.0, description="when the message heard last was sent")
+    arrivals = Memory("s", _NEVER, shape=(messages,), description="arrival times of the last messages, newest first")
+    times = Memory("s", 0.0, shape=(messages,), description="when they were sent")
+    positions = Memory("m", 0.0, shape=(messages,), description="positions in them")
+    speeds = Memory("m/s", 0.0, shape=(messages,), description="speeds in them")
+
+    position = Output("m", description="position received last")
+    speed = Output("m/s", description="speed received last")
+    age = Output("s", description="age of what was received last")
+
+    def initial(self) -> Values:
+        return {"last_position": self.sent_position, "last_speed": self.sent_speed, "last_time": self.time}
+
+    def outputs(self) -> Values:
+        sent, position, speed = self._heard()
+        return {"position": position, "speed": speed, "age": self.time - sent}
+
+    def update(self) -> Values:
+        due = self._due()
+        rows = {"arrivals": self._arrival(), "times": self.time, "positions": self.sent_position}
+        rows["speeds"] = self.sent_speed
+        oldest = self.arrivals[-1]
+        forgotten = logical_and(oldest > self.time + _ROUNDING, oldest < _NEVER)
+        sent, position, speed = self._heard()
+        return {
+            "number": where(due, self._count(), self.number),
+            "bad": where(due, self._turns_bad(), self.bad),
+            "overrun": logical_or(self.overrun, logical_and(due, forgotten)),
+            "last_time": sent,
+            "last_position": position,
+            "last_speed": speed,
+            **{name: self._shifted(getattr(self, name), newest, due) for name, newest in rows.items()},
+        }
+
+    def _count(self) -> Any:
+        return floor((self.time - self.offset) / self.refresh + _ROUNDING)
+
+    def _due(self) -> Any:
+        return self._count() > self.number
+
+    def _turns_bad(self) -> Any:
+        """The channel's state for the message that is due."""
+        return where(self.bad, logical_not(self.weather < self.burst_end), self.weather < self.burst_begin)
+
+    def _arrival(self) -> Any:
+        """When the message that is due arrives."""
+        lost = self.luck < where(self._turns_bad(), self.burst_loss, self.loss)
+        silent = logical_not(self.sending)
+        for begin, end in self.outages:
+            now = self.time + _ROUNDING
+            silent = logical_or(silent, logical_and(now >= begin, now < end))
+        return where(logical_or(lost, silent), _NEVER, self.time + self.delay + self.jitter * self.haste)
+
+    def _heard(self) -> tuple[Any, Any, Any]:
+        """Time of sending, position and speed of the newest message that has arrived."""
+        now = self.time + _ROUNDING
+        heard = (self.last_time, self.last_position, self.last_speed)
+        columns = zip(self.arrivals, self.times, self.positions, self.speeds, strict=True)
+        for arrival, *message in reversed(list(columns)):
+            heard = _choose(arrival <= now, message, heard)
+        arrived = logical_and(self._due(), self._arrival() <= now)
+        return _choose(arrived, (self.time, self.sent_position, self.sent_speed), heard)
+
+    def _shifted(self, column: Any, newest: Any, due: Any) -> list[Any]:
+        """A column with a message put in at its head where one is due."""
+        moved = [newest, *column[:-1]]
+        return [where(due, new, old) for new, old in zip(moved, column, strict=True)]
+
+
+def _choose(condition: Any, then: Sequence[Any], otherwise: Sequence[Any]) -> tuple[Any, Any, Any]:
+    sent, position, speed = (where(condition, a, b) for a, b in zip(then, otherwise, strict=True))
+    return sent, position, speed

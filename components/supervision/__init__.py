@@ -1,0 +1,1 @@
+"""What plans and watches a train's trips: timetable (ATS) and protection (ATP)."""

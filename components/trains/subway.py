@@ -1,0 +1,170 @@
+"""A subway train whose couplers deform as prescribed: one equation of motion for all vehicles."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import Any, NamedTuple
+
+from ..component import Values
+from ..declarations import Data, Parameter, State
+from ..maths import cos, sin, where
+from .multiple_unit import MultipleUnit
+from .vehicles import added, pattern
+
+_COUPLERS = (
+    {"sine": 0.1e-3},
+    {"cosine": 0.15e-3},
+    {"sine": 0.1e-3},
+    {"cosine": 0.15e-3},
+    {"cosine": 0.15e-3},
+)
+
+
+class Coupler(NamedTuple):
+    """Amplitudes of a prescribed deformation s = sine sin(w t) + cosine cos(w t), in m."""
+
+    sine: float
+    cosine: float
+
+
+def read_couplers(rows: Any) -> tuple[Coupler, ...]:
+    """Prescribed deformations from their table.
+
+    Raises:
+        ValueError: unusable rows; the message says which.
+    """
+    if isinstance(rows, str) or not isinstance(rows, Sequence) or not rows:
+        raise ValueError("couplers are a list of tables, at least one")
+    found = []
+    for index, row in enumerate(rows, 1):
+        if not isinstance(row, Mapping) or row.keys() - {"sine", "cosine"}:
+            raise ValueError(f"coupler {index} must be a table of 'sine' and 'cosine' (m), not {row!r}")
+        values = [row.get(name, 0.0) for name in ("sine", "cosine")]
+        if any(isinstance(value, bool) or not isinstance(value, int | float) for value in values):
+            raise ValueError(f"coupler {index}: 'sine' and 'cosine' are numbers, not {row!r}")
+        found.append(Coupler(float(values[0]), float(values[1])))
+    return tuple(found)
+
+
+class Motion(NamedTuple):
+    """How vehicle k moves against the first: speed S in m/s and acceleration in m/s2, sums over the couplers ahead."""
+
+    speed: list[Any]
+    acceleration: list[Any]
+
+
+class SubwayTrain(MultipleUnit):
+    """A six-car subway train with prescribed coupler deformations and time-varying Davis coefficients (the paper's).
+
+    M dv/dt = u - R1(t, x) - R2(t) v - R3(t) v^2 + M d, u = sum(mu_k F_k). Coefficients of the resistance are in N/kN of
+    weight. As printed, the constant part of the resistance acts at standstill too; ``stiction`` changes that.
+    """
+
+    source = "Liu & Hou 2020, eqs. 1-9, 52-59, 65; units settled, line chosen"
+    note = (
+        "Specific resistances are read as N/kN. The line and the pitch of the vehicles are chosen: the source's Fig. 2 "
+        "is not available. Six couplers are printed for six vehicles; five exist."
+    )
+    equations = (
+        r"$M\dot v = u - R_1 - R_2 v - R_3 v^2 - M r + M d, \qquad u = \sum_k \mu_k F_k, \qquad \dot x = v$",
+        r"$R_1 = \sum_k K_k\,(a_k + b_k S_k + c_k S_k^2 + w(x - (k-1) L)) + \sum_k \ddot s_k \sum_{j>k} m_j$",
+        r"$R_2 = \sum_k K_k\,(b_k + 2 c_k S_k), \qquad R_3 = \sum_k K_k c_k, \qquad K_k = m_k g / 1000,"
+        r" \qquad S_k = \sum_{j<k} \dot s_j$",
+        r"$f_k = f_{k-1} + \mu_k F_k - r_k - m_k\,(\dot v - d + \sum_{j<k} \ddot s_j), \qquad f_0 = 0$",
+        r"with position $x$, speed $v$, applied_force $u$, vehicle_force $F_k$, coupler_force $f_k$, masses $m_k$"
+        r" (times load_factor), weights $\mu_k$, vehicle_length $L$, the line's resistance $w$ in N/kN, line_resistance"
+        r" $r$, disturbance $d$, coupler deformations $s_k$, and $a_k, b_k, c_k$ each of the form $a_0 + a_1 \sin"
+        r" \omega t$.",
+    )
+    recommended_step = 0.01
+
+    couplers = Data(
+        _COUPLERS,
+        convert=read_couplers,
+        description="deformation of each coupler, 'sine' and 'cosine' (m); a table shorter than the train is repeated",
+    )
+
+    coupler_frequency = Parameter(
+        "rad/s", 1.0, minimum=0.0, description="angular frequency of the couplers' deformation"
+    )
+
+    position = State("m", 0.0, output=True, description="position of the leading vehicle since departure")
+    speed = State("m/s", 0.0, output=True, description="speed of the leading vehicle")
+
+    def derivatives(self) -> Values:
+        effective = self._effective(self._vehicle_forces(self.speed))
+        force = added(effective)
+        rates = {
+            "position": self.speed,
+            "speed": self._acceleration(force),
+            **self._drive_rates(self.speed, force * self.speed),
+        }
+        waiting = self._waiting()
+        return {name: where(waiting, 0.0, rate) for name, rate in rates.items()}
+
+    def outputs(self) -> Values:
+        waiting = self._waiting()
+        forces = [where(waiting, 0.0, force) for force in self._vehicle_forces(self.speed)]
+        effective = self._effective(forces)
+        force = added(effective)
+        acceleration = self._acceleration(force)
+        couplers = self._coupler_forces(effective, acceleration)
+        motion = self._deformation()
+        return {
+            "acceleration": where(waiting, 0.0, acceleration),
+            "applied_force": force,
+            "vehicle_force": forces,
+            "coupler_force": [where(waiting, 0.0, coupler) for coupler in couplers],
+            "resistance": self._resistance(),
+            "resistance_parameters": self._parameters(motion.speed, self._line(), self._coupling(motion)),
+        }
+
+    def update(self) -> Values:
+        return self._departing({"position": self.start_offset, "speed": 0.0})
+
+    def _deformation(self) -> Motion:
+        clock, w = self._clock(), self.coupler_frequency
+        sine, cosine = sin(w * clock), cos(w * clock)
+        speed: list[Any] = [0.0]
+        acceleration: list[Any] = [0.0]
+        for coupler in pattern(self.couplers, self.vehicles - 1):
+            speed.append(speed[-1] + w * (coupler.sine * cosine - coupler.cosine * sine))
+            acceleration.append(acceleration[-1] - w * w * (coupler.sine * sine + coupler.cosine * cosine))
+        return Motion(speed, acceleration)
+
+    def _line(self) -> list[Any]:
+        """Force of the line against each vehicle in N."""
+        places = [self.position - k * self.vehicle_length for k in range(self.vehicles)]
+        return [mass * self._line_resistance(x) for mass, x in zip(self._masses(), places, strict=True)]
+
+    def _coupling(self, motion: Motion) -> Any:
+        """F_K: what the prescribed accelerations of the vehicles behind the first cost, in N."""
+        terms = [mass * a for mass, a in zip(self._masses(), motion.acceleration, strict=True)]
+        return added(terms[1:])
+
+    def _resistances(self, motion: Motion) -> list[Any]:
+        """Davis and line resistance of each vehicle in N."""
+        rows = zip(self._weight_forces(), self._davis(self._clock()), motion.speed, self._line(), strict=True)
+        found = []
+        for weight, davis, s, w in rows:
+            v = self.speed + s
+            found.append(weight * self._rolling(davis.a + davis.b * v + davis.c * v * v, self.speed) + w)
+        return found
+
+    def _resistance(self) -> Any:
+        motion = self._deformation()
+        return added(self._resistances(motion)) + self._coupling(motion)
+
+    def _acceleration(self, force: Any) -> Any:
+        return (force - self._resistance()) / added(self._masses()) - self._drag()
+
+    def _coupler_forces(self, effective: list[Any], acceleration: Any) -> list[Any]:
+        """In-train forces behind each vehicle but the last, from the equations of motion of the vehicles ahead."""
+        motion = self._deformation()
+        rows = zip(effective, self._resistances(motion), self._masses(), motion.acceleration, strict=True)
+        forces: list[Any] = []
+        force: Any = 0.0
+        for drive, resistance, mass, relative in rows:
+            force = force + drive - resistance - mass * (acceleration + self._drag() + relative)
+            forces.append(force)
+        return forces[:-1]
