@@ -70,10 +70,10 @@ def function(name: str, arguments: Sequence[tuple[str, Any]], results: Sequence[
     used = "".join(lines)
     unused = [f"    (void){argument};" for argument, _ in arguments if f"{argument}[" not in used]
     work = sorted({compiled.instruction_output(k)[0] for k in range(len(lines)) if not _is_output(compiled, k)})
-    signature = ", ".join(f"const double *restrict {argument}" for argument, _ in arguments)
+    signature = ", ".join(f"const double *{argument}" for argument, _ in arguments)
     declared = [f"    double {', '.join(f'a{slot}' for slot in work)};"] if work else []
     body = "\n".join([*declared, *unused, *lines])
-    return f"static void {name}({signature}, double *restrict result)\n{{\n{body}\n}}\n"
+    return f"static void {name}({signature}, double *result)\n{{\n{body}\n}}\n"
 
 
 def _line(compiled: Any, k: int, arguments: Sequence[str]) -> str:

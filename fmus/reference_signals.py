@@ -98,7 +98,6 @@ def _table(times: list[float], slots: list[Slot], values: Mapping[str, Any]) -> 
     names = ["time", *(name for slot in slots for name in slot.scalars)]
     columns = [np.reshape(values[slot.name], (len(times), -1)) for slot in slots]
     lines = [",".join(f'"{name}"' for name in names)]
-    lines += (
-        ",".join(repr(float(x)) for x in (t, *np.concatenate(row))) for t, *row in zip(times, *columns, strict=True)
-    )
+    for time, *cells in zip(times, *columns, strict=True):
+        lines.append(",".join(repr(float(x)) for x in (time, *(x for array in cells for x in array))))
     return "\n".join(lines) + "\n"

@@ -11,6 +11,7 @@ import platform
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from . import rows
 from .check import Checked
 from .system import System
 
@@ -22,7 +23,7 @@ _PACKAGES = ("railcosim", "fmpy", "pythonfmu", "numpy", "scipy")
 
 def write(directory: Path, system: System, checked: Checked, kind: str) -> None:
     """Write what is known before the first step, so that a run that is killed can be read."""
-    for name in ("results.csv", "metrics.json"):  # of an earlier run: not to be taken for this one's
+    for name in (rows.CSV, rows.BINARY, "metrics.json"):  # of an earlier run: not to be taken for this one's
         (directory / name).unlink(missing_ok=True)
     _dump(directory / "run.json", _describe(system, checked, kind) | {"status": "running"})
     _dump(directory / "units.json", {"time": "s"} | _units(checked))

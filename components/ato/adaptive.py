@@ -37,17 +37,19 @@ class AdaptiveAto(AtoController):
     def outputs(self) -> Values:
         errors = self._errors()
         squared, denominator = self._terms(errors.augmented)
-        gain = self.feedback_gain + self.robust_gain * squared / denominator
+        gain = self.feedback_gain + self._adapted(errors.augmented) * squared / denominator
         return self._report(-gain * errors.augmented, errors)
 
     def update(self) -> Values:
-        error = self._errors().augmented
-        squared, denominator = self._terms(error)
-        growth = self.adaptation_gain * squared * error * error / denominator
-        adapted = (self.robust_gain + self.step * growth) / (1.0 + self.step * self.decay)
-        return {"robust_gain": where(self._waiting(), 0.0, adapted)}
+        return {"robust_gain": where(self._waiting(), 0.0, self._adapted(self._errors().augmented))}
 
     def _terms(self, error: Any) -> tuple[Any, Any]:
         """lambda^2 and D."""
         size = 1.0 + abs(self.speed) + self.speed * self.speed
         return size * size, size * abs(error) + self.smoothing
+
+    def _adapted(self, error: Any) -> Any:
+        """The gain that this sample's error leads to; it acts at once."""
+        squared, denominator = self._terms(error)
+        growth = self.adaptation_gain * squared * error * error / denominator
+        return (self.robust_gain + self.sample_time * growth) / (1.0 + self.sample_time * self.decay)

@@ -24,7 +24,7 @@ class FixedDistanceCruise(PairwiseCruise):
         r" f = \alpha\,(v_\mathrm{front} - v_\mathrm{rear}) + P(d)$",
         r"$P(d) = \kappa\,(d - d^*)$",
         r"$F = m\,(u + c_0 + c_1 v + c_2 v^2 + r)$, with $u = b$ or, with a limit, $u$ = $b$ held within it",
-        r"Reconstructed: with gap $d$, desired_gap $d^*$, demand $u$, force $F$, mass $m$, line_resistance $r$.",
+        r"Reconstructed: with gap $d$, desired_gap $d^*$, gap_gain $\kappa$, demand $u$, force $F$, mass $m$, line_resistance $r$.",
     )
     note = "Reconstructed: gains, weight rho and compensation at the own speed are ours, fitted to a published table."
     recommended_step = 0.1
@@ -32,14 +32,14 @@ class FixedDistanceCruise(PairwiseCruise):
     k = Parameter("1/s", 0.0065, minimum=0.0, description="gain on the error to the target speed (reconstructed)")
     alpha = Parameter("1/s", 0.037, minimum=0.0, description="gain on speed differences of neighbours (reconstructed)")
     rho = Parameter("1", 2.0 / 3.0, minimum=0.0, description="weight of the train behind (reconstructed)")
-    kappa = Parameter("1/s2", 7.7e-3, minimum=0.0, description="gain on the gap's error (reconstructed)")
+    gap_gain = Parameter("1/s2", 7.7e-3, minimum=0.0, description="gain on the gap's error, kappa (reconstructed)")
     desired_gap = Parameter("m", 7.4e3, minimum=0.0, description="gap to keep, front to front")
 
     def derivatives(self) -> Values:
         return self._caution_rates()
 
     def _pull(self, gap: Any) -> Any:
-        return self.kappa * (gap - self.desired_gap)
+        return self.gap_gain * (gap - self.desired_gap)
 
     def _compensated_speed(self) -> Any:
         return self.speed

@@ -11,7 +11,9 @@ from ..maths import clip, logical_and, logical_or, maximum, minimum, sqrt, where
 from .port import CruiseController
 
 _ONSET = 0.2
-"""s: time constant with which caution and the held bound follow the onset of an outage."""
+"""s: time constant with which caution behind the train ahead, and the held bound, follow the onset of an outage."""
+_FADE = 2.0
+"""s: time constant with which the train behind and the leader fade out: nothing is in a hurry there."""
 _FASTEST = 300.0
 """m/s: speeds heard are held below this where they are squared, so that nonsense stays finite."""
 
@@ -86,9 +88,9 @@ class GuardedCruise(CruiseController, ABC):
         """Rates of this class's states."""
         lost = self._lost_ahead()
         return {
-            "caution_ahead": self._caution_rate(lost, self.caution_ahead),
-            "caution_behind": self._caution_rate(self._lost_behind(), self.caution_behind),
-            "caution_leader": self._caution_rate(self._lost_leader(), self.caution_leader),
+            "caution_ahead": self._caution_rate(lost, self.caution_ahead, _ONSET),
+            "caution_behind": self._caution_rate(self._lost_behind(), self.caution_behind, _FADE),
+            "caution_leader": self._caution_rate(self._lost_leader(), self.caution_leader, _FADE),
             "held_bound": where(lost, (self._safe_bound() - self.held_bound) / _ONSET, 0.0),
         }
 
@@ -111,8 +113,8 @@ class GuardedCruise(CruiseController, ABC):
     def _lost(self, there: Any, age: Any) -> Any:
         return logical_and(logical_and(self.fallback, there), age > self.degraded_age)
 
-    def _caution_rate(self, lost: Any, caution: Any) -> Any:
-        return where(lost, (1.0 - caution) / _ONSET, -caution / self.rejoin_time)
+    def _caution_rate(self, lost: Any, caution: Any, onset: float) -> Any:
+        return where(lost, (1.0 - caution) / onset, -caution / self.rejoin_time)
 
     def _safe_bound(self) -> Any:
         """Largest demand that keeps the braking distance, m/s2; -braking where it is lost already."""

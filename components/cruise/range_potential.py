@@ -30,7 +30,7 @@ class RangePotentialCruise(PairwiseCruise):
         r" U(d) = \dfrac{1}{d^2 - d_\mathrm{min}^2} + \dfrac{1}{d_\mathrm{max}^2 - d^2}$",
         r"$F = m\,(u + c_0 + c_1 v_\mathrm{r} + c_2 v_\mathrm{r}^2 + r)$, with $u = b$ or, with a limit, $u$ = $b$ held"
         r" within it",
-        r"Reconstructed: with gap $d$, gap_min $d_\mathrm{min}$, gap_max $d_\mathrm{max}$, target_speed $v_\mathrm{r}$,"
+        r"Reconstructed: with gap $d$, field_gain $\kappa$, gap_min $d_\mathrm{min}$, gap_max $d_\mathrm{max}$, target_speed $v_\mathrm{r}$,"
         r" demand $u$, force $F$, mass $m$, line_resistance $r$.",
     )
     note = "Reconstructed: the source's potential is replaced by the one of Wang et al. 2020; gains fitted to a table."
@@ -38,7 +38,9 @@ class RangePotentialCruise(PairwiseCruise):
 
     k = Parameter("1/s", 0.019, minimum=0.0, description="gain on the error to the target speed (reconstructed)")
     alpha = Parameter("1/s", 0.016, minimum=0.0, description="gain on speed differences of neighbours (reconstructed)")
-    kappa = Parameter("m4/s2", 2e8, minimum=0.0, description="gain on the field, 0.2 (m/s2) km3 (reconstructed)")
+    field_gain = Parameter(
+        "m4/s2", 2e8, minimum=0.0, description="gain on the field, kappa: 0.2 (m/s2) km3 (reconstructed)"
+    )
     gap_min = Parameter("m", 6.5e3, minimum=0.0, description="lower bound of the gap, front to front")
     gap_max = Parameter("m", 8.0e3, minimum=0.0, description="upper bound of the gap, front to front")
 
@@ -46,7 +48,7 @@ class RangePotentialCruise(PairwiseCruise):
         return self._caution_rates()
 
     def _pull(self, gap: Any) -> Any:
-        return self.kappa * slope(gap, self.gap_min, self.gap_max)
+        return self.field_gain * slope(gap, self.gap_min, self.gap_max)
 
     def _compensated_speed(self) -> Any:
         return self.target_speed

@@ -34,7 +34,7 @@ class TunablePotentialCruise(PairwiseCruise):
         r" P = \kappa\, s\,/\,\sqrt{s^2 + w^2}$",
         r"$d^* \rightarrow d_0 + \tau v_\mathrm{r} + v_\mathrm{r}^2\,/\,(2 b_0)$, at the rate gap_rate at most",
         r"$F = m\,(u + c_0 + c_1 v + c_2 v^2 + r)$, with $u = b$ or, with a limit, $u$ = $b$ held within it",
-        r"Reconstructed: with gap $d$, desired_gap $d^*$, gap_tolerance $\delta$, gap_width $w$, gap_base $d_0$,"
+        r"Reconstructed: with gap $d$, desired_gap $d^*$, gap_tolerance $\delta$, pull_limit $\kappa$, gap_width $w$, gap_base $d_0$,"
         r" gap_time $\tau$, gap_braking $b_0$, demand $u$, force $F$, mass $m$, line_resistance $r$.",
     )
     note = "Reconstructed: the source's formulas and most of its parameters are lost; law and gains are ours."
@@ -43,7 +43,7 @@ class TunablePotentialCruise(PairwiseCruise):
     k = Parameter("1/s", 0.0094, minimum=0.0, description="gain on the error to the target speed (reconstructed)")
     alpha = Parameter("1/s", 0.035, minimum=0.0, description="gain on speed differences of neighbours (reconstructed)")
     rho = Parameter("1", 2.0 / 3.0, minimum=0.0, description="weight of the train behind (reconstructed)")
-    kappa = Parameter("m/s2", 2.3, minimum=0.0, description="largest pull of a gap (reconstructed)")
+    pull_limit = Parameter("m/s2", 2.3, minimum=0.0, description="largest pull of a gap, kappa (reconstructed)")
     gap_tolerance = Parameter(
         "m", 50.0, minimum=0.0, description="half width of the band of free gaps, delta: the tuning parameter"
     )
@@ -70,7 +70,7 @@ class TunablePotentialCruise(PairwiseCruise):
     def _pull(self, gap: Any) -> Any:
         error = gap - self.desired_gap
         s = error - clip(error, -self.gap_tolerance, self.gap_tolerance)
-        return self.kappa * s / sqrt(s * s + self.gap_width * self.gap_width)
+        return self.pull_limit * s / sqrt(s * s + self.gap_width * self.gap_width)
 
     def _compensated_speed(self) -> Any:
         return self.speed

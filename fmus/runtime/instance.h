@@ -39,7 +39,7 @@ typedef struct {
 enum { MAX_TEXT = 1024, MAX_MESSAGE = 1024 };
 
 /* One method's equations: `clock` is the time and the length of the sample. */
-typedef void Equations(const double *restrict clock, const double *restrict values, double *restrict result);
+typedef void Equations(const double *clock, const double *values, double *result);
 
 /* Length of an array that may be empty: C has no arrays of length zero. */
 #define AT_LEAST_ONE(n) ((n) > 0 ? (n) : 1)

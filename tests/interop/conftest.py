@@ -113,6 +113,11 @@ class Scene:
     def points(self):
         return round(self.stop_time / self.step) + 1
 
+    def outputs(self, *types):
+        """Names of all outputs of the given types, or of any."""
+        chosen = [(part, v) for part in self.parts.values() for v in part.outputs if not types or v.type in types]
+        return {f"{part.name}.{v.name}" for part, v in chosen}
+
     def deviation(self, algorithm, found):
         """Largest deviation of a tool's signals from ours, relative above one unit."""
         errors = {name: float(np.max(self._error(algorithm, name, values))) for name, values in found.items()}

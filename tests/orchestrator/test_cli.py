@@ -272,7 +272,7 @@ def test_ctrl_c_ends_with_130_and_leaves_what_was_computed(tmp_path: Path) -> No
     command += ["--set", "simulation.record=1"]
     with subprocess.Popen(command, cwd=tmp_path, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True) as process:
         assert process.stderr is not None
-        while not (tmp_path / "out/results.csv").is_file() or (tmp_path / "out/results.csv").stat().st_size < 2000:
+        while not (tmp_path / "out/results.bin").is_file() or (tmp_path / "out/results.bin").stat().st_size < 2000:
             assert process.poll() is None, process.stderr.read()
         process.send_signal(signal.SIGINT)
         stdout, stderr = process.communicate(timeout=30)

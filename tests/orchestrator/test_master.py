@@ -481,8 +481,8 @@ def test_an_observer_ends_a_run(workspace):
     master = Master({"still": Still()}, ["still"], [], {}, "gauss-seidel")
     master.initialize(0.5, 9.0)
     seen = []
-    assert not master.run(0.5, 0.25, 10, lambda k, t, values: seen.append((k, t)) or k < 3)
-    assert seen == [(1, 0.75), (2, 1.0), (3, 1.25)]
+    assert not master.run(0.5, 0.25, 10, 2, lambda k, rows: seen.append((k, list(rows))) or k < 3)
+    assert seen == [(1, []), (2, [[1.0]]), (3, [])]
     assert master.steps == 3
     master.terminate()
     assert calls == [

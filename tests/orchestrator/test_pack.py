@@ -84,7 +84,7 @@ def test_the_comfort_scenario_runs_in_fmpy_as_in_our_master(tmp_path, algorithm)
     system = load("comfort_cruise", algorithm=algorithm, stop_time=20.0)
     packed = pack(system, tmp_path / "platoon.fmu", expose=["train[:],cruise[:]"])
     result, ours = simulate(packed.path, system), run(system, kind="native")
-    assert len(names(result)) == len(packed.exposed) == 32
+    assert set(names(result)) == {shown.name for shown in packed.exposed}
     for name in names(result):
         np.testing.assert_allclose(result[name], ours[name], rtol=1e-9, atol=1e-9, err_msg=name)
     assert any("one step late" in note for note in packed.notes) == (algorithm == "jacobi")

@@ -316,7 +316,7 @@ def endless(tmp_path):
         )
         processes.append(process)
         deadline = time.monotonic() + 60.0
-        while not (path / "results.csv").exists() or (path / "results.csv").stat().st_size < 5000:
+        while not (path / "results.bin").exists() or (path / "results.bin").stat().st_size < 5000:
             assert process.poll() is None, process.stderr.read()
             assert time.monotonic() < deadline
             time.sleep(0.05)

@@ -1,0 +1,326 @@
+"""Native FMUs as files: what is in them, that they are reproducible, that their sources serve, and what is refused."""
+
+import os
+import re
+import shutil
+import subprocess
+import sys
+import zipfile
+from pathlib import Path
+
+import fmpy
+import fmpy.build
+import numpy as np
+import pytest
+from fmpy.validation import validate_fmu
+from lxml import etree
+from railcosim.components import Component, ComponentError, simulate
+from railcosim.components.tracing import TracingError
+from railcosim.fmus import native_fmu, toolchain
+from railcosim.fmus.build import build, build_component, resolve
+from railcosim.fmus.toolchain import CompilerError
+
+HERE = Path(__file__).parent
+MIXED = f"{HERE / 'native_samples.py'}:Mixed"
+TEXTS = {"Types", "Everything"}
+STRICT = ("-std=c11", "-Wall", "-Wextra", "-Wconversion", "-Wshadow", "-pedantic", "-Werror")
+HEADERS = Path(fmpy.__file__).parent / "c-code"
+
+
+def native(reference, arguments=None):
+    if reference.rpartition(":")[2] in TEXTS:
+        pytest.skip("computes a text")
+    return build(reference, arguments, kind="native")
+
+
+def unzip(path, folder):
+    with zipfile.ZipFile(path) as archive:
+        archive.extractall(folder)
+    return folder
+
+
+def compile_program(sources, target, *flags, compiler=("gcc",)):
+    done = subprocess.run([*compiler, *flags, *sources, "-o", target, "-lm"], capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stderr
+    return target
+
+
+# ---------------------------------------------------------------- the archive
+
+
+def test_the_validator_finds_nothing(reference):
+    assert list(validate_fmu(str(native(reference)))) == []
+
+
+def test_the_archive_is_whole(tmp_path):
+    folder = unzip(build("PointMassTrain", kind="native"), tmp_path)
+    files = {str(path.relative_to(folder)) for path in folder.rglob("*") if path.is_file()}
+    assert {
+        "modelDescription.xml",
+        "documentation/index.html",
+        f"binaries/{toolchain.PLATFORMS[toolchain.here()].folder}/PointMassTrain{toolchain.PLATFORMS[toolchain.here()].suffix}",
+        *(f"sources/{name}" for name in ("all.c", "model.h", "equations.c", "instance.h", "fmi2.c", "simulation.c")),
+        *(f"sources/{name}" for name in ("state.c", "tape.c", "noise.c", "log.c")),
+    } <= files
+    assert not any("fmi2Functions" in name for name in files)
+
+
+def test_the_description_says_what_a_native_fmu_can(tmp_path):
+    root = etree.parse(unzip(build("PointMassTrain", kind="native"), tmp_path) / "modelDescription.xml").getroot()
+    slave = root.find("CoSimulation")
+    for capability in ("canGetAndSetFMUstate", "canSerializeFMUstate", "providesDirectionalDerivative"):
+        assert slave.get(capability) == "true"
+    assert slave.get("needsExecutionTool") == "false"
+    assert [file.get("name") for file in slave.find("SourceFiles")] == ["all.c"]
+    variables = {v.get("name"): v for v in root.find("ModelVariables")}
+    index = {name: k for k, name in enumerate(variables, 1)}
+    assert variables["der(speed)"].find("Real").get("derivative") == str(index["speed"])
+    assert variables["der(speed)"].find("Real").get("unit") == "m/s2"
+    rates = [int(u.get("index")) for u in root.find("ModelStructure/Derivatives")]
+    assert rates == [index["der(position)"], index["der(speed)"]]
+    (rate,) = (u for u in root.find("ModelStructure/Derivatives") if int(u.get("index")) == index["der(position)"])
+    assert rate.get("dependencies") == str(index["speed"])
+
+
+def test_it_runs_in_fmpy_as_in_plain_python(tmp_path):
+    given = {"force": 3e5, "speed": 3.0}
+    result = fmpy.simulate_fmu(
+        str(build("PointMassTrain", kind="native")), stop_time=10.0, output_interval=0.5, start_values=given
+    )
+    expected = simulate(resolve("PointMassTrain")(**given), 10.0, 0.5)
+    for name in ("position", "speed", "acceleration"):
+        assert np.array_equal(result[name], expected[name]), name
+
+
+# ---------------------------------------------------------------- building
+
+
+def test_the_same_component_gives_the_same_bytes(monkeypatch, tmp_path):
+    contents = []
+    for place in ("one", "a much longer place/two"):
+        monkeypatch.setenv("RAILCOSIM_CACHE", str(tmp_path / place))
+        contents.append(build("ComfortCruise", kind="native").read_bytes())
+    assert contents[0] == contents[1]
+
+
+def test_the_code_does_not_depend_on_the_order_of_a_set():
+    """In a process of another hash seed."""
+    program = (
+        "from railcosim.fmus import native_fmu; from railcosim.fmus.build import resolve; import sys\n"
+        f"print(native_fmu.sources(resolve({MIXED!r})(), 'guid'))"
+    )
+    texts = {
+        subprocess.run(
+            [sys.executable, "-c", program],
+            env={**os.environ, "PYTHONHASHSEED": seed},
+            capture_output=True,
+            text=True,
+            check=True,
+        ).stdout
+        for seed in ("1", "2")
+    }
+    assert len(texts) == 1
+
+
+def test_a_hit_in_the_cache_neither_traces_nor_compiles(monkeypatch):
+    path = build("Gust", kind="native")
+    before = path.stat().st_mtime_ns
+
+    def never(*_, **__):
+        raise AssertionError("built again")
+
+    monkeypatch.setattr(native_fmu, "contents", never)
+    monkeypatch.setattr(subprocess, "run", never)
+    assert build("Gust", kind="native") == path
+    assert path.stat().st_mtime_ns == before
+
+
+def test_values_and_kinds_make_different_fmus():
+    train = resolve("PointMassTrain")
+    paths = [build_component(train(**given), "native") for given in ({}, {"mass": 3e5}, {"speed": 1.0})]
+    guids = {fmpy.read_model_description(path).guid for path in [*paths, build("PointMassTrain")]}
+    assert len(guids) == 4
+
+
+# ---------------------------------------------------------------- refusals
+
+
+def component(body, declarations="", methods=""):
+    return (
+        "import math\n"
+        "from railcosim.components import Component, Input, Memory, Output, Parameter, State, maths\n"
+        "class C(Component):\n"
+        '    "One."\n'
+        '    u = Input("1", 0.5)\n'
+        '    mode = Parameter("1", "slow")\n'
+        '    y = Output("1")\n'
+        f"{declarations}"
+        "    def outputs(self):\n"
+        f"        {body}\n"
+        f"{methods}"
+    )
+
+
+@pytest.mark.parametrize(
+    ("body", "said"),
+    [
+        ("return {'y': 1.0 if self.u > 0.0 else 2.0}", "asked for its truth"),
+        ("return {'y': math.tanh(self.u)}", "turned into a plain number"),
+        ("return {'y': maths.where(self.mode == 'fast', self.u, 0.0)}", "a text is read"),
+        ("return {'y': max(self.u, 0.0)}", "asked for its truth"),
+    ],
+)
+def test_equations_that_cannot_be_traced_are_refused_with_the_line(write_component, body, said):
+    path = write_component(component(body), name="law.py")
+    with pytest.raises(ComponentError) as caught:
+        build(path, kind="native")
+    message = str(caught.value)
+    assert said in message
+    assert "C.outputs" in message
+
+
+def test_packages_that_c_does_not_have_are_refused_with_the_reason(write_component):
+    path = write_component(component("return {'y': self.u}", declarations='    requires = ("scipy",)\n'))
+    with pytest.raises(ComponentError, match=r"C imports scipy.*Python FMU"):
+        build(path, kind="native")
+
+
+def test_what_the_compiler_said_is_told(monkeypatch, tmp_path):
+    compiler = tmp_path / "cc"
+    compiler.write_text("#!/bin/sh\necho 'all.c:1: error: no sense' >&2\nexit 1\n")
+    compiler.chmod(0o755)
+    monkeypatch.setenv("CC", str(compiler))
+    for cached in (toolchain.system_compiler, toolchain.identity):
+        getattr(cached, "cache_clear", lambda: None)()
+    try:
+        with pytest.raises(CompilerError, match="no sense"):
+            build_component(resolve("Gust")(size=0.123), "native")
+    finally:
+        monkeypatch.undo()
+        for cached in (toolchain.system_compiler, toolchain.identity):
+            getattr(cached, "cache_clear", lambda: None)()
+
+
+@pytest.mark.parametrize("name", ["Tape", "tape", "Log", "state", "equations", "all", "Noise", "instance", "library"])
+def test_a_component_may_bear_the_name_of_a_file_of_the_runtime(write_component, unpack, name):
+    text = component("return {'y': 2.0 * self.u}").replace("class C(", f"class {name}(")
+    path = write_component(text).removesuffix(":C") + f":{name}"
+    result = fmpy.simulate_fmu(str(unpack(build(path, kind="native"))), stop_time=1.0, output_interval=0.5)
+    assert list(result["y"]) == [1.0, 1.0, 1.0]
+
+
+# ---------------------------------------------------------------- the sources
+
+
+@pytest.mark.parametrize("compiler", [("gcc",), (sys.executable, "-m", "ziglang", "cc")], ids=["gcc", "zig"])
+def test_the_sources_compile_without_a_warning(tmp_path, reference, compiler):
+    if shutil.which(compiler[0]) is None:
+        pytest.skip(f"{compiler[0]} is not installed")
+    folder = unzip(native(reference), tmp_path)
+    source = folder / "sources" / "all.c"
+    compile_program([source], tmp_path / "o", *STRICT, "-O2", "-c", "-I", HEADERS, compiler=compiler)
+
+
+@pytest.mark.skipif(shutil.which("nm") is None, reason="needs nm")
+def test_nothing_but_the_functions_of_the_standard_is_visible(tmp_path):
+    folder = unzip(build(MIXED, kind="native"), tmp_path)
+    (library,) = (folder / "binaries").glob("*/*.so")
+    listed = subprocess.run(["nm", "-D", "--defined-only", library], capture_output=True, text=True, check=True).stdout
+    assert all(line.split()[-1].startswith("fmi2") for line in listed.splitlines())
+    own = compile_program([folder / "sources" / "all.c"], tmp_path / "o", "-c", "-I", _prefixing(tmp_path))
+    listed = subprocess.run(["nm", "--defined-only", "-g", own], capture_output=True, text=True, check=True).stdout
+    names = [line.split()[-1] for line in listed.splitlines()]
+    assert len(names) > 30
+    assert all(name.startswith("Mixed_fmi2") for name in names)
+    called = subprocess.run(["nm", "-u", own], capture_output=True, text=True, check=True).stdout
+    assert not re.search(r"\b(printf|exit|abort|setlocale)\b", called)
+
+
+def _prefixing(folder):
+    """The standard's headers, with the prefix that FMPy has taken out of its copy put back."""
+    place = folder / "headers"
+    if not place.exists():
+        shutil.copytree(HEADERS, place, ignore=shutil.ignore_patterns("fmi1*", "fmi3*", "*.txt"))
+        header = place / "fmi2Functions.h"
+        plain = "#define fmi2FullName(name) name\n"
+        assert plain in header.read_text()
+        header.write_text(
+            header.read_text().replace(
+                plain,
+                "#if defined(FMI2_FUNCTION_PREFIX)\n"
+                "  #define fmi2Paste(a,b)     a ## b\n"
+                "  #define fmi2PasteB(a,b)    fmi2Paste(a,b)\n"
+                "  #define fmi2FullName(name) fmi2PasteB(FMI2_FUNCTION_PREFIX, name)\n"
+                f"#else\n  {plain}#endif\n",
+            )
+        )
+    return place
+
+
+def test_two_source_fmus_run_side_by_side_in_one_program(tmp_path, sample):
+    models = {"TRAIN": "PointMassTrain", "OBSERVER": sample("Estimator")}
+    folders = {key: unzip(build(what, kind="native"), tmp_path / key) for key, what in models.items()}
+    described = {key: fmpy.read_model_description(folder) for key, folder in folders.items()}
+    references = {v.name.upper(): v.valueReference for d in described.values() for v in d.modelVariables}
+    flags = [f"-D{key}_GUID={d.guid!r}".replace("'", '"') for key, d in described.items()]
+    train = {v.name: v.valueReference for v in described["TRAIN"].modelVariables}
+    flags += [f"-DFORCE={train['force']}", f"-DSPEED={train['speed']}"]
+    flags += [f"-D{name}={references[name]}" for name in ("MEASURED", "ESTIMATE")]
+    headers = ["-I", _prefixing(tmp_path)]
+    objects = [
+        compile_program([folder / "sources" / "all.c"], tmp_path / f"{key}.o", "-std=c11", "-c", *headers)
+        for key, folder in folders.items()
+    ]
+    program = compile_program([HERE / "c" / "side_by_side.c", *objects], tmp_path / "both", *STRICT, *flags, *headers)
+    lines = subprocess.run([program], capture_output=True, text=True, check=True).stdout.split()
+    numbers = [float.fromhex(text) for text in lines]
+    speed = simulate(resolve("PointMassTrain")(), 5.0, 0.1, lambda t: {"force": 1e5 * (round(t / 0.1) % 7)})["speed"]
+    estimate = simulate(
+        resolve(sample("Estimator"))(), 5.0, 0.1, lambda t: {"measured": float(speed[round(t / 0.1) + 1])}
+    )
+    assert numbers[::2] == speed[1:].tolist()
+    # The program left the first measurement unset before initialization, so its estimate starts from zero.
+    assert len(numbers[1::2]) == len(estimate["estimate"]) - 1
+    assert abs(numbers[-1] - estimate["estimate"][-1]) < 1e-2
+
+
+@pytest.mark.parametrize("what", ["PointMassTrain", MIXED], ids=["PointMassTrain", "Mixed"])
+def test_fmpy_compiles_the_sources_to_the_same_results(tmp_path, monkeypatch, what):
+    """FMPy's own build of source FMUs, with CMake, its headers and other flags than ours."""
+    monkeypatch.setenv("PATH", f"{Path(sys.executable).parent}{os.pathsep}{os.environ['PATH']}")
+    if shutil.which("cmake") is None:
+        pytest.skip("cmake is not installed")
+    folder = unzip(build(what, kind="native"), tmp_path / "fmu")
+    ours = fmpy.simulate_fmu(str(folder), stop_time=5.0, output_interval=0.25)
+    shutil.rmtree(folder / "binaries")
+    fmpy.build.build_platform_binary(folder)
+    assert list((folder / "binaries").glob("*/*.so"))
+    theirs = fmpy.simulate_fmu(str(folder), stop_time=5.0, output_interval=0.25)
+    for name in ours.dtype.names:
+        assert np.array_equal(ours[name], theirs[name]), name
+
+
+@pytest.mark.parametrize("what", ["PointMassTrain", MIXED, "Learner", "Dice", "Counter"])
+def test_the_whole_interface_runs_clean_under_the_sanitizers(tmp_path, sample, what):
+    """AddressSanitizer (leaks included) and UndefinedBehaviorSanitizer, on a driver that calls everything."""
+    if shutil.which("gcc") is None:
+        pytest.skip("needs gcc")
+    reference = sample(what) if what in ("Learner", "Dice", "Counter") else what
+    folder = unzip(build(reference, kind="native"), tmp_path / "fmu")
+    program = compile_program(
+        [HERE / "c" / "whole_api.c"],
+        tmp_path / "driver",
+        *("-std=c11", "-g", "-O1", "-fsanitize=address,undefined,float-cast-overflow", "-fno-sanitize-recover=all"),
+        *("-DFMI2_OVERRIDE_FUNCTION_PREFIX", "-I", folder / "sources", "-I", HEADERS),
+        *("-Wall", "-Wextra", "-Werror"),
+    )
+    environment = {**os.environ, "ASAN_OPTIONS": "detect_leaks=1:strict_string_checks=1"}
+    done = subprocess.run(
+        [program, tmp_path / "tape"], env=environment, capture_output=True, text=True, check=False
+    )
+    assert (done.returncode, done.stderr, done.stdout) == (0, "", "clean\n")
+
+
+def test_the_base_class_is_no_fmu():
+    with pytest.raises((ComponentError, TracingError)):
+        build_component(type("Bad", (Component,), {"__doc__": "x", "outputs": lambda self: {"nothing": 1.0}})(), "native")
