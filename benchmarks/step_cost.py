@@ -20,14 +20,13 @@ import tempfile
 import time
 from collections.abc import Callable
 from pathlib import Path
-from typing import Any
 
 from fmpy.fmi2 import FMU2Slave
 from railcosim.orchestrator import load
 from railcosim.orchestrator.archive import Workspace
 from railcosim.orchestrator.check import Checked, check
 from railcosim.orchestrator.fmu import forget_paths
-from railcosim.orchestrator.master import Master
+from railcosim.orchestrator.master import Master, Rows
 from railcosim.orchestrator.results import Recorder
 from railcosim.orchestrator.system import System
 
@@ -41,15 +40,14 @@ def ours(system: System, checked: Checked, steps: int, *, record: bool) -> Measu
     slaves = {name: model.instantiate(name) for name, model in checked.models.items()}
     master = Master(slaves, checked.order.sequence, checked.wiring.links, checked.wiring.starts, system.algorithm)
     master.initialize(0.0, system.stop_time)
-    recorder = Recorder(master.signals, None)
+    recorder = Recorder(master.signals, master.kinds, None)
 
-    def observe(k: int, now: float, values: Any) -> bool:
-        if record:
-            recorder.record(now, values)
+    def observe(_: int, rows: Rows) -> bool:
+        recorder.extend(rows)
         return True
 
     begin = time.process_time()
-    master.run(0.0, system.step, steps, observe)
+    master.run(0.0, system.step, steps, 1 if record else steps, observe)
     seconds = time.process_time() - begin
     ends = [v for n, v in zip(master.signals, master.values, strict=True) if n.startswith("train") and "position" in n]
     for slave in slaves.values():

@@ -228,7 +228,8 @@ def _continued(rows: Rows, pad: int) -> Rows:
     rise = rows[-1] - rows[0]
     straight = rows[place] + turn[:, None] * rise
     mirrored = (2.0 * rows[-1] - rows[period - place]) + (turn[:, None] - 1) * rise
-    return np.where(turn[:, None] % 2 == 0, straight, mirrored)
+    continued: Rows = np.where(turn[:, None] % 2 == 0, straight, mirrored)
+    return continued
 
 
 def _low_pass(rows: Rows, gain: float) -> Rows:

@@ -8,7 +8,6 @@ bytes.
 from __future__ import annotations
 
 import html
-from collections.abc import Iterable
 from typing import Any
 
 from ..components.component import ComponentError
@@ -74,7 +73,7 @@ class Formulas:
         )
 
 
-def _path(points: Any, codes: Iterable[int]) -> str:
+def _path(points: Any, codes: Any) -> str:
     from matplotlib.path import Path  # noqa: PLC0415
 
     pieces = []

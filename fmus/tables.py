@@ -133,7 +133,9 @@ def _text(v: ScalarVariable, component: Component) -> str:
     value = component.__dict__[v.slot.name]
     text = value if v.element is None else np.ravel(value)[v.element]
     if len(text.encode()) >= _MAX_TEXT or "\0" in text:
-        raise ComponentError(f"{type(component).__name__}.{v.name}: a native FMU holds texts of up to {_MAX_TEXT - 1} bytes")
+        raise ComponentError(
+            f"{type(component).__name__}.{v.name}: a native FMU holds texts of up to {_MAX_TEXT - 1} bytes"
+        )
     return _quoted(text)
 
 
@@ -142,6 +144,6 @@ def _quoted(text: str) -> str:
     plain = {ord(c) for c in " !#$%&'()*+,-./:;<=>@[]^_`{|}~"}
     return (
         '"'
-        + "".join(chr(b) if chr(b).isalnum() and b < 128 or b in plain else f"\\{b:03o}" for b in text.encode())
+        + "".join(chr(b) if (chr(b).isalnum() and b < 128) or b in plain else f"\\{b:03o}" for b in text.encode())
         + '"'
     )

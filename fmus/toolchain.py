@@ -1,8 +1,8 @@
 """Compiling a native FMU: the system's C compiler for this machine, ziglang for every other platform.
 
-Flags are chosen so that the bits do not depend on the machine: a baseline processor, no fused multiply-add, and no power
-turned into a product, which would round differently from the C library's, and with it from Python's. Nothing of the
-machine gets into a library either: names are relative, and neither times nor debug information are kept.
+Flags are chosen so that the bits do not depend on the machine: a baseline processor, no fused multiply-add, and no
+power turned into a product, which would round differently from the C library's, and with it from Python's. Nothing of
+the machine gets into a library either: names are relative, and neither times nor debug information are kept.
 
 Folders below ``binaries/``: FMI 2.0 knows ``linux64``, ``win64`` and ``darwin64`` and means 64-bit x86 by them; for
 other machines FMI 2.0.5 refers to the platform tuples of FMI 3.0, hence ``aarch64-linux``. Importers differ: on an Arm
@@ -102,7 +102,7 @@ def system_compiler() -> str | None:
     """The system's C compiler: the one CC names, or the first of cc, gcc, clang (on Windows cl first), or None."""
     usual = ("cl", "cc", "gcc", "clang") if sys.platform.startswith("win") else ("cc", "gcc", "clang")
     for name in (os.environ.get("CC"), *usual):
-        found = shutil.which(name) if name else None
+        found: str | None = shutil.which(name) if name else None
         if found is not None:
             return found
     return None

@@ -1,7 +1,7 @@
 """Tracing: a component's equations, run on symbols, become CasADi expressions and from them C.
 
-The values of an instance stand in one vector: every scalar variable at its value reference, then the cells of the tapes,
-then those of the random numbers. Time and the length of a sample are the vector ``clock``.
+The values of an instance stand in one vector: every scalar variable at its value reference, then the cells of the
+tapes, then those of the random numbers. Time and the length of a sample are the vector ``clock``.
 """
 
 from __future__ import annotations
@@ -326,15 +326,16 @@ class _Tracer:
                 raise TracingError(f"{self.name}.{slot.name} is a computed text; only a Python FMU can have one")
             if slot.name not in returned:
                 raise TracingError(f"{self.name}.{method} returns no value of {slot.name!r}")
-            array = np.asarray(returned[slot.name], dtype=object)
+            try:
+                array = np.asarray(returned[slot.name], dtype=object)
+                expressions = [_expression(cell) for cell in array.flat]
+            except ValueError as error:  # a text, or something else that is no number; TracingError is one
+                raise TracingError(f"{self.name}.{method}: {slot.name!r}: {error}") from None
             if array.shape != slot.shape:
                 raise TracingError(
                     f"{self.name}.{method}: {slot.name!r} has shape {array.shape}, declared {slot.shape}"
                 )
-            try:
-                cells += [_expression(cell) for cell in array.flat]
-            except TracingError as error:
-                raise TracingError(f"{self.name}.{method}: {slot.name!r}: {error}") from None
+            cells += expressions
         return cells
 
 

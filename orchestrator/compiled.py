@@ -11,7 +11,6 @@ from collections.abc import Iterable
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
 
 from .fmu import FmuChannel, FmuSlave
 
@@ -142,7 +141,7 @@ class CompiledLoop:
         return done == count
 
     def _raise(self, failed: int, status: int, time: float, step: float) -> None:
-        """Raise what `Master` does; a failed operation with a status that is no failure left a value that is not finite."""
+        """Raise what `Master` does; with a status that is no failure, a value is not finite."""
         slave, call = self._culprits[failed]
         slave.time = time + step if call.startswith("fmi2Get") else time
         slave.check(call, status)

@@ -103,7 +103,7 @@ _SIGNATURES: dict[str, list[Any]] = {
         for suffix in ("Real", "Integer", "Boolean", "String")
     },
 }
-"""What is called at every step: FMPy's own methods check and log in Python at each call, so there the library's functions
+"""What is called at every step. FMPy's own methods check and log in Python at each call: here the library's functions
 are called directly."""
 
 
@@ -181,7 +181,9 @@ class FmuSlave:
         self.log: deque[str] = deque(maxlen=_LOG_LINES)
         self._dead = False
         try:
-            self._library: _Library | None = _open_library(library(folder, interface, interface.model), interface, folder)
+            self._library: _Library | None = _open_library(
+                library(folder, interface, interface.model), interface, folder
+            )
             self._fmu = copy.copy(self._library.fmu)
             self._fmu.instanceName = name
             self._callbacks = _callbacks(id(self), self.log)

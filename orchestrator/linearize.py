@@ -1,32 +1,32 @@
 """The closed loop of a scenario as a linear model around one point of its run: x' = A x + B u, y = C x + D u.
 
 Every FMU gives its own matrices (`local_model`); the connections join them. A system of continuous parts gives a
-continuous model of ideal exchange: what passes straight through a block is eliminated, algebraic loops are solved. Where
-a block is sampled, or a connection delayed, the model is that of one communication step, in the very order in which the
-master exchanges values.
+continuous model of ideal exchange: what passes straight through a block is eliminated, algebraic loops are solved.
+Where a block is sampled, or a connection delayed, the model is that of one communication step (`one_step`), in the very
+order in which the master exchanges values.
 """
 
 from __future__ import annotations
 
+import importlib
 import re
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
 import networkx as nx
 import numpy as np
-from numpy.typing import NDArray
 
 from .archive import Workspace
 from .check import Checked, check
 from .errors import FmuError, ScenarioError, did_you_mean
 from .fmu import Slave, forget_paths
 from .loading import Kind
-from .local_model import Array, Block, Stepped, make_block
+from .local_model import Array, Continuous, Stepped, make_block
 from .master import Master
+from .one_step import Composition
 from .run import Progress
 from .system import System
-from .wiring import Link
 
 Signal = tuple[str, str]
 """(instance, scalar variable)."""
@@ -63,7 +63,7 @@ class Linearization:
     def state_space(self) -> Any:
         """As a `control.StateSpace` with named signals where python-control is installed, else SciPy's state space."""
         try:
-            import control  # noqa: PLC0415 (optional)
+            control = importlib.import_module("control")  # optional
         except ImportError:
             from scipy import signal  # noqa: PLC0415
 
@@ -121,7 +121,7 @@ def linearize(
             master = Master(slaves, checked.order.sequence, wiring.links, wiring.starts, system.algorithm)
             master.initialize(system.start_time, stop)
             _advance(master, system, round(steps), progress)
-            loop = _Loop(system, checked, master, inputs, outputs)
+            loop = Loop(system, checked, master, inputs, outputs)
             return loop.linearize(sampled)
         finally:
             for slave in slaves.values():
@@ -141,7 +141,7 @@ def _advance(master: Master, system: System, count: int, progress: Progress | No
         master.run(system.start_time, system.step, count, every, observe)
 
 
-class _Loop:
+class Loop:
     """A running master on its way to a linear model."""
 
     def __init__(
@@ -243,14 +243,8 @@ class _Loop:
         inner = np.linalg.solve(mixing, np.hstack([c, d @ drive]))
         from_x, from_e = inner[:, : len(x)], inner[:, len(x) :]
         rows = [y.index(signal) for signal in self.outputs]
-        return self._result(
-            a + b @ link @ from_x,
-            b @ (link @ from_e + drive),
-            from_x[rows],
-            from_e[rows] + at_output[rows],
-            [".".join(signal) for signal in x],
-            None,
-        )
+        closed: Any = a + b @ link @ from_x, b @ (link @ from_e + drive), from_x[rows], from_e[rows] + at_output[rows]
+        return self._result(Continuous(*closed), [".".join(signal) for signal in x], None)
 
     def _exchange(self, u: Sequence[Signal], y: Sequence[Signal]) -> tuple[Array, Array, Array]:
         """Which output feeds which input (times its scale), and where the chosen inputs are added."""
@@ -283,8 +277,8 @@ class _Loop:
 
     def _discrete(self) -> Linearization:
         """One communication step, in the master's own order; registers keep what is read a step late."""
-        models = self._step_models()
-        return _Composition(self, models).result()
+        matrices, states = Composition(self, self._step_models()).result()
+        return self._result(matrices, states, self.system.step)
 
     def _step_models(self) -> dict[str, Stepped]:
         master, models = self.master, {}
@@ -302,20 +296,16 @@ class _Loop:
             self.notes.append(f"no slope here, what switches is held: {_families(rough)}")
         return models
 
-    def _result(
-        self, a: Array, b: Array, c: Array, d: Array, states: Sequence[str], step: float | None
-    ) -> Linearization:
-        if not np.isfinite(a).all():
+    def _result(self, matrices: Continuous, states: Sequence[str], step: float | None) -> Linearization:
+        if not np.isfinite(matrices.a).all():
             raise FmuError("a derivative is not finite", time=self.time)
         signals = [*self.inputs, *self.outputs, *((n, s) for n, block in self.blocks.items() for s in block.states)]
-        units = {
-            ".".join(s): unit for s in signals if (unit := self.blocks[s[0]].slave.interface.variables[s[1]].unit)
-        }
+        units = {".".join(s): unit for s in signals if (unit := self.blocks[s[0]].slave.interface.variables[s[1]].unit)}
         return Linearization(
-            a,
-            b,
-            c,
-            d,
+            matrices.a,
+            matrices.b,
+            matrices.c,
+            matrices.d,
             tuple(states),
             tuple(".".join(signal) for signal in self.inputs),
             tuple(".".join(signal) for signal in self.outputs),
@@ -330,122 +320,6 @@ class _Loop:
     def _values(self) -> dict[str, float]:
         known = dict(zip(self.master.signals, self.master.values, strict=True))
         return {".".join(s): float(known[".".join(s)]) for s in self.outputs if ".".join(s) in known}
-
-
-class _Composition:
-    """One communication step of the whole system out of the steps of its blocks.
-
-    Every quantity is a row over (states at the begin, chosen inputs); a row is passed on as the master passes values.
-    """
-
-    def __init__(self, loop: _Loop, models: Mapping[str, Stepped]) -> None:
-        self.loop, self.models = loop, models
-        self.sequence = [slave.name for slave in loop.master.sequence]
-        self.jacobi = loop.system.algorithm == "jacobi"
-        self.states = [(n, s) for n, block in loop.blocks.items() for s in block.states]
-        self.registers: list[tuple[Signal, int]] = []
-        self._register()
-        self.width = len(self.states) + len(self.registers)
-        self.rows = np.eye(self.width, self.width + len(loop.inputs))
-        self.fresh: dict[Signal, Array] = {}
-
-    def _register(self) -> None:
-        """What is read of former communication points and does not follow from the states: (signal, how old)."""
-        stepped: set[str] = set()
-        for name in self.sequence:
-            for target in self._targets(name):
-                link = self.loop.links[target]
-                age = self._age(link, link.source[0] in stepped)
-                if age is not None:
-                    oldest = 0 if age == 0 else 1
-                    kept = [(link.source, k) for k in range(oldest, age + 1)]
-                    kept += [(link.source, 0)]
-                    self.registers += [r for r in kept if r not in self.registers and self._must_keep(*r)]
-            if not self.jacobi:
-                stepped.add(name)
-        self.registers.sort(key=lambda r: (self.sequence.index(r[0][0]), r[0][1], r[1]))
-
-    def _targets(self, name: str) -> list[Signal]:
-        return [(name, i) for i in self.loop.blocks[name].inputs if (name, i) in self.loop.links]
-
-    def _age(self, link: Link, is_fresh: bool) -> int | None:
-        """How many communication points before the begin of the step the value read was recorded; None: just now."""
-        age = self.loop.master._age(link)
-        if age is None:
-            return None if is_fresh else 0
-        return age
-
-    def _must_keep(self, signal: Signal, age: int) -> bool:
-        """A present value that states determine is computed from them."""
-        block = self.loop.blocks[signal[0]]
-        if block.way == "source":
-            return False
-        return age > 0 or self._passes(signal)
-
-    def _passes(self, signal: Signal) -> bool:
-        block = self.loop.blocks[signal[0]]
-        k = block.outputs.index(signal[1])
-        return bool(self.models[signal[0]].d[k].any())
-
-    # ---------------------------------------------------------------- rows
-
-    def _state_rows(self, name: str) -> Array:
-        return self.rows[[k for k, (n, _) in enumerate(self.states) if n == name]]
-
-    def _added(self, signal: Signal, row: Array) -> Array:
-        """With the deviation that is added to this signal, if one is."""
-        if signal not in self.loop.inputs:
-            return row
-        row = row.copy()
-        row[self.width + self.loop.inputs.index(signal)] += 1.0
-        return row
-
-    def _recorded(self, signal: Signal, age: int) -> Array:
-        """A recorded value, ``age`` points before the begin of the step."""
-        if (signal, age) in self.registers:
-            return np.asarray(self.rows[len(self.states) + self.registers.index((signal, age))])
-        if self.loop.blocks[signal[0]].way == "source":
-            return np.zeros(self.rows.shape[1])
-        model, block = self.models[signal[0]], self.loop.blocks[signal[0]]
-        return np.asarray(model.c[block.outputs.index(signal[1])] @ self._state_rows(signal[0]))
-
-    def _input_rows(self, name: str, stepped: Collection[str]) -> Array:
-        block = self.loop.blocks[name]
-        rows = np.zeros((len(block.inputs), self.rows.shape[1]))
-        for k, variable in enumerate(block.inputs):
-            target = (name, variable)
-            if target in self.loop.links:
-                link = self.loop.links[target]
-                age = self._age(link, link.source[0] in stepped)
-                row = self.fresh[link.source] if age is None else self._recorded(link.source, age)
-                rows[k] = link.scale * self._added(link.source, row)
-            rows[k] = self._added(target, rows[k])
-        return rows
-
-    def result(self) -> Linearization:
-        """The composed model."""
-        loop, stepped = self.loop, set[str]()
-        following = np.zeros_like(self.rows)
-        seen: dict[Signal, Array] = {}
-        for name in self.sequence:
-            model, block = self.models[name], loop.blocks[name]
-            x, u = self._state_rows(name), self._input_rows(name, stepped)
-            following[[k for k, (n, _) in enumerate(self.states) if n == name]] = model.phi @ x + model.gamma @ u
-            after, before = model.e @ x + model.f @ u, model.c @ x + model.d @ u
-            for k, output in enumerate(block.outputs):
-                self.fresh[name, output] = after[k]
-                seen[name, output] = self._added((name, output), before[k])
-            if not self.jacobi:
-                stepped.add(name)
-        for k, (signal, age) in enumerate(self.registers, len(self.states)):
-            following[k] = self.fresh[signal] if age == 0 else self._recorded(signal, age - 1)
-        outputs = np.array([seen[signal] for signal in loop.outputs]).reshape(-1, self.rows.shape[1])
-        names = [".".join(s) for s in self.states]
-        names += [
-            f"{'.'.join(s)} (recorded)" if age == 0 else f"{'.'.join(s)} ({age} earlier)" for s, age in self.registers
-        ]
-        n, system = self.width, loop.system
-        return loop._result(following[:, :n], following[:, n:], outputs[:, :n], outputs[:, n:], names, system.step)
 
 
 def _resolve(wanted: Sequence[str], valid: Sequence[Signal], option: str) -> list[Signal]:
@@ -473,6 +347,3 @@ def _resolve(wanted: Sequence[str], valid: Sequence[Signal], option: str) -> lis
 def _families(names: Sequence[str]) -> str:
     """``cruise[1], cruise[2]`` as ``cruise[:]``."""
     return ", ".join(dict.fromkeys(re.sub(r"\[\d+\]", "[:]", name) for name in names))
-
-
-__all__ = ["Linearization", "NDArray", "linearize"]

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
+from functools import partial
 from typing import Any, Literal
 
 import numpy as np
@@ -23,7 +24,7 @@ from .snapshot import guarded, state_names, take
 Array = NDArray[np.float64]
 Way = Literal["derivatives", "differences", "source"]
 
-_FIRST_STEP = 1e-4
+_FIRST_STEP = 1e-3
 """First step of the finite differences, relative to the value's size above 1."""
 _HALVINGS = 6
 _ROUGH = 1e-3
@@ -166,7 +167,7 @@ class Block:
                 self.slave.channel("Real", [name]).set([float(x)])
             self.slave.step(time, length)
             ends.append(self.slave.channel("Real", self.outputs).get())
-        if self.outputs and not np.allclose(*ends, rtol=1e-9, atol=1e-12):
+        if self.outputs and not np.allclose(ends[0], ends[1], rtol=1e-9, atol=1e-12):
             raise ScenarioError(
                 f"{self.name}: {self.slave.interface.model} lists no states in ModelStructure/Derivatives, but its "
                 "outputs remember former inputs: it cannot be linearized; export it with its states and "
@@ -189,17 +190,19 @@ def make_block(slave: Slave, model: Model) -> Block:
         note = "" if vendor or rates else f"{slave.name}: {interface.model} lists no states; it is taken to have none"
         return Block(slave, "derivatives", rates, (), note=note)
     if vendor:
-        note = "" if vendor.get("kind") == "native" and isinstance(slave, FmuSlave) else "finite differences over a step"
-        reason = f"{slave.name} ({interface.model}): {note}: it is no native FMU" if note else ""
-        return Block(slave, "differences", rates, tuple(n for n in state_names(slave) if n not in rates), note=reason)
+        native = vendor.get("kind") == "native" and isinstance(slave, FmuSlave)
+        note = "" if native else f"{interface.model} is no native FMU here: finite differences over a step"
+        return Block(slave, "differences", rates, tuple(n for n in state_names(slave) if n not in rates), note=note)
     if interface.can_save_state:
         listed = f"of its states {', '.join(rates)}" if rates else "of its inputs; it lists no states"
-        note = f"{slave.name}: {interface.model} gives no directional derivatives: finite differences over a step {listed}"
+        note = (
+            f"{slave.name}: {interface.model} gives no directional derivatives: finite differences over a step {listed}"
+        )
         return Block(slave, "differences", rates, (), note=note)
     raise ScenarioError(
-        f"{slave.name}: {interface.model} can be linearized in no way: it gives no directional derivatives and does not "
-        "save its state; export it with providesDirectionalDerivative or canGetAndSetFMUstate, or --swap another model "
-        "in its place"
+        f"{slave.name}: {interface.model} can be linearized in no way: it gives no directional derivatives and does "
+        "not save its state; export it with providesDirectionalDerivative or canGetAndSetFMUstate, or --swap another "
+        "model in its place"
     )
 
 
@@ -223,7 +226,7 @@ def _directional(slave: Slave, unknowns: Sequence[str], knowns: Sequence[str]) -
     fmu, variables = slave._fmu, slave.interface.variables
     rows = [variables[name].reference for name in unknowns]
     columns = [variables[name].reference for name in knowns]
-    found = [guarded(slave, lambda r=r: fmu.getDirectionalDerivative(rows, [r], [1.0])) for r in columns]
+    found = [guarded(slave, partial(fmu.getDirectionalDerivative, rows, [column], [1.0])) for column in columns]
     return np.array(found).reshape(len(columns), len(rows)).T
 
 
@@ -231,7 +234,7 @@ def _input(slave: Slave, name: str) -> float:
     return float(slave.channel("Real", [name]).get()[0])
 
 
-def held(a: Array, b: Array, length: float) -> tuple[Array, Array]:
+def held(a: Any, b: Any, length: float) -> tuple[Array, Array]:
     """State after a step of x' = A x + B u with u held: x+ = phi x + gamma u."""
     n, m = b.shape
     both = np.zeros((n + m, n + m))

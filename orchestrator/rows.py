@@ -1,9 +1,9 @@
 """The files that recorded rows live in: ``results.bin`` while a run goes, ``results.csv`` once it has ended.
 
-``results.csv`` is for people and other programs. Its numbers are the shortest that read back to the same bits; finding
-those takes far longer than a step does. While a run goes its rows are therefore appended to ``results.bin``: one line of
-JSON with the ``columns`` and those of them that hold ``whole`` numbers, then each row as 64-bit little-endian floats.
-The file is removed when ``results.csv`` is complete; where it is still there, the run was killed.
+``results.csv`` is for people and other programs. Its numbers are the shortest that read back to the same bits, and
+finding those takes longer than many a step. While a run goes its rows are therefore appended to ``results.bin``: one
+line of JSON with the ``columns`` and the places of those that hold ``whole`` numbers, then each row as 64-bit
+little-endian floats. That file is removed when ``results.csv`` is complete; where it is still there, the run was killed.
 """
 
 from __future__ import annotations
@@ -100,6 +100,8 @@ def _read_binary(path: Path) -> tuple[list[str], list[int], NDArray[np.float64]]
         header = json.loads(stream.readline())
         numbers = np.fromfile(stream, _FLOAT)
     columns = header["columns"]
+    if not columns:
+        raise ValueError(f"{path.name} has no columns")
     return columns, header["whole"], numbers[: len(numbers) // len(columns) * len(columns)].reshape(-1, len(columns))
 
 

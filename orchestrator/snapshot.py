@@ -78,7 +78,8 @@ def _read_json(slave: Any) -> dict[str, Any]:
         finally:
             slave._fmu.freeFMUstate(state)
 
-    return guarded(slave, read)
+    found: dict[str, Any] = guarded(slave, read)
+    return found
 
 
 def guarded(slave: Slave, call: Callable[[], Any]) -> Any:
@@ -216,7 +217,7 @@ def _numbers(slave: FmuSlave) -> dict[int, float]:
     found: dict[int, float] = {}
     for kind in ("Real", "Integer", "Boolean"):
         named = [v for v in slave.interface.variables.values() if v.type == kind and not v.name.startswith("der(")]
-        channel = slave.channel(kind, [v.name for v in named])  # type: ignore[arg-type]
+        channel = slave.channel(kind, [v.name for v in named])
         found |= {v.reference: float(x) for v, x in zip(named, channel.get(), strict=True)}
     return found
 

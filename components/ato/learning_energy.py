@@ -6,8 +6,11 @@ from typing import Any
 
 from ..component import Component, Values
 from ..declarations import Input, Memory, Output, Parameter, Tape
-from ..maths import clip, maximum, pi, tan, where
+from ..maths import clip, logical_and, maximum, pi, tan, where
 from ..trains.multiple_unit import WAITING
+
+_NONE = -1e12
+"""J: a change from trip to trip before there was one."""
 
 
 class LearningEnergy(Component):
@@ -37,6 +40,9 @@ class LearningEnergy(Component):
     mass = Parameter("kg", 194295.0, minimum=1.0, description="mass of the train")
     barrier = Parameter("m/s", 0.1, minimum=1e-6, description="bound v_b of the augmented error")
     has_barrier = Parameter("1", True, description="whether the controller has a barrier")
+    watched = Parameter(
+        "1", True, description="whether the change is computed; the proof knows no wrong mass, no noise"
+    )
     learning_gain = Parameter("1", (5e5, 0.01, 0.01), shape=(3,), minimum=1e-12, description="gains Gamma, as its")
 
     past_energy = Tape("J", 0.0, description="E of the trip before at this instant")
@@ -52,11 +58,11 @@ class LearningEnergy(Component):
 
     def outputs(self) -> Values:
         energy = self._energy()
-        return {"energy": energy, "change": where(self.past_known > 0.5, energy - self.past_energy, 0.0)}
+        return {"energy": energy, "change": where(self._comparable(), energy - self.past_energy, 0.0)}
 
     def update(self) -> Values:
         waiting, energy = self.trip_time < WAITING, self._energy()
-        change = where(self.past_known > 0.5, energy - self.past_energy, -1e12)
+        change = where(self._comparable(), energy - self.past_energy, _NONE)
         return {
             "past_energy": energy,
             "past_known": 1.0,
@@ -64,6 +70,10 @@ class LearningEnergy(Component):
             "past_rate": where(waiting, 0.0, self._rate()),
             "largest_change": where(waiting, self.largest_change, maximum(self.largest_change, change)),
         }
+
+    def _comparable(self) -> Any:
+        """Whether there is a trip before to compare with."""
+        return logical_and(self.watched, self.past_known > 0.5)
 
     def _rate(self) -> Any:
         rate: Any = 0.0

@@ -28,7 +28,7 @@ class Ahead(NamedTuple):
 
 
 class Law(NamedTuple):
-    """Results of the control law, by carriage: acceleration estimate, jerk command, n, command in N."""
+    """Results of the control law, by carriage: acceleration estimate, jerk, n, and command in N before its limit."""
 
     acceleration: list[Any]
     jerk: list[Any]
@@ -45,6 +45,9 @@ class ConsistCruise(Estimator, ABC):
     ``ahead_jerk`` from its controller. Positions must be of one instant.
 
     A subclass gives the jerk command of the head; the other carriages follow by backstepping on the carriage in front.
+    With ``limit_force`` the observer and the carriages behind are told what the limited command gives: a jerk command
+    that an actuator cannot follow, passed on, would keep the train behind from braking.
+
     With ``late_action`` the observer is advanced with the command of the sample before, which is the one that acts, and
     the law uses what it foresees for the time at which the new command will: the late exchange costs no precision.
 
@@ -81,7 +84,7 @@ class ConsistCruise(Estimator, ABC):
 
     force = Output("N", shape=(_carriages,), description="command to each actuator, u")
     tail_acceleration = Output("m/s2", description="estimated acceleration of the last carriage, for the train behind")
-    tail_jerk = Output("m/s3", description="jerk command of the last carriage, for the train behind")
+    tail_jerk = Output("m/s3", description="jerk of the last carriage by its limited command, for the train behind")
     distance_error = Output("m", description="distance to the train ahead minus d_s, e")
     combined_error = Output("m/s", description="z = speed difference + rho e")
     barrier_violated = Output("1", bool, description="whether e or z is outside its range: the safe action is on")
@@ -166,7 +169,10 @@ class ConsistCruise(Estimator, ABC):
             own = Ahead(x[j], v[j], a[j], None)
             jerk = self._follow(ahead, own, self.carriage_spacing) if j else self._head_jerk(ahead, own)
             p, fault = estimate.specific_force[j], estimate.specific_fault[j]
-            commands.append(self.mass[j] * (p - fault + self.actuator_lag * (jerk + n_rate[j])))
+            command = self.mass[j] * (p - fault + self.actuator_lag * (jerk + n_rate[j]))
+            # Whoever follows must count on the jerk that the limited command gives, not on the one it falls short of.
+            jerk = jerk + (self._limited(command) - command) / (self.mass[j] * self.actuator_lag)
+            commands.append(command)
             jerks.append(jerk)
             ahead = own._replace(jerk=jerk)
         return Law(a, jerks, n, commands)

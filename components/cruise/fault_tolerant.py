@@ -26,8 +26,8 @@ _BARRIER = (
     r"$\alpha = \hat a_f + \rho e_v + k_z s_z + k_e h g, \quad e_3 = \hat a - \alpha, \quad"
     r" \sigma = k_z \mu_z + k_e h g', \quad m = \rho + \sigma$,",
     r"$J = J_f + \rho e_a + \sigma\,(e_a + \rho e_v) + k_e h' g e_v - (k_a + k_d m^2)\,e_3 + \gamma s_z \mu_z$",
-    r"with $s(y) = \dfrac{a b y}{(a + y)(b - y)}, \quad \mu = s', \quad h = s_e \mu_e, \quad g = z / (s_z \mu_z)$ on the"
-    r" ranges $(-a, b)$ of $e$ and $z$, both held at clip_fraction of them",
+    r"with $s(y) = \dfrac{a b y}{(a + y)(b - y)}, \quad \mu = s', \quad h = s_e \mu_e, \quad g = z / (s_z \mu_z)$ on"
+    r" the ranges $(-a, b)$ of $e$ and $z$, both held at clip_fraction of them",
 )
 
 
@@ -66,11 +66,11 @@ class BarrierCruise(ConsistCruise, ABC):
 
 
 class FaultTolerantCruise(StateFaultEstimator, BarrierCruise):
-    """Fault-tolerant cooperative cruise of a train of carriages under state constraints (after Zhang & Chen 2022).
+    """Fault-tolerant cooperative cruise under state constraints (reconstructed after Zhang & Chen 2022).
 
-    Reconstructed: every formula is re-derived so that the source's statements hold. A state-fault observer estimates
-    each actuator's force and fault; each carriage follows the one in front by backstepping; the head keeps distance
-    e in (d_e - d_s, d_c - d_s) and z = e_v + rho e in its range through a barrier. The command is
+    For a train of carriages. Reconstructed: every formula is re-derived so that the source's statements hold. A
+    state-fault observer estimates each actuator's force and fault; each carriage follows the one in front by
+    backstepping; the head keeps e = distance - d_s and z = e_v + rho e in range through a barrier. The command is
     u = M [p^ - (q^0 + q^1) + tau (J + dn/dt)], which makes the jerk the commanded J and cancels the estimated fault.
 
     Safe action: e and z are held at ``clip_fraction`` of their ranges before they are transformed, and the derivatives
@@ -85,9 +85,10 @@ class FaultTolerantCruise(StateFaultEstimator, BarrierCruise):
 
 
 class FaultTolerantCruiseIntermediate(IntermediateEstimatorEquations, BarrierCruise):
-    """The fault-tolerant cruise with the intermediate estimator (Zhu et al. 2015) for an observer: the baseline.
+    """The fault-tolerant cruise with the intermediate estimator for an observer (reconstructed): the baseline.
 
-    Reconstructed and re-derived like `FaultTolerantCruise`. It finds constant faults; periodic ones leave a residual.
+    Reconstructed and re-derived like `FaultTolerantCruise`, observer after Zhu et al. 2015. It finds constant
+    faults; periodic ones leave a residual.
     """
 
     source = f"{_SOURCE}; observer: Zhu, Yang, Wang, Wang, IEEE TAC 61(9)"
@@ -96,7 +97,7 @@ class FaultTolerantCruiseIntermediate(IntermediateEstimatorEquations, BarrierCru
 
 
 class BacksteppingCruise(StateFaultEstimator, ConsistCruise):
-    """The fault-tolerant cruise without its barrier: heads use plain backstepping as well. An ablation.
+    """The fault-tolerant cruise without its barrier (reconstructed): an ablation, plain backstepping for all.
 
     Reconstructed and re-derived like `FaultTolerantCruise`. It does not keep the speed difference in its range:
     ``barrier_violated`` only reports.

@@ -24,7 +24,8 @@ class FixedDistanceCruise(PairwiseCruise):
         r" f = \alpha\,(v_\mathrm{front} - v_\mathrm{rear}) + P(d)$",
         r"$P(d) = \kappa\,(d - d^*)$",
         r"$F = m\,(u + c_0 + c_1 v + c_2 v^2 + r)$, with $u = b$ or, with a limit, $u$ = $b$ held within it",
-        r"Reconstructed: with gap $d$, desired_gap $d^*$, gap_gain $\kappa$, demand $u$, force $F$, mass $m$, line_resistance $r$.",
+        r"Reconstructed: with gap $d$, desired_gap $d^*$, gap_gain $\kappa$, demand $u$, force $F$, mass $m$,"
+        r" line_resistance $r$.",
     )
     note = "Reconstructed: gains, weight rho and compensation at the own speed are ours, fitted to a published table."
     recommended_step = 0.1

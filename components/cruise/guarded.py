@@ -14,6 +14,8 @@ _ONSET = 0.2
 """s: time constant with which caution behind the train ahead, and the held bound, follow the onset of an outage."""
 _FADE = 2.0
 """s: time constant with which the train behind and the leader fade out: nothing is in a hurry there."""
+_FIRMNESS = 4.0
+"""How firmly the safe speed is held, over the reaction time: 4 comes to rest without overshoot (critical damping)."""
 _FASTEST = 300.0
 """m/s: speeds heard are held below this where they are squared, so that nonsense stays finite."""
 
@@ -28,7 +30,7 @@ class GuardedCruise(CruiseController, ABC):
        the train ahead, the demand is held below the *safe bound*: the speed from which the own train, braking with
        ``braking`` after ``reaction_time``, stops ``standstill_gap`` short of where the train ahead stops if it has
        braked with ``ahead_braking`` ever since its last message (Gipps 1981),
-       v_safe = -b T + sqrt(b^2 T^2 + 2 b (x_a + v_a^2/(2 b_a) - s - x)); bound = max(2 (v_safe - v) / T, -b).
+       v_safe = -b T + sqrt(b^2 T^2 + 2 b (x_a + v_a^2/(2 b_a) - s - x)); bound = max(4 (v_safe - v) / T, -b).
        That stop does not depend on the age, so no message can be too old for it.
     3. After the first fresh message the bound fades with ``rejoin_time``, and what faded out comes back with it.
 
@@ -122,4 +124,4 @@ class GuardedCruise(CruiseController, ABC):
         stop = self.ahead_position + heard * heard / (2.0 * self.ahead_braking) - self.standstill_gap
         lag = self.braking * self.reaction_time
         safe = sqrt(lag * lag + 2.0 * self.braking * maximum(stop - self.position, 0.0)) - lag
-        return maximum(2.0 * (safe - self.speed) / self.reaction_time, -self.braking)
+        return maximum(_FIRMNESS * (safe - self.speed) / self.reaction_time, -self.braking)

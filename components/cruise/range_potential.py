@@ -30,8 +30,8 @@ class RangePotentialCruise(PairwiseCruise):
         r" U(d) = \dfrac{1}{d^2 - d_\mathrm{min}^2} + \dfrac{1}{d_\mathrm{max}^2 - d^2}$",
         r"$F = m\,(u + c_0 + c_1 v_\mathrm{r} + c_2 v_\mathrm{r}^2 + r)$, with $u = b$ or, with a limit, $u$ = $b$ held"
         r" within it",
-        r"Reconstructed: with gap $d$, field_gain $\kappa$, gap_min $d_\mathrm{min}$, gap_max $d_\mathrm{max}$, target_speed $v_\mathrm{r}$,"
-        r" demand $u$, force $F$, mass $m$, line_resistance $r$.",
+        r"Reconstructed: with gap $d$, field_gain $\kappa$, gap_min $d_\mathrm{min}$, gap_max $d_\mathrm{max}$,"
+        r" target_speed $v_\mathrm{r}$, demand $u$, force $F$, mass $m$, line_resistance $r$.",
     )
     note = "Reconstructed: the source's potential is replaced by the one of Wang et al. 2020; gains fitted to a table."
     recommended_step = 0.1

@@ -34,8 +34,8 @@ class TunablePotentialCruise(PairwiseCruise):
         r" P = \kappa\, s\,/\,\sqrt{s^2 + w^2}$",
         r"$d^* \rightarrow d_0 + \tau v_\mathrm{r} + v_\mathrm{r}^2\,/\,(2 b_0)$, at the rate gap_rate at most",
         r"$F = m\,(u + c_0 + c_1 v + c_2 v^2 + r)$, with $u = b$ or, with a limit, $u$ = $b$ held within it",
-        r"Reconstructed: with gap $d$, desired_gap $d^*$, gap_tolerance $\delta$, pull_limit $\kappa$, gap_width $w$, gap_base $d_0$,"
-        r" gap_time $\tau$, gap_braking $b_0$, demand $u$, force $F$, mass $m$, line_resistance $r$.",
+        r"Reconstructed: with gap $d$, desired_gap $d^*$, gap_tolerance $\delta$, pull_limit $\kappa$, gap_width $w$,"
+        r" gap_base $d_0$, gap_time $\tau$, gap_braking $b_0$, demand $u$, force $F$, mass $m$, line_resistance $r$.",
     )
     note = "Reconstructed: the source's formulas and most of its parameters are lost; law and gains are ours."
     recommended_step = 0.1

@@ -58,7 +58,7 @@ def read_schedule(rows: Any) -> tuple[Fault, ...]:
 
 
 class ActuatorFaults(Component):
-    """Constant and periodic actuator faults of one train, in scheduled intervals (after Zhang & Chen 2022, eq. 3).
+    """Constant and periodic actuator faults of one train, on a schedule (reconstructed after Zhang & Chen 2022).
 
     ``fault`` is the mean of f over the coming sample, in closed form, so that a plant which holds it over the sample
     receives the right impulse, also where a fault switches off the grid. ``fault_now`` is f at this instant.

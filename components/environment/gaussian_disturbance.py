@@ -7,9 +7,10 @@ from ..declarations import Noise, Output, Parameter, Size
 
 
 class GaussianDisturbance(Component):
-    """Independent normal disturbances of a train's carriages, each value held for a while (Zhang & Chen 2022).
+    """Independent normal disturbances of a train's carriages (reconstructed after Zhang & Chen 2022).
 
-    The source runs its experiment under Gaussian disturbances; their size and holding time are chosen here.
+    Each value is held for ``hold``, and for a whole communication step where that is longer. The source runs its
+    experiment under Gaussian disturbances; their size and holding time are chosen here.
     """
 
     source = "Zhang & Chen 2022 (arXiv 2211.02242): Gaussian disturbance; size and holding time chosen"

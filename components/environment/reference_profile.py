@@ -44,7 +44,7 @@ def read_profile(data: Any) -> Profile:
 
 
 class ReferenceProfile(Component):
-    """The virtual leader of a cooperative cruise (after Zhang & Chen 2022, eq. 7).
+    """The virtual leader of a cooperative cruise (re-derived after Zhang & Chen 2022, eq. 7).
 
     It accelerates, cruises and decelerates in several periods; every speed change has an acceleration that is a
     trapezoid over time, so that the jerk is bounded. Positions are exact cubic pieces, not integrated.

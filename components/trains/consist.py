@@ -70,8 +70,8 @@ class Consist(Carriages):
         r"$n_j = c_0 + c_1 v_j + c_2 v_j^2 + (T_{j,j+1} - T_{j-1,j})\,/\,M_j, \qquad"
         r" T_{j,j+1} = k\,(x_j - x_{j+1} - l) + b\,(v_j - v_{j+1}), \qquad F_j(0) = M_j R(v_j)$",
         r"with position $x$, speed $v$, actuator_force $F$, force $u$, fault $f$, disturbance $d$, mass $M$,"
-        r" actuator_lag $\tau$, coupler_stiffness $k$, coupler_damping $b$ and carriage_spacing $l$; no tension ahead of"
-        r" the head and behind the tail. With limit_force, $u$ is cut off at $\pm$ force_limit.",
+        r" actuator_lag $\tau$, coupler_stiffness $k$, coupler_damping $b$ and carriage_spacing $l$; no tension ahead"
+        r" of the head and behind the tail. With limit_force, $u$ is cut off at $\pm$ force_limit.",
     )
     note = (
         "Reconstructed: formulas and numbers are re-derived to meet the source's statements, not transcribed from it."

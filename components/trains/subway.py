@@ -92,31 +92,33 @@ class SubwayTrain(MultipleUnit):
     speed = State("m/s", 0.0, output=True, description="speed of the leading vehicle")
 
     def derivatives(self) -> Values:
-        effective = self._effective(self._vehicle_forces(self.speed))
-        force = added(effective)
+        waiting, motion = self._waiting(), self._deformation()
+        force = added(self._effective(self._vehicle_forces(self.speed)))
+        resistance = added(self._resistances(motion, self._line())) + self._coupling(motion)
         rates = {
             "position": self.speed,
-            "speed": self._acceleration(force),
+            "speed": self._acceleration(force, resistance),
             **self._drive_rates(self.speed, force * self.speed),
         }
-        waiting = self._waiting()
         return {name: where(waiting, 0.0, rate) for name, rate in rates.items()}
 
     def outputs(self) -> Values:
         waiting = self._waiting()
+        motion, line = self._deformation(), self._line()
         forces = [where(waiting, 0.0, force) for force in self._vehicle_forces(self.speed)]
         effective = self._effective(forces)
         force = added(effective)
-        acceleration = self._acceleration(force)
-        couplers = self._coupler_forces(effective, acceleration)
-        motion = self._deformation()
+        resistances = self._resistances(motion, line)
+        resistance = added(resistances) + self._coupling(motion)
+        acceleration = self._acceleration(force, resistance)
+        couplers = self._coupler_forces(effective, resistances, acceleration, motion)
         return {
             "acceleration": where(waiting, 0.0, acceleration),
             "applied_force": force,
             "vehicle_force": forces,
             "coupler_force": [where(waiting, 0.0, coupler) for coupler in couplers],
-            "resistance": self._resistance(),
-            "resistance_parameters": self._parameters(motion.speed, self._line(), self._coupling(motion)),
+            "resistance": resistance,
+            "resistance_parameters": self._parameters(motion.speed, line, self._coupling(motion)),
         }
 
     def update(self) -> Values:
@@ -142,26 +144,23 @@ class SubwayTrain(MultipleUnit):
         terms = [mass * a for mass, a in zip(self._masses(), motion.acceleration, strict=True)]
         return added(terms[1:])
 
-    def _resistances(self, motion: Motion) -> list[Any]:
+    def _resistances(self, motion: Motion, line: list[Any]) -> list[Any]:
         """Davis and line resistance of each vehicle in N."""
-        rows = zip(self._weight_forces(), self._davis(self._clock()), motion.speed, self._line(), strict=True)
+        rows = zip(self._weight_forces(), self._davis(self._clock()), motion.speed, line, strict=True)
         found = []
         for weight, davis, s, w in rows:
             v = self.speed + s
             found.append(weight * self._rolling(davis.a + davis.b * v + davis.c * v * v, self.speed) + w)
         return found
 
-    def _resistance(self) -> Any:
-        motion = self._deformation()
-        return added(self._resistances(motion)) + self._coupling(motion)
+    def _acceleration(self, force: Any, resistance: Any) -> Any:
+        return (force - resistance) / added(self._masses()) - self._drag()
 
-    def _acceleration(self, force: Any) -> Any:
-        return (force - self._resistance()) / added(self._masses()) - self._drag()
-
-    def _coupler_forces(self, effective: list[Any], acceleration: Any) -> list[Any]:
+    def _coupler_forces(
+        self, effective: list[Any], resistances: list[Any], acceleration: Any, motion: Motion
+    ) -> list[Any]:
         """In-train forces behind each vehicle but the last, from the equations of motion of the vehicles ahead."""
-        motion = self._deformation()
-        rows = zip(effective, self._resistances(motion), self._masses(), motion.acceleration, strict=True)
+        rows = zip(effective, resistances, self._masses(), motion.acceleration, strict=True)
         forces: list[Any] = []
         force: Any = 0.0
         for drive, resistance, mass, relative in rows:

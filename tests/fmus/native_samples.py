@@ -1,4 +1,4 @@
-"""Components for the tests of native FMUs: every declaration at once without computed texts, and every function of maths."""
+"""Components for tests of native FMUs: every declaration at once (no computed text), and every function of maths."""
 
 from railcosim.components import Component, Input, Memory, Noise, Output, Parameter, Size, State, Tape, maths
 
@@ -112,7 +112,19 @@ class Functions(Component):
                 maths.piecewise_linear(u, [-1.0, 0.0, 2.0], self.table),
                 self.whole / 2 + self.whole * u - self.whole,
             ],
-            "arrays": [*(w * a - u / (w * w + 1.0)), *maths.tanh(w), *maths.where(w > 0.0, w, u), *maths.clip(w, -1, a)],
-            "flags": [u < a, u <= a, u > a, u == 0.0, maths.logical_and(self.flag, u != a), maths.logical_not(self.flag)],
+            "arrays": [
+                *(w * a - u / (w * w + 1.0)),
+                *maths.tanh(w),
+                *maths.where(w > 0.0, w, u),
+                *maths.clip(w, -1, a),
+            ],
+            "flags": [
+                u < a,
+                u <= a,
+                u > a,
+                u == 0.0,
+                maths.logical_and(self.flag, u != a),
+                maths.logical_not(self.flag),
+            ],
             "integer": maths.where(self.flag, self.whole, 2 * self.whole),
         }

@@ -20,7 +20,7 @@ from fmpy.fmi2 import FMU2Slave
 from hypothesis import HealthCheck, given, reject, settings
 from hypothesis import strategies as st
 from railcosim.components import CATALOGUE, ComponentError, Simulation
-from railcosim.components.declarations import Input, Memory, Output, Parameter, Size, State, Tape
+from railcosim.components.declarations import Input, Memory, Parameter, Size, State, Tape
 from railcosim.fmus.build import build, resolve
 from railcosim.fmus.variables import scalar_variables
 from railcosim.orchestrator import load, run
@@ -89,7 +89,7 @@ def cell(slot, wide=False):
     if slot.type is bool:
         return st.booleans()
     if slot.type is str:
-        return st.text("aä%#\"\\ ", max_size=5)
+        return st.text('aä%#"\\ ', max_size=5)
     if slot.type is int:
         low, high = slot.declaration.minimum, slot.declaration.maximum
         start = int(np.ravel(slot.start)[0])
@@ -184,10 +184,10 @@ def plain(cls, arguments, script):
         simulation.set(name, value)
     rows = [row()]
     simulation.start()
-    for time, length, given in script.steps:
+    for time, length, changes in script.steps:
         if simulation.time != time:
             simulation.time = time
-        for name, value in given.items():
+        for name, value in changes.items():
             simulation.set(name, value)
         rows.append(row())
         simulation.step(length)
@@ -243,8 +243,8 @@ def packaged(reference, arguments, script, kind):
         set_all(script.steps[0][2])
         rows = [row()]
         fmu.exitInitializationMode()
-        for time, length, given in script.steps:
-            set_all(given)
+        for time, length, changes in script.steps:
+            set_all(changes)
             rows.append(row())
             fmu.doStep(time, length)
             rows.append(row())

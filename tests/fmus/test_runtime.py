@@ -1,4 +1,7 @@
-"""The C runtime of native FMUs through the bare functions of the standard: who may call what, when, and with what."""
+"""The C runtime of native FMUs through the bare functions of the standard: who may call what, when, and with what.
+
+Longer than a file should be because everything here shares one driver of raw calls, and the interface is what it is.
+"""
 
 import ctypes
 import itertools
@@ -9,7 +12,7 @@ import re
 import shutil
 import subprocess
 import sys
-from ctypes import POINTER, byref, c_char_p, c_double, c_int, c_size_t, c_uint, c_void_p
+from ctypes import byref, c_char_p, c_double, c_int, c_size_t, c_uint, c_void_p
 from pathlib import Path
 
 import fmpy
@@ -432,18 +435,24 @@ def test_value_references_out_of_range_and_of_another_type_are_refused(load):
             assert (status == OK) == (other == kind), (name, other)
             if other != kind:
                 assert name in fmu.said or "reference" in fmu.said
-                assert getattr(fmu, f"Set{other}")(*reference(fmu, name), cell(b"1" if other == "String" else 1)) == ERROR
+                assert (
+                    getattr(fmu, f"Set{other}")(*reference(fmu, name), cell(b"1" if other == "String" else 1)) == ERROR
+                )
     for far in (count, count + 1, 2**31, 2**32 - 1):
         for other, cell in (("Real", c_double), ("Integer", c_int), ("Boolean", c_int), ("String", c_char_p)):
             assert getattr(fmu, f"Get{other}")(one(c_uint, far), c_size_t(1), (cell * 1)()) == ERROR
             assert str(far) in fmu.said
             assert getattr(fmu, f"Set{other}")(one(c_uint, far), c_size_t(1), (cell * 1)()) == ERROR
-        assert fmu.GetDirectionalDerivative(
-            one(c_uint, far), c_size_t(1), *reference(fmu, "u[1]"), one(REALS, 1), one(REALS)
-        ) == ERROR
-        assert fmu.GetDirectionalDerivative(
-            *reference(fmu, "z"), one(c_uint, far), c_size_t(1), one(REALS, 1), one(REALS)
-        ) == ERROR
+        assert (
+            fmu.GetDirectionalDerivative(
+                one(c_uint, far), c_size_t(1), *reference(fmu, "u[1]"), one(REALS, 1), one(REALS)
+            )
+            == ERROR
+        )
+        assert (
+            fmu.GetDirectionalDerivative(*reference(fmu, "z"), one(c_uint, far), c_size_t(1), one(REALS, 1), one(REALS))
+            == ERROR
+        )
 
 
 @pytest.mark.parametrize("kind", ["Real", "Integer", "Boolean", "String"])
@@ -793,7 +802,7 @@ def test_two_instances_do_not_know_of_each_other(load):
     interleaved = [[], []]
     for k in range(15):
         for rows, fmu in zip(interleaved, pair, strict=True):
-            rows += drive(fmu, k, 1)
+            rows.extend(drive(fmu, k, 1))
     assert interleaved == alone
 
 

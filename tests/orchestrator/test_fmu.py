@@ -191,8 +191,8 @@ def test_a_discarded_step(slave, foreign, xml):
 def test_after_a_fatal_status_nothing_is_called_any_more(slave, components, monkeypatch):
     """Not even freeInstance: in an FMU of pythonfmu 0.7 it would drop its objects twice, and end the process."""
     freed = []
-    monkeypatch.setattr(FMU2Slave, "fmi2FreeInstance", lambda fmu, _: freed.append(fmu.instanceName))
     bad, good = (begin(slave(components(FAILS)("Fails"), name=name)) for name in ("bad", "good"))
+    monkeypatch.setattr(FMU2Slave, "fmi2FreeInstance", lambda fmu, _: freed.append(fmu.instanceName))
     bad.step(0.0, 6.0)
     with pytest.raises(FmuError) as caught:
         bad.channel("Real", ["y"]).get()

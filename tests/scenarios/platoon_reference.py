@@ -1,7 +1,7 @@
 """The closed loops of the three laws of `papers/tunable_potential.md` as ordinary differential equations.
 
-Written by hand from its sections 1 to 4 and 7, with NumPy, in the paper's kilometres, and sharing nothing with `railcosim`.
-`march` integrates many starts at once with classical RK4 (step 0.25 s, reported every 1 s, as the specification's own
+Written by hand from its sections 1 to 4 and 7, with NumPy, in the paper's kilometres, and sharing nothing with
+`railcosim`. `march` integrates many starts at once with classical RK4 (step 0.25 s, reported every 1 s, as the specification's own
 measurements); `dop853` solves one start with SciPy's eighth-order Runge-Kutta. Load it by its path.
 """
 
@@ -160,9 +160,7 @@ def dop853(law, x=POSITION, v=SPEED, *, stop=2000.0, report=1.0, phases=PHASES, 
         target = target_at(begin, phases)
         plan_now = next(p for p in reversed(plan) if begin >= p[0] - 1e-9)
         solution = solve_ivp(
-            lambda t, y, u=target, p=plan_now: np.concatenate(
-                [y[n:], law.acceleration(y[:n], y[n:], u, slewed(t, p))]
-            ),
+            lambda t, y, u=target, p=plan_now: np.concatenate([y[n:], law.acceleration(y[:n], y[n:], u, slewed(t, p))]),
             (begin, end),
             state,
             method="DOP853",
@@ -186,7 +184,7 @@ def dop853(law, x=POSITION, v=SPEED, *, stop=2000.0, report=1.0, phases=PHASES, 
 
 
 def indices(run, begin=0.0, end=2000.0):
-    """The four indices of section 4: convergence (s), speed overshoot (m/s), gap overshoot (km), acceleration (m/s2)."""
+    """The four indices of section 4: convergence (s), overshoots of speed (m/s) and gap (km), acceleration (m/s2)."""
     phase = (run.t >= begin - 1e-9) & (run.t < end - 1e-9)
     error = run.v[phase] - target_at(begin)
     beyond = np.flatnonzero(~(np.abs(error) <= 1.0).all(axis=-1))

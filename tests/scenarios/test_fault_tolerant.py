@@ -125,8 +125,6 @@ def test_eight_trains_of_eight_carriages():
 def test_python_and_native_agree(seconds):
     """Bit for bit, with faults, noise and all trains; 1000 s of Python FMUs take some minutes."""
     settings = ["turbulence.count=3", "turbulence.deviation=0.02", f"simulation.stop_time={seconds}"]
-    if seconds < 10.0:
-        settings.append("simulation.start_time=0.0")
     runs = [
         run(load("fault_tolerant_cruise", settings=settings), kind=kind, figures=False) for kind in ("auto", "python")
     ]
@@ -142,11 +140,11 @@ def test_an_observer_beside_the_controller_sees_the_same():
         system.connect(f"train[2].{name}", f"observer.{name}")
     system.connect("cruise[2].force", "observer.force", delay=1)
     result = run(system)
-    for name in ("fault_estimate", "actuator_force_estimate"):
-        for j in (1, 2, 3):
-            # The observer reports at the end of a step what it found at its beginning.
-            inside, beside = result[f"cruise[2].{name}[{j}]"], result[f"observer.{name}[{j}]"]
-            assert (beside[1:] == inside[:-1]).all()
     for j in (1, 2, 3):
-        inside, beside = result[f"cruise[2].acceleration_estimate[{j}]"], result[f"observer.acceleration_estimate[{j}]"]
+        inside, beside = (result[f"{name}.fault_estimate[{j}]"] for name in ("cruise[2]", "observer"))
+        assert (beside == inside).all()
+        # This one depends directly on the command: it is reported a step after the state it belongs to.
+        inside, beside = (result[f"{name}.actuator_force_estimate[{j}]"] for name in ("cruise[2]", "observer"))
+        assert (beside[1:] == inside[:-1]).all()
+        inside, beside = (result[f"{name}.acceleration_estimate[{j}]"] for name in ("cruise[2]", "observer"))
         assert (beside == inside).all()

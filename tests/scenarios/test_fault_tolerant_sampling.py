@@ -52,7 +52,7 @@ def test_direct_exchange(step):
 @pytest.mark.long
 @pytest.mark.parametrize("step", DELAYED)
 def test_delayed_exchange(step):
-    """Jacobi. Told so, the controller foresees one sample: no worse than the specification's plain one, and near direct."""
+    """Jacobi. Told so, the controller foresees one sample: better than the specification's plain one, near direct."""
     result, metrics = measured(step, ['simulation.algorithm="jacobi"', "cruise.late_action=true"])
     fault, fluctuation = DELAYED[step]
     assert 0.2 * fault < metrics["fault_error"] < fault

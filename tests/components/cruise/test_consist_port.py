@@ -71,6 +71,16 @@ def test_the_command_is_cut_off_and_the_observer_is_told():
     assert free.get("actuator_force_estimate")[0] - before > 2.0 * gained
 
 
+@pytest.mark.parametrize("limit", [20e3, 1e6])
+def test_the_train_behind_hears_the_jerk_that_the_limited_command_gives(limit):
+    """J = (u/M - p)/tau - dn/dt with the limited u: one carriage at rest with its resistance, so dn/dt = 0, p = R."""
+    one = {"carriages": 1, "position": [0.0], "ahead_position": 3400.0, "c0": 0.02, "c1": 0.0, "c2": 0.0}
+    simulation = started(**one, limit_force=True, force_limit=limit)
+    expected = (simulation.get("force")[0] / 80e3 - 0.02) / 0.4
+    assert simulation.get("force_limited") == (limit < 1e5)
+    assert simulation.get("tail_jerk") == pytest.approx(expected, rel=1e-12)
+
+
 def test_a_late_command_is_what_the_observer_expects():
     """Told that commands act a sample late, it advances with the last one and not with the one it now gives."""
     punctual, late = started(ahead_position=3260.0), started(ahead_position=3260.0, late_action=True)

@@ -71,7 +71,8 @@ static int get_everything(fmi2Component c, double *sum)
         case TYPE_BOOLEAN: CHECK(fmi2GetBoolean(c, &n, 1, &whole) == fmi2OK); break;
         default: CHECK(fmi2GetString(c, &n, 1, &text) == fmi2OK);
         }
-        *sum += real + (double)whole + (double)strlen(text);
+        bool own = n < N_VARIABLES && model_variables[n].role == ROLE_FIXED; /* such as the name of the tape's file */
+        *sum += real + (double)whole + (own ? 0.0 : (double)strlen(text));
         double direction = 1.0, derivative = 0.0;
         unsigned known = N_STATES > 0 ? FIRST_STATE : 0;
         fmi2GetDirectionalDerivative(c, &n, 1, &known, 1, &direction, &derivative);
@@ -161,7 +162,9 @@ int main(int count, char **arguments)
     CHECK(fmi2GetFMUstate(c, &copy) == fmi2OK && fmi2DoStep(c, STEP * STEPS, STEP, fmi2True) == fmi2Error);
 
     other = 0.0;
-    CHECK(steps(d, 13, STEPS, &other) == 0 && other == expected && fmi2Terminate(d) == fmi2OK); /* writes the tape */
+    CHECK(steps(d, 13, STEPS, &other) == 0);
+    CHECK(other == expected);
+    CHECK(fmi2Terminate(d) == fmi2OK); /* writes the tape */
     CHECK(get_everything(d, &other) == 0 && fmi2Reset(d) == fmi2OK && start(d, arguments[1]) == 0); /* and reads it */
     CHECK(steps(d, 0, STEPS, &other) == 0 && fmi2Terminate(d) == fmi2OK);
 

@@ -1,0 +1,182 @@
+"""Commands of ``orchestrate`` that compare and analyse; `cli` registers them."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from . import console
+from .better import read_directions
+from .compare import compare as compare_systems
+from .compare import variants
+from .compare_report import show_comparison
+from .linear_figures import draw_linear
+from .linear_report import show_linear, write_linear
+from .linearize import linearize as linearize_system
+from .loading import KINDS, Kind
+from .modes import stability
+from .responses import string_stability
+from .scenario import load
+
+OK, FAILED, FMU_FAILED, INTERRUPTED = 0, 1, 3, 130
+
+Scenario = Annotated[
+    str, typer.Argument(metavar="SCENARIO", help="A shipped scenario (see 'orchestrate list'), or a .toml file.")
+]
+Scenarios = Annotated[
+    list[str], typer.Argument(metavar="SCENARIO...", help="Shipped scenarios (see 'orchestrate list'), or .toml files.")
+]
+Set = Annotated[
+    list[str] | None,
+    typer.Option("--set", help="Set a parameter or start value, in all variants: train[4].speed=10."),
+]
+With = Annotated[
+    list[str] | None, typer.Option("--with", help="Give a build argument, in all variants: train.carriages=8.")
+]
+Quiet = Annotated[bool, typer.Option("--quiet", "-q", help="Print nothing but errors.")]
+KindText = Annotated[
+    str,
+    typer.Option(
+        "--kind",
+        metavar="[" + "|".join(KINDS) + "]",
+        help="native: compiled FMUs; python: Python FMUs; plain: Python objects, to debug; auto: native if possible.",
+    ),
+]
+
+
+def _kind(text: str) -> Kind:
+    for kind in KINDS:
+        if kind == text:
+            return kind
+    raise typer.BadParameter(f"'{text}' is not one of {', '.join(map(repr, KINDS))}.", param_hint="'--kind'")
+
+
+def compare(
+    scenarios: Scenarios,
+    *,
+    presets: Annotated[
+        list[str] | None, typer.Option("--preset", help="Add a variant: the scenario under this preset; repeatable.")
+    ] = None,
+    swaps: Annotated[
+        list[str] | None,
+        typer.Option("--swap", help="Add a variant with another model: cruise=OtherComponent; repeatable."),
+    ] = None,
+    settings: Set = None,
+    builds: With = None,
+    stop: Annotated[float | None, typer.Option(help="Stop time in s, of all variants.")] = None,
+    step: Annotated[float | None, typer.Option(help="Communication step in s, of all variants.")] = None,
+    directions: Annotated[
+        list[str] | None,
+        typer.Option("--better", help="What is better, where the metric does not say: gap_at_end=larger; repeatable."),
+    ] = None,
+    kind: KindText = "auto",
+    output: Annotated[
+        Path | None, typer.Option("--output", "-o", help="Directory; results/compare-<scenarios> by default.")
+    ] = None,
+    no_figures: Annotated[bool, typer.Option("--no-figures", help="Draw nothing.")] = False,
+    quiet: Quiet = False,
+) -> None:
+    """Run variants side by side: one table of metrics, a winner per row, overlaid figures.
+
+    Variants: each SCENARIO as it stands, then under each --preset, then with each --swap. Several changes to one
+    variant are parted by commas: --swap cruise=A,train=B. Exit codes: 0 fine; 1 a requirement failed in a variant; 2
+    the input is wrong; 3 a variant failed; 130 interrupted.
+    """
+    chosen = _kind(kind)
+    systems = variants(
+        scenarios,
+        presets=presets or (),
+        swaps=swaps or (),
+        settings=settings or (),
+        builds=builds or (),
+        stop_time=stop,
+        step=step,
+    )
+    names = dict.fromkeys(system.name for system in systems.values())
+    metrics = {name: text for system in systems.values() for name, text in system.metrics.items()}
+    directory = output or Path("results") / "-".join(["compare", *names])
+    comparison = compare_systems(
+        systems,
+        kind=chosen,
+        output=directory,
+        figures=not no_figures,
+        directions=read_directions(directions or (), metrics),
+        progress=lambda name, start: console.progress(name, quiet, start),
+    )
+    show_comparison(comparison, quiet)
+    if comparison.interrupted:
+        raise typer.Exit(INTERRUPTED)
+    if comparison.broken:
+        raise typer.Exit(FMU_FAILED)
+    raise typer.Exit(FAILED if comparison.requirement_failed else OK)
+
+
+def linearize(
+    scenario: Scenario,
+    *,
+    at: Annotated[float, typer.Option("--at", help="Time of the run to linearize at, s: a communication point.")],
+    inputs: Annotated[
+        list[str] | None,
+        typer.Option(
+            help="Inputs of the model: train[1].disturbance,target.value; disturbances and sources by default."
+        ),
+    ] = None,
+    outputs: Annotated[
+        list[str] | None, typer.Option(help="Outputs of the model: train[:].speed; all shown states by default.")
+    ] = None,
+    sampled: Annotated[
+        bool, typer.Option("--sampled", help="The model of one communication step, also of a continuous system.")
+    ] = False,
+    duration: Annotated[float | None, typer.Option(help="Length of the step responses in s.")] = None,
+    preset: Annotated[str | None, typer.Option(help="Apply a preset of the scenario.")] = None,
+    settings: Annotated[
+        list[str] | None, typer.Option("--set", help="Set a parameter or start value: train[4].speed=10.")
+    ] = None,
+    builds: Annotated[
+        list[str] | None, typer.Option("--with", help="Give a build argument: train.carriages=8.")
+    ] = None,
+    swaps: Annotated[
+        list[str] | None,
+        typer.Option("--swap", help="Put in another model: cruise=other.fmu, or OtherComponent, or my_file.py:Class."),
+    ] = None,
+    step: Annotated[
+        float | None, typer.Option(help="Communication step in s; sample times equal to it follow.")
+    ] = None,
+    kind: KindText = "auto",
+    output: Annotated[
+        Path | None, typer.Option("--output", "-o", help="Directory; results/<scenario>-linear by default.")
+    ] = None,
+    no_figures: Annotated[bool, typer.Option("--no-figures", help="Draw nothing.")] = False,
+    quiet: Quiet = False,
+) -> None:
+    """Linearize the closed loop at a time of a run: eigenvalues, stability, step and Bode figures, string stability.
+
+    Exit codes: 0 stable (string stability is told, not judged); 1 not stable; 2 the input is wrong; 3 an FMU failed.
+    """
+    chosen = _kind(kind)
+    if duration is not None and not 0.0 < duration < float("inf"):
+        raise typer.BadParameter("it must be a positive time in s.", param_hint="'--duration'")
+    system = load(scenario, preset=preset, settings=settings or (), builds=builds or (), swaps=swaps or (), step=step)
+    with console.progress(system.name, quiet, system.start_time) as progress:
+        model = linearize_system(
+            system,
+            at,
+            inputs=inputs or (),
+            outputs=outputs or (),
+            kind=chosen,
+            sampled=sampled,
+            progress=progress,
+        )
+    found, passings = stability(model), string_stability(model)
+    directory = output or Path("results") / "-".join(filter(None, (system.name, preset, "linear")))
+    directory.mkdir(parents=True, exist_ok=True)
+    write_linear(directory, model, found, passings)
+    figures = [] if no_figures else draw_linear(model, found, passings, directory, duration=duration)
+    if not quiet:
+        out = console.console()
+        show_linear(out, model, found, passings)
+        drawn = f", {len(figures)} figure{'s' * (len(figures) > 1)}" if figures else ""
+        console.say(out, f"Files in {directory}: linear.json{drawn}", whole=True)
+    raise typer.Exit(OK if found.verdict == "stable" else FAILED)

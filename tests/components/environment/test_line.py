@@ -1,0 +1,52 @@
+"""The line's resistance by hand: g (gradient + 0.6/R) + resistance, constant in each section."""
+
+import pytest
+from railcosim.components import ComponentError, Line
+
+PROFILE = [
+    {"position": 0.0},
+    {"position": 1e3, "gradient": 0.01},
+    {"position": 2e3, "gradient": -0.02, "radius": 6000.0},
+    {"position": 3e3, "resistance": 0.05},
+]
+
+
+@pytest.mark.parametrize(
+    ("position", "expected"),
+    [
+        (-5.0, 0.0),
+        (0.0, 0.0),
+        (999.9, 0.0),
+        (1000.0, 0.0981),
+        (1999.0, 0.0981),
+        (2000.0, -0.1962 + 9.81 * 1e-4),
+        (3000.0, 0.05),
+        (9e9, 0.05),
+    ],
+)
+def test_sections(position, expected):
+    assert Line(profile=PROFILE, position=position).outputs()["line_resistance"] == pytest.approx(expected, abs=1e-12)
+    half = Line(profile=PROFILE, position=position, factor=0.5).outputs()["line_resistance"]
+    assert half == pytest.approx(0.5 * expected, abs=1e-12)
+
+
+def test_without_data_the_line_is_level():
+    assert Line(position=5e3).outputs() == {"line_resistance": 0.0}
+
+
+@pytest.mark.parametrize(
+    "profile",
+    [
+        [],
+        "flat",
+        [1, 2],
+        [{"gradient": 0.01}],
+        [{"position": 1.0}, {"position": 1.0}],
+        [{"position": 0.0, "slope": 0.01}],
+        [{"position": 0.0, "radius": -1.0}],
+        [{"position": 0.0, "gradient": "steep"}],
+    ],
+)
+def test_unusable_lines_are_refused(profile):
+    with pytest.raises(ComponentError, match="profile"):
+        Line(profile=profile)

@@ -1,0 +1,96 @@
+"""The generated tables: what the runtime is told about a model, read back by a C compiler's eyes where it matters."""
+
+import re
+import subprocess
+from pathlib import Path
+
+import fmpy
+import pytest
+from railcosim.components import Component, ComponentError, Input, Output, Parameter, PointMassTrain
+from railcosim.fmus.build import resolve
+from railcosim.fmus.tables import model_header
+from railcosim.fmus.trace import trace
+
+MIXED = f"{Path(__file__).parent / 'native_samples.py'}:Mixed"
+RUNTIME = Path(fmpy.__file__).parent / "c-code"
+
+
+def header(component):
+    return model_header(component, trace(component, type(component).__name__), "{guid}")
+
+
+def constants(text):
+    return {key: int(value) for key, value in re.findall(r"#define ([A-Z_]+) (\d+)\n", text)}
+
+
+def table(text, name):
+    return re.search(rf"{name}\[\] = {{\n(.*?)}};", text, re.DOTALL)[1].splitlines()
+
+
+def test_the_numbers_of_things():
+    found = constants(header(resolve(MIXED)()))
+    expected = {"N_OUTPUTS": 5, "N_STATES": 3, "N_MEMORY": 5, "N_TAPE": 2, "N_NOISES": 2, "N_INITIAL": 3, "N_TEXTS": 3}
+    assert {key: found[key] for key in expected} == expected
+    assert found["N_VALUES"] == found["N_VARIABLES"] + 2 + 3  # the cells of the tape and of the noise
+    assert (found["N_REINITIALISED"], found["IS_SAMPLED"], found["HAS_HELD"]) == (1, 1, 1)
+    train = constants(header(PointMassTrain()))
+    assert (train["N_STATES"], train["IS_SAMPLED"], train["HAS_HELD"], train["N_TAPE"]) == (2, 0, 0, 0)
+
+
+def test_variables_say_type_role_start_and_bounds():
+    rows = {re.search(r'"(.*?)"', row)[1]: row.strip() for row in table(header(resolve(MIXED)()), "model_variables")}
+    assert rows["gain"] == '{"gain", TYPE_REAL, ROLE_TUNABLE, 0.5, 0.0, 2.0, -1},'
+    assert rows["teeth"] == '{"teeth", TYPE_INTEGER, ROLE_FIXED, 3.0, 1.0, 9.0, -1},'
+    assert rows["door"] == '{"door", TYPE_BOOLEAN, ROLE_INPUT, 0.0, -INFINITY, INFINITY, -1},'
+    assert rows["remark"] == '{"remark", TYPE_STRING, ROLE_INPUT, 0.0, -INFINITY, INFINITY, 2},'
+    assert rows["y[2]"] == '{"y[2]", TYPE_REAL, ROLE_OUTPUT, 0.0, -INFINITY, INFINITY, -1},'
+    assert "ROLE_START" in rows["x[1]"]
+    assert "ROLE_COMPUTED" in rows["v"]
+    assert "ROLE_COMPUTED" in rows["m[2]"]
+    assert "ROLE_START" in rows["n"]
+
+
+def test_outputs_with_feed_through_are_held_as_whole_arrays():
+    assert [row.strip(" ,") for row in table(header(resolve(MIXED)()), "model_held")] == [
+        *("true", "true"),  # y
+        *("false", "false"),  # z, tossed
+        "true",  # total
+    ]
+
+
+def test_values_given_to_the_component_are_its_starts():
+    text = header(PointMassTrain(speed=0.1, limit_force=True))
+    assert '"speed", TYPE_REAL, ROLE_START, 0.1,' in text
+    assert '"limit_force", TYPE_BOOLEAN, ROLE_FIXED, 1.0,' in text
+
+
+class Labels(Component):
+    """Texts of every kind."""
+
+    label = Parameter("1", "plain")
+    words = Input("1", "", shape=(2,))
+    y = Output("1")
+
+    def outputs(self):
+        return {"y": 1.0}
+
+
+@pytest.mark.parametrize(
+    "text", ["", "Köln", 'a "quoted" \\ one', "??/ trigraph", "line\nbreak\t", "7\x01" + "7", "%s #1#"]
+)
+def test_texts_survive_the_c_compiler(tmp_path, text):
+    program = tmp_path / "show.c"
+    program.write_text(
+        "#include <stdio.h>\n"
+        + re.search(r"static const char.*?};", header(Labels(label=text, words=["x", text])), re.DOTALL)[0]
+        + '\nint main(void) { for (int k = 0; k < 3; k++) { printf("%s|", model_texts[k]); } return 0; }\n'
+    )
+    subprocess.run(["gcc", "-std=c11", "-Wall", "-Werror", program, "-o", tmp_path / "show"], check=True)
+    shown = subprocess.run([tmp_path / "show"], capture_output=True, check=True).stdout.decode()
+    assert shown == f"{text}|x|{text}|"
+
+
+@pytest.mark.parametrize("text", ["ä" * 512, "a\0b"])
+def test_texts_that_do_not_fit_are_refused(text):
+    with pytest.raises(ComponentError, match=r"Labels\.label.*1023"):
+        header(Labels(label=text))

@@ -1,0 +1,139 @@
+/* An FMU by hand, which behaves until t = 5 s and then does what its parameter `mode` says. Variables by value reference:
+   0 u, 1 v (real inputs); 2 x, 3 y (real outputs: der(x) = u - x, y = x + v); 4 m (integer input); 5 n (integer output:
+   m + 1 a step ago); 6 on (boolean input); 7 off (boolean output: not on, a step ago); 8 mode.
+   Modes 1 to 5: the status of the step; 9: status -1; 10, 11, 12: y is NaN, infinity, minus infinity; 20 + s, 30 + s: the
+   status of getting, of setting. */
+
+#include <math.h>
+#include <stddef.h>
+#include <stdlib.h>
+#include <string.h>
+
+typedef void (*Logger)(void *environment, const char *instance, int status, const char *category, const char *text, ...);
+typedef struct {
+    Logger logger;
+    void *(*allocate)(size_t, size_t);
+    void (*release)(void *);
+    void *finished;
+    void *environment;
+} Callbacks;
+typedef struct {
+    double reals[4];
+    int whole[9];
+    double time;
+    Logger logger;
+    void *environment;
+    char name[100];
+} Odd;
+
+static int tell(Odd *s, int status)
+{
+    if (status) {
+        s->logger(s->environment, s->name, status, "odd", "%s does as it was told: %d", s->name, status);
+    }
+    return status;
+}
+
+static int mode(const Odd *s, int first)
+{
+    int mode = s->whole[8];
+    return s->time >= 5.0 && mode >= first && mode < first + 10 ? mode - first : 0;
+}
+
+void *fmi2Instantiate(const char *name, int kind, const char *guid, const char *place, const Callbacks *callbacks,
+                      int visible, int logging)
+{
+    Odd *s = calloc(1, sizeof *s);
+    strncpy(s->name, name, sizeof s->name - 1);
+    s->logger = callbacks->logger;
+    s->environment = callbacks->environment;
+    return s;
+}
+
+void fmi2FreeInstance(void *c)
+{
+    free(c);
+}
+
+int fmi2SetReal(void *c, const unsigned *vr, size_t count, const double *values)
+{
+    Odd *s = c;
+    for (size_t k = 0; k < count; k++) {
+        s->reals[vr[k]] = values[k];
+    }
+    return tell(s, mode(s, 30));
+}
+
+int fmi2GetReal(void *c, const unsigned *vr, size_t count, double *values)
+{
+    Odd *s = c;
+    int how = s->time >= 5.0 ? s->whole[8] : 0;
+    s->reals[3] = how == 10 ? NAN : how == 11 ? INFINITY : how == 12 ? -INFINITY : s->reals[2] + s->reals[1];
+    for (size_t k = 0; k < count; k++) {
+        values[k] = s->reals[vr[k]];
+    }
+    return tell(s, mode(s, 20));
+}
+
+int fmi2SetInteger(void *c, const unsigned *vr, size_t count, const int *values)
+{
+    Odd *s = c;
+    for (size_t k = 0; k < count; k++) {
+        s->whole[vr[k]] = values[k];
+    }
+    return 0;
+}
+
+int fmi2GetInteger(void *c, const unsigned *vr, size_t count, int *values)
+{
+    Odd *s = c;
+    for (size_t k = 0; k < count; k++) {
+        values[k] = s->whole[vr[k]];
+    }
+    return 0;
+}
+
+int fmi2SetBoolean(void *c, const unsigned *vr, size_t count, const int *values)
+{
+    return fmi2SetInteger(c, vr, count, values);
+}
+
+int fmi2GetBoolean(void *c, const unsigned *vr, size_t count, int *values)
+{
+    return fmi2GetInteger(c, vr, count, values);
+}
+
+int fmi2SetupExperiment(void *c, int has_tolerance, double tolerance, double start, int has_stop, double stop)
+{
+    ((Odd *)c)->time = start;
+    return 0;
+}
+
+int fmi2DoStep(void *c, double time, double step, int final)
+{
+    Odd *s = c;
+    int status = mode(s, 0);
+    s->reals[2] += step * (s->reals[0] - s->reals[2]);
+    s->whole[5] = s->whole[4] + 1;
+    s->whole[7] = !s->whole[6];
+    s->time = time + step;
+    return tell(s, status == 9 ? -1 : status);
+}
+
+const char *fmi2GetVersion(void)
+{
+    return "2.0";
+}
+
+const char *fmi2GetTypesPlatform(void)
+{
+    return "default";
+}
+
+#define FINE(name) int name(void) { return 0; }
+FINE(fmi2SetDebugLogging) FINE(fmi2EnterInitializationMode) FINE(fmi2ExitInitializationMode) FINE(fmi2Terminate)
+FINE(fmi2Reset) FINE(fmi2GetString) FINE(fmi2SetString) FINE(fmi2GetFMUstate) FINE(fmi2SetFMUstate)
+FINE(fmi2FreeFMUstate) FINE(fmi2SerializedFMUstateSize) FINE(fmi2SerializeFMUstate) FINE(fmi2DeSerializeFMUstate)
+FINE(fmi2GetDirectionalDerivative) FINE(fmi2SetRealInputDerivatives) FINE(fmi2GetRealOutputDerivatives)
+FINE(fmi2CancelStep) FINE(fmi2GetStatus) FINE(fmi2GetRealStatus) FINE(fmi2GetIntegerStatus)
+FINE(fmi2GetBooleanStatus) FINE(fmi2GetStringStatus)
