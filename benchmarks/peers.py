@@ -232,15 +232,8 @@ class Ecos:
         structure.add_parameter_set("start", {f"lag{k}::x": start for k, start in enumerate(ring.starts)})
         self.engine = EcosSimulation(structure=structure, step_size=STEP)
         if self.csv:
-            folder = Path(tempfile.mkdtemp())
-            lines = "".join(
-                f'<ecos:component name="lag{k}"><ecos:variable name="x"/></ecos:component>' for k in range(ring.count)
-            )
-            (folder / "log.xml").write_text(
-                f'<ecos:LogConfig xmlns:ecos="http://github.com/Ecos-platform/ecos"><ecos:components>{lines}'
-                "</ecos:components></ecos:LogConfig>"
-            )
-            self.engine.add_csv_writer(str(folder / "ring.csv"), str(folder / "log.xml"))
+            target = Path(tempfile.mkdtemp()) / "ring.csv"
+            self.engine.add_csv_writer(str(target), identifiers=[f"lag{k}::x" for k in range(ring.count)])
         if not self.engine.init(parameter_set="start"):
             raise RuntimeError("it cannot be initialized")
         self.count = ring.count

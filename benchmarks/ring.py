@@ -4,10 +4,10 @@
     python benchmarks/ring.py --light          # the same FMU with the least library there can be: the hardest case
     python benchmarks/ring.py --line 1000      # that many trains with as many controllers, 350 s
 
-CPU time of the stepping per FMU step, all threads together, in microseconds; in parentheses the ratio to the bare C loop
-over the same FMU. Every candidate lives in a process of its own and steps in turn with the others, so that a busy machine
-slows all alike; medians. All take 10 000 steps, except those so slow that fewer suffice to see it (``--budget``). That all
-compute the same is checked. A peer that is not installed or fails is left out with the reason.
+CPU time of the stepping per FMU step, all threads together, in microseconds; in parentheses the ratio to the bare C
+loop over the same FMU. Every candidate lives in a process of its own and steps in turn with the others, so that a busy
+machine slows all alike; medians. All take 10 000 steps, but those so slow that fewer suffice to see it (``--budget``).
+That all compute the same is checked. A peer that is not installed or fails is left out with the reason.
 """
 
 from __future__ import annotations
@@ -154,10 +154,9 @@ CANDIDATES: dict[str, type[Any]] = {BARE: BareLoop, OURS: Ours, "railcosim, no c
 def serve(pipe: Any, name: str, ring: Ring) -> None:
     """Build a candidate, then obey: ("run" or "finish", steps) -> (CPU seconds, values)."""
     try:
-        begin, before = time.process_time(), resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
+        begin, before = time.process_time(), resident()
         candidate: Candidate = (CANDIDATES | {"disk": OursToDisk})[name](ring)
-        memory = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss - before
-        pipe.send((time.process_time() - begin, memory))
+        pipe.send((time.process_time() - begin, resident() - before))
         while True:
             command, steps = pipe.recv()
             gc.collect()
@@ -168,6 +167,12 @@ def serve(pipe: Any, name: str, ring: Ring) -> None:
         pass
     except BaseException as error:
         pipe.send(f"{type(error).__name__}: {error}".splitlines()[0][:150])
+
+
+def resident() -> float:
+    """Memory of this process in KB, as Linux tells it."""
+    statm = Path("/proc/self/statm")
+    return int(statm.read_text().split()[1]) * resource.getpagesize() / 1024 if statm.exists() else 0.0
 
 
 @dataclass

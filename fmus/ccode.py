@@ -73,7 +73,7 @@ def function(name: str, arguments: Sequence[tuple[str, Any]], results: Sequence[
     signature = ", ".join(f"const double *{argument}" for argument, _ in arguments)
     declared = [f"    double {', '.join(f'a{slot}' for slot in work)};"] if work else []
     body = "\n".join([*declared, *unused, *lines])
-    return f"static void {name}({signature}, double *result)\n{{\n{body}\n}}\n"
+    return f"static inline void {name}({signature}, double *result)\n{{\n{body}\n}}\n"
 
 
 def _line(compiled: Any, k: int, arguments: Sequence[str]) -> str:

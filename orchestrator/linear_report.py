@@ -40,7 +40,7 @@ def show_linear(out: Console, model: Linearization, stability: Stability, passin
     for quantity in dict.fromkeys(passing.quantity for passing in passings):
         mine = [passing for passing in passings if passing.quantity == quantity]
         worst = max(mine, key=lambda passing: passing.peak)
-        text = f"|T| of {quantity} is at most {worst.peak:.4g} ({worst.pair}, at {worst.at:.4g} rad/s)"
+        text = f"|T| of {quantity} is at most {worst.peak:.6g} ({worst.pair}, at {worst.at:.4g} rad/s)"
         if worst.holds:
             console.say(out, f"string stable under {model.inputs[default_input(model)]}: {text}", "green")
         else:
@@ -90,7 +90,7 @@ def _string_table(model: Linearization, passings: list[Passing]) -> Table:
     for passing in passings:
         first, second = passing.pair.split(" to ")[::-1]
         verdict = Text("holds", style="green") if passing.holds else Text("grows", style="bold red")
-        table.add_row(passing.quantity, f"{first}, {second}", f"{passing.peak:.4g}", f"{passing.at:.4g}", verdict)
+        table.add_row(passing.quantity, f"{first}, {second}", f"{passing.peak:.6g}", f"{passing.at:.4g}", verdict)
     return table
 
 

@@ -32,7 +32,7 @@ Signal = tuple[str, str]
 """(instance, scalar variable)."""
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Linearization:
     """A linear model of a closed loop: deviations from one point of a run.
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 import re
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
@@ -90,17 +91,18 @@ class Stability:
         return found
 
 
+@functools.lru_cache(maxsize=4)
 def stability(model: Linearization) -> Stability:
-    """Eigenvalues, and what they mean together."""
+    """Eigenvalues, and what they mean together; remembered, because figures and responses ask again."""
     modes = _modes(model)
     growing = [m for m in modes if m.pole.real > NEUTRAL]
     ringing = [m for m in modes if m.is_neutral and m.seen and m.frequency > 10.0 * NEUTRAL]
     neutral = [m for m in modes if m.is_neutral and m.seen and m not in ringing]
     if growing:
-        text = f"unstable: {_count(growing)} grow, the fastest by e in {-growing[0].time_constant:.4g} s"
+        text = f"unstable: {_count(growing)} grow{_s(growing)}, the fastest by e in {-growing[0].time_constant:.4g} s"
         return Stability("unstable", tuple(modes), f"{text} ({_listed(growing[0].states)})")
     if ringing:
-        text = f"undamped: {_count(ringing)} neither grow nor decay, at {ringing[0].frequency:.4g} rad/s"
+        text = f"undamped: {_count(ringing)} neither growing nor decaying, at {ringing[0].frequency:.4g} rad/s"
         return Stability("undamped", tuple(modes), f"{text} ({_listed(ringing[0].states)})")
     if sum(m.count for m in neutral) > _nullity(model):
         names = ", ".join(dict.fromkeys(name for m in neutral for name in m.states))
@@ -114,6 +116,10 @@ def stability(model: Linearization) -> Stability:
 def _count(modes: Sequence[Mode]) -> str:
     number = sum(m.count for m in modes)
     return f"{number} mode{'s' * (number > 1)}"
+
+
+def _s(modes: Sequence[Mode]) -> str:
+    return "s" if sum(m.count for m in modes) == 1 else ""
 
 
 def _listed(names: Sequence[str]) -> str:

@@ -18,7 +18,7 @@ from .modes import NEUTRAL, stability
 
 Complex = NDArray[np.complex128]
 
-_STRING_SLACK = 1e-6
+_STRING_SLACK = 1e-5
 _CLEAR = 1e-9
 
 
@@ -105,7 +105,7 @@ class Passing:
 
 def default_input(model: Linearization) -> int:
     """The input that string stability is judged under: the first disturbance, else the first."""
-    return next((k for k, name in enumerate(model.inputs) if name.endswith(".disturbance")), 0)
+    return next((k for k, name in enumerate(model.inputs) if re.search(r"\.disturbance(\[1\])?$", name)), 0)
 
 
 def string_stability(model: Linearization, input_index: int | None = None) -> list[Passing]:

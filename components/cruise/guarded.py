@@ -42,7 +42,7 @@ class GuardedCruise(CruiseController, ABC):
     guard = Parameter("1", False, description="whether the safe bound acts at all times, where fallback is on")
     age_limit = Parameter("s", 0.25, minimum=0.0, description="age from which a neighbour's position is extrapolated")
     degraded_age = Parameter("s", 1.0, minimum=0.0, description="age from which the train falls back")
-    rejoin_time = Parameter("s", 10.0, minimum=1e-3, description="time constant of rejoining after an outage")
+    rejoin_time = Parameter("s", 10.0, minimum=0.1, description="time constant of rejoining after an outage")
     braking = Parameter("m/s2", 0.6, minimum=1e-3, description="braking the own train is sure to reach, b")
     ahead_braking = Parameter("m/s2", 1.0, minimum=1e-3, description="hardest braking expected of the train ahead, b_a")
     reaction_time = Parameter("s", 1.0, minimum=1e-3, description="time before the own brakes act, T")
@@ -77,9 +77,9 @@ class GuardedCruise(CruiseController, ABC):
     def _guarded(self, demand: Any) -> Any:
         """The law's demand, lowered to the safe bound as far as the fallback asks for it."""
         lost, bound = self._lost_ahead(), self._safe_bound()
-        weight = where(lost, 1.0, self.caution_ahead)
-        # Exactly the demand where the weight is zero.
-        careful = demand + weight * minimum(where(lost, bound, self.held_bound) - demand, 0.0)
+        # Exactly the demand where there is no caution.
+        rejoining = demand + self.caution_ahead * minimum(self.held_bound - demand, 0.0)
+        careful = where(lost, minimum(demand, bound), rejoining)
         guarded = logical_and(logical_and(self.fallback, self.guard), self.has_ahead)
         return where(guarded, minimum(careful, bound), careful)
 

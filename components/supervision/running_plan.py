@@ -116,6 +116,7 @@ def _solve(changes: Sequence[_Change], jerk: float, duration: float, distance: f
             return -1.0
         return float(moved(profile.motions[-1], duration - profile.times[-1]).position)
 
+    _profile(changes, jerk, top)  # phases that overlap at that speed, too, are the plan's own mistake
     low, high = 0.0, top
     if not reached(low) <= distance <= reached(high):
         raise ValueError(f"no speed of the phase 'solve' between 0 and {top:g} m/s leads to {distance:g} m")

@@ -129,7 +129,7 @@ static void slope(Instance *s, double time, double *result)
 static fmi2Status integrate(Instance *s, double begin, double length)
 {
     double longest = s->values[MAX_STEP];
-    double parts = longest > 0.0 ? ceil(length / longest - 1e-9) : 1.0;
+    double parts = longest > 0.0 && length > longest ? ceil(length / longest - 1e-9) : 1.0;
     if (!(parts < 2147483647.0)) {
         return fail(s, "max_step = %g s is too short for a step of %g s", longest, length);
     }

@@ -144,10 +144,11 @@ def scripts(draw, component):
     if "max_step" in component.slots:
         starts["max_step"] = draw(st.sampled_from([0.0, 0.1, 0.04, step / 3.0, 1.0]))
     if has_tape:
-        lengths = [step] * 16
+        lengths = [step] * 20
         starts["tape_duration"] = 10 * step
         starts["tape_cutoff"] = draw(st.sampled_from([0.0, 0.02, 0.3, 2.0])) / step
-    wait, ride = draw(st.integers(1, 3)), draw(st.integers(1, 5))
+    # Samples of each trip, from the wait before it; trips of several lengths leave the tape's end to earlier ones.
+    trips = [(trip + 1, place) for trip in range(20) for place in range(-rng.integers(1, 3), rng.integers(1, 6))]
     clocks = [slot for slot in component.of(Parameter) if slot.unit == "s"]
     events = [float(x) for slot in clocks for x in np.ravel(starts.get(slot.name, slot.start))]
     time = start_time = draw(st.sampled_from([0.0, 1.0, -0.7, *(event - 2.5 * step for event in events)]))
@@ -156,8 +157,7 @@ def scripts(draw, component):
         moved = [slot for slot in component.of(Input) if rng.random() < 0.8 or k == 0]
         given = {slot.name: random_value(slot, rng, places) for slot in moved}
         if has_tape:
-            trip, place = divmod(k, wait + ride)
-            given |= {"trip": trip + 1, "trip_time": (place - wait) * step}
+            given |= {"trip": trips[k][0], "trip_time": trips[k][1] * step}
         if k == 4:
             given |= {s.name: draw(values(s)) for s in component.of(Parameter) if s.declaration.tunable}
         steps.append((time, length, given))

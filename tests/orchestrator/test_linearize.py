@@ -17,6 +17,7 @@ from railcosim.orchestrator.responses import FrequencyResponse, step_response, s
 from typer.testing import CliRunner
 
 ALPHA, STEP = 0.2, 0.5
+needs_native = pytest.mark.skipif(importlib.util.find_spec("casadi") is None, reason="casadi is not installed")
 FREE = {"c0": 0.0, "c1": 0.0, "c2": 0.0}
 PI = '''
 class Pi(Base):
@@ -78,6 +79,7 @@ def a_model(a, b, c, *, step=None, outputs=None, states=None):
 # ---------------------------------------------------------------- one train: everything is known
 
 
+@needs_native
 def test_one_train_has_the_matrices_of_its_equations():
     """dx/dt = v, dv/dt = alpha (target - v) + w: eigenvalues 0 and -alpha, and the fallback's -1/rejoin_time."""
     model = linearize(one_train(), 1.0)
@@ -151,6 +153,18 @@ def test_memory_is_a_state_of_the_step(pi_loop, kind):
     assert any("is no native FMU here" in note for note in model.notes) == (kind != "native")
 
 
+def test_a_late_sensor_is_a_register_of_its_own():
+    """A sampled block in the loop, one sample late: z^2 - z + alpha h = 0, as for a late force."""
+    system = one_train()
+    system.connections = [c for c in system.connections if c.target not in ("cruise.position", "cruise.speed")]
+    system.add("sensor", "Sensor", delay=1)
+    for name in ("position", "speed"):
+        system.connect(f"train.{name}", f"sensor.true_{name}")
+        system.connect(f"sensor.{name}", f"cruise.{name}")
+    found = np.linalg.eigvals(linearize(system, 5.0).a)
+    assert all(np.abs(found - z).min() < 1e-9 for z in np.roots([1.0, -1.0, ALPHA * STEP]))
+
+
 def test_finite_differences_find_slopes_and_hold_what_switches():
     def respond(x):
         return np.array([x[0] ** 3 + 5e4, np.sin(x[1]), np.sign(x[2]), 3.0])
@@ -177,6 +191,7 @@ class Gain(Base):
 """
 
 
+@needs_native
 def test_chains_and_loops_of_feed_through_are_solved(components):
     """y1 = 0.5 y2 + e, y2 = -0.8 y1: y1 = e / (1 + 0.4); scaled by the connection's own scale."""
     gain = components(GAIN)("Gain")
@@ -383,6 +398,7 @@ def orchestrate():
     return run
 
 
+@needs_native
 def test_the_command_answers_and_leaves_its_numbers_and_figures(orchestrate, tmp_path):
     done = orchestrate("linearize", "comfort_cruise", "--at", "60", "-o", tmp_path)
     assert done.exit_code == 0, done.output
@@ -398,7 +414,7 @@ def test_the_command_answers_and_leaves_its_numbers_and_figures(orchestrate, tmp
 
 
 def test_an_unstable_loop_ends_with_1(orchestrate, tmp_path):
-    """A consensus that repels: beta below what alpha holds is not allowed, so the sign is turned by a connection."""
+    """The law's force with its sign turned by the connection: dv/dt = -alpha (target - v)."""
     (tmp_path / "runaway.toml").write_text(
         '[simulation]\nstop_time = 5.0\n[instances.train]\ncomponent = "PointMassTrain"\nstart.speed = 8.0\n'
         '[instances.cruise]\ncomponent = "ComfortCruise"\nstart.target_speed = 8.0\n'
@@ -408,5 +424,5 @@ def test_an_unstable_loop_ends_with_1(orchestrate, tmp_path):
     arguments = ("linearize", tmp_path / "runaway.toml", "--at", "1", "--no-figures", "-o", tmp_path)
     done = orchestrate(*arguments)
     assert done.exit_code == 1
-    assert "unstable: 1 mode grow" in done.output
+    assert "unstable: 1 mode grows" in done.output
     assert orchestrate(*arguments, "--quiet").output == ""

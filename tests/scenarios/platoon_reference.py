@@ -1,8 +1,8 @@
 """The closed loops of the three laws of `papers/tunable_potential.md` as ordinary differential equations.
 
 Written by hand from its sections 1 to 4 and 7, with NumPy, in the paper's kilometres, and sharing nothing with
-`railcosim`. `march` integrates many starts at once with classical RK4 (step 0.25 s, reported every 1 s, as the specification's own
-measurements); `dop853` solves one start with SciPy's eighth-order Runge-Kutta. Load it by its path.
+`railcosim`. `march` integrates many starts at once with classical RK4 (step 0.25 s, reported every 1 s, as the
+specification's own measurements); `dop853` solves one start with SciPy's eighth-order Runge-Kutta. Load it by its path.
 """
 
 import itertools
