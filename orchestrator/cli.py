@@ -4,40 +4,46 @@ from __future__ import annotations
 
 import importlib.metadata
 import os
-import shlex
 import sys
-import tomllib
 from collections.abc import Sequence
 from contextlib import suppress
 from dataclasses import replace
-from enum import StrEnum
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated
 
 import typer
 
 from ..components import CATALOGUE
 from ..components.component import ComponentError
-from ..fmus.build import build as build_fmu
 from ..fmus.description import summary
-from . import console
+from . import cli_analysis, cli_models, console
 from .archive import Workspace
 from .check import check as check_system
+from .cli_options import (
+    FAILED,
+    FMU_FAILED,
+    INTERRUPTED,
+    OK,
+    WRONG_INPUT,
+    Algorithm,
+    Kind,
+    KindName,
+    Preset,
+    Quiet,
+    Scenario,
+    Set,
+    Step,
+    Stop,
+    Swap,
+    With,
+)
 from .errors import FmuError, RailcosimError, ScenarioError
-from .loading import load_fmu
-from .pack import pack as pack_system
 from .plots import draw
 from .published import PublishedRow
-from .release import default_directory, release
 from .reproduce import cases
 from .results import Results
 from .run import Run, execute
 from .scenario import load, shipped
-from .skeleton import write_skeleton
-from .validate import TIMEOUT, show_report
-from .validate import validate as validate_fmu
-
-OK, FAILED, WRONG_INPUT, FMU_FAILED, INTERRUPTED = 0, 1, 2, 3, 130
 
 app = typer.Typer(
     no_args_is_help=True,
@@ -45,55 +51,6 @@ app = typer.Typer(
     rich_markup_mode=None,
     pretty_exceptions_enable=False,
 )
-
-
-class KindName(StrEnum):
-    """`loading.KINDS`, as the command line needs them."""
-
-    auto = "auto"
-    native = "native"
-    python = "python"
-    plain = "plain"
-
-
-class PackagingName(StrEnum):
-    """The kinds of FMU that can be built, as the command line needs them."""
-
-    auto = "auto"
-    native = "native"
-    python = "python"
-
-
-class AlgorithmName(StrEnum):
-    """`system.ALGORITHMS`, as the command line needs them."""
-
-    gauss_seidel = "gauss-seidel"
-    jacobi = "jacobi"
-
-
-Scenario = Annotated[
-    str, typer.Argument(metavar="SCENARIO", help="A shipped scenario (see 'orchestrate list'), or a .toml file.")
-]
-Preset = Annotated[str | None, typer.Option(help="Apply a preset of the scenario.")]
-Set = Annotated[
-    list[str] | None,
-    typer.Option("--set", help="Set a parameter or start value: train[4].speed=10."),
-]
-With = Annotated[list[str] | None, typer.Option("--with", help="Give a build argument: train.carriages=8.")]
-Swap = Annotated[
-    list[str] | None,
-    typer.Option("--swap", help="Put in another model: cruise=other.fmu, or OtherComponent, or my_file.py:Class."),
-]
-Stop = Annotated[float | None, typer.Option(help="Stop time in s.")]
-Step = Annotated[float | None, typer.Option(help="Communication step in s; sample times equal to it follow.")]
-Algorithm = Annotated[AlgorithmName | None, typer.Option(help="How the instances exchange values.")]
-Kind = Annotated[
-    KindName,
-    typer.Option(
-        help="native: compiled FMUs; python: Python FMUs; plain: Python objects, to debug; auto: native if possible."
-    ),
-]
-Quiet = Annotated[bool, typer.Option("--quiet", "-q", help="Print nothing but errors.")]
 
 
 def main() -> None:
@@ -224,58 +181,6 @@ def list_all() -> None:
 
 
 @app.command()
-def describe(
-    model: Annotated[str, typer.Argument(help="A component's name, my_file.py:Class, or the path of any FMU.")],
-    builds: Annotated[list[str] | None, typer.Option("--with", help="Give a build argument: carriages=8.")] = None,
-) -> None:
-    """Show the interface of a component or of any FMU.
-
-    Variables by causality, with units, start values and direct dependencies; build arguments; where it comes from.
-    """
-    arguments = _arguments(builds)
-    if model.endswith(".fmu") and arguments:
-        raise ScenarioError(f"{model} is built already; it takes no --with {', '.join(arguments)}")
-    path = Path(model) if model.endswith(".fmu") else build_fmu(model, arguments)
-    with Workspace() as workspace:
-        interface = load_fmu(path, workspace).interface
-    out = console.console()
-    vendor = interface.vendor
-    console.say(out, interface.model, "bold")
-    facts = {
-        "": interface.description,
-        "note": vendor.get("note", ""),
-        "source": vendor.get("source", ""),
-        "build arguments": ", ".join(f"{k} = {v!r}" for k, v in vendor.get("arguments", {}).items()),
-        "digest": vendor.get("digest", ""),
-        "kind": f"{vendor['kind']}: {vendor['kind_note']}" if vendor else "",
-        "made with": interface.generator,
-        "guid": interface.guid,
-        "default step": "" if interface.default_step is None else f"{interface.default_step:g} s",
-        "saves its state": "yes" if interface.can_save_state else "no",
-    }
-    for label, fact in facts.items():
-        if fact:
-            console.say(out, f"{label}: {fact}" if label else fact)
-    for warning in interface.warnings:
-        console.say(out, f"warning: {warning}", "yellow")
-    console.show_interface(out, interface)
-
-
-def _arguments(builds: list[str] | None) -> dict[str, Any]:
-    """``carriages=8`` as on every command line: the value is TOML, or text."""
-    arguments: dict[str, Any] = {}
-    for text in builds or []:
-        name, equals, value = text.partition("=")
-        if not equals or not name:
-            raise ScenarioError(f"--with {text}: write NAME=VALUE, as in --with carriages=8")
-        try:
-            arguments[name.strip()] = tomllib.loads(f"value = {value}")["value"]
-        except tomllib.TOMLDecodeError:
-            arguments[name.strip()] = value
-    return arguments
-
-
-@app.command()
 def check(
     scenario: Scenario, preset: Preset = None, settings: Set = None, builds: With = None, swaps: Swap = None
 ) -> None:
@@ -302,94 +207,6 @@ def check(
 
 
 @app.command()
-def build(
-    names: Annotated[list[str] | None, typer.Argument(help="Component names or my_file.py:Class.")] = None,
-    *,
-    every: Annotated[bool, typer.Option("--all", help="Build the whole catalogue, with SHA256SUMS.")] = False,
-    builds: Annotated[list[str] | None, typer.Option("--with", help="Give a build argument: carriages=8.")] = None,
-    kind: Annotated[
-        PackagingName, typer.Option(help="native: compiled C; python: Python FMUs; auto: native if possible.")
-    ] = PackagingName.auto,
-    platforms: Annotated[
-        str | None,
-        typer.Option(
-            help="Of native FMUs: all, or some of linux64,win64,darwin64,aarch64-linux; this machine's by default."
-        ),
-    ] = None,
-    output: Annotated[Path | None, typer.Option("--output", "-o", help="Directory for the FMUs.")] = None,
-    quiet: Quiet = False,
-) -> None:
-    """Build FMUs to keep, for other tools or for --swap; prints the files it wrote."""
-    wanted = [*(names or []), *(CATALOGUE if every else [])]
-    if not wanted:
-        raise ScenarioError(f"name the components to build, or --all; there is {', '.join(CATALOGUE)}")
-    written = release(
-        tuple(dict.fromkeys(wanted)),
-        _arguments(builds),
-        output or default_directory(),
-        kind=kind.value,
-        platforms=[name.strip() for name in (platforms or "").split(",") if name.strip()],
-        checksums=every,
-        tell=(lambda line: None) if quiet else (lambda line: print(line, file=sys.stderr, flush=True)),
-    )
-    for path in written:
-        print(path)
-
-
-@app.command()
-def pack(
-    scenario: Scenario,
-    output: Annotated[Path, typer.Option("--output", "-o", help="The FMU to write, such as platoon.fmu.")],
-    *,
-    expose: Annotated[
-        list[str] | None,
-        typer.Option(help="What to show: train[:].speed,gust.size; all outputs of the trains by default."),
-    ] = None,
-    preset: Preset = None,
-    settings: Set = None,
-    builds: With = None,
-    swaps: Swap = None,
-    stop: Stop = None,
-    step: Step = None,
-    algorithm: Algorithm = None,
-    platforms: Annotated[
-        str | None, typer.Option(help="all, or some of linux64,win64,darwin64; this machine's by default.")
-    ] = None,
-) -> None:
-    """Write one FMU that holds a whole scenario, for another tool to run as a block."""
-    system = load(
-        scenario,
-        preset=preset,
-        settings=settings or (),
-        builds=builds or (),
-        swaps=swaps or (),
-        stop_time=stop,
-        step=step,
-        algorithm=algorithm.value if algorithm else None,
-    )
-    packed = pack_system(system, output, expose=expose or (), platforms=(platforms or "").split(","))
-    out = console.console()
-    for note in console.folded(packed.notes):
-        console.say(out, f"note: {note}", "yellow")
-    shown = f"{len(packed.exposed)} variables, for {', '.join(packed.platforms)}"
-    console.say(out, f"{packed.path}: {len(system.instances)} FMUs as one, {shown}", whole=True)
-
-
-@app.command()
-def validate(
-    fmu: Annotated[Path, typer.Argument(help="Any FMI 2.0 co-simulation FMU, ours or not.")],
-    timeout: Annotated[float, typer.Option(min=0.1, help="Longest time for one probe, in s.")] = TIMEOUT,
-) -> None:
-    """Check any FMU: archive, description, and probes that cannot take this program down.
-
-    Exit codes: 0 nothing failed; 1 something did; 2 the file is no FMU that could be used.
-    """
-    report = validate_fmu(fmu, timeout=timeout)
-    show_report(console.console(), report)
-    raise typer.Exit(OK if report.passed else FAILED)
-
-
-@app.command()
 def plot(
     results: Annotated[Path, typer.Argument(help="The directory of a run.")],
     signals: Annotated[
@@ -406,13 +223,6 @@ def plot(
     directory.mkdir(parents=True, exist_ok=True)
     for path in draw(figures, loaded, directory):
         print(path)
-
-
-@app.command()
-def new(path: Annotated[Path, typer.Argument(help="The file to write, such as my_controller.py.")]) -> None:
-    """Write a commented controller to start from; it runs."""
-    name = write_skeleton(path)
-    print(f"{path} written. Try it:\n  orchestrate run comfort_cruise --swap cruise={shlex.quote(f'{path}:{name}')}")
 
 
 @app.command()
@@ -445,6 +255,18 @@ def reproduce(
         missed |= bad
         console.say(out, line, "bold red" if bad else "green")
     raise typer.Exit(FAILED if missed else OK)
+
+
+for command in (
+    cli_models.describe,
+    cli_models.build,
+    cli_models.pack,
+    cli_models.validate,
+    cli_models.new,
+    cli_analysis.compare,
+    cli_analysis.linearize,
+):
+    app.command()(command)
 
 
 if __name__ == "__main__":

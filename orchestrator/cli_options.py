@@ -1,0 +1,76 @@
+"""What the commands of ``orchestrate`` share: exit codes, and the options that several of them take."""
+
+from __future__ import annotations
+
+import tomllib
+from enum import StrEnum
+from typing import Annotated, Any
+
+import typer
+
+from .errors import ScenarioError
+
+OK, FAILED, WRONG_INPUT, FMU_FAILED, INTERRUPTED = 0, 1, 2, 3, 130
+
+
+class KindName(StrEnum):
+    """`loading.KINDS`, as the command line needs them."""
+
+    auto = "auto"
+    native = "native"
+    python = "python"
+    plain = "plain"
+
+
+class PackagingName(StrEnum):
+    """The kinds of FMU that can be built, as the command line needs them."""
+
+    auto = "auto"
+    native = "native"
+    python = "python"
+
+
+class AlgorithmName(StrEnum):
+    """`system.ALGORITHMS`, as the command line needs them."""
+
+    gauss_seidel = "gauss-seidel"
+    jacobi = "jacobi"
+
+
+Scenario = Annotated[
+    str, typer.Argument(metavar="SCENARIO", help="A shipped scenario (see 'orchestrate list'), or a .toml file.")
+]
+Preset = Annotated[str | None, typer.Option(help="Apply a preset of the scenario.")]
+Set = Annotated[
+    list[str] | None,
+    typer.Option("--set", help="Set a parameter or start value: train[4].speed=10."),
+]
+With = Annotated[list[str] | None, typer.Option("--with", help="Give a build argument: train.carriages=8.")]
+Swap = Annotated[
+    list[str] | None,
+    typer.Option("--swap", help="Put in another model: cruise=other.fmu, or OtherComponent, or my_file.py:Class."),
+]
+Stop = Annotated[float | None, typer.Option(help="Stop time in s.")]
+Step = Annotated[float | None, typer.Option(help="Communication step in s; sample times equal to it follow.")]
+Algorithm = Annotated[AlgorithmName | None, typer.Option(help="How the instances exchange values.")]
+Kind = Annotated[
+    KindName,
+    typer.Option(
+        help="native: compiled FMUs; python: Python FMUs; plain: Python objects, to debug; auto: native if possible."
+    ),
+]
+Quiet = Annotated[bool, typer.Option("--quiet", "-q", help="Print nothing but errors.")]
+
+
+def build_arguments(builds: list[str] | None) -> dict[str, Any]:
+    """``carriages=8`` as on every command line: the value is TOML, or text."""
+    arguments: dict[str, Any] = {}
+    for text in builds or []:
+        name, equals, value = text.partition("=")
+        if not equals or not name:
+            raise ScenarioError(f"--with {text}: write NAME=VALUE, as in --with carriages=8")
+        try:
+            arguments[name.strip()] = tomllib.loads(f"value = {value}")["value"]
+        except tomllib.TOMLDecodeError:
+            arguments[name.strip()] = value
+    return arguments
