@@ -81,8 +81,8 @@ def _without_the_missing(system: System, names: list[str], every_step: bool) -> 
     gone += [f"metric {name!r}" for name in system.metrics if name not in metrics]
     gone += [f"figure {figure.get('title')!r}" for figure in system.figures if figure not in figures]
     notes = [f"left out, because the swapped model lacks what they speak of: {', '.join(gone)}"] if gone else []
-    changes = {"requirements": requirements, "metrics": metrics, "figures": figures, "published": published}
-    return replace(system, **changes), notes
+    kept = replace(system, requirements=requirements, metrics=metrics, figures=figures, published=published)
+    return kept, notes
 
 
 def signal_names(interfaces: Mapping[str, Interface], wiring: Wiring) -> list[str]:

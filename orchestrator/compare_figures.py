@@ -1,7 +1,7 @@
 """A scenario's figures with the curves of several runs in each panel.
 
 Where a panel has one curve, colour tells the variant. Where it has several, colour tells the curve and the dashes the
-variant, up to four; beyond that, each variant has a panel of its own colour and the curves share it.
+variant, up to four; beyond that, colour tells the variant alone.
 """
 
 from __future__ import annotations
@@ -96,8 +96,7 @@ def _draw_panel(ax: Axes, panel: Mapping[str, Any], runs: Mapping[str, Results],
     by_variant = len(labels) == 1 or len(names) > len(DASHES)
     scale = float(panel.get("scale", 1.0))
     for line in lines:
-        k = line.variant
-        style = _style(k, labels.index(line.curve.label), by_variant)
+        style = _style(line.variant, labels.index(line.curve.label), len(labels), by_variant)
         ax.plot(line.curve.x, scale * line.curve.y, **style)
     first = next(iter(runs.values()))
     for band in _bands(panel):
@@ -111,11 +110,18 @@ def _draw_panel(ax: Axes, panel: Mapping[str, Any], runs: Mapping[str, Results],
     return True
 
 
-def _style(variant: int, label: int, by_variant: bool) -> dict[str, Any]:
+def _style(variant: int, label: int, labels: int, by_variant: bool) -> dict[str, Any]:
     if by_variant:
         return {"color": COLOURS[variant % len(COLOURS)], "linestyle": DASHES[variant // len(COLOURS) % 4]}
-    width = _WIDTHS[variant % 4]
-    return {"color": COLOURS[label % len(COLOURS)], "linestyle": DASHES[variant % 4], "linewidth": width}
+    return {"color": _colour(label, labels), "linestyle": DASHES[variant % 4], "linewidth": _WIDTHS[variant % 4]}
+
+
+def _colour(label: int, labels: int) -> Any:
+    if labels <= len(COLOURS):
+        return COLOURS[label]
+    import matplotlib as mpl  # noqa: PLC0415
+
+    return mpl.colormaps["viridis"](0.92 * label / (labels - 1))
 
 
 def _legend(ax: Axes, labels: Sequence[str], names: Sequence[str], drawn: set[int], by_variant: bool) -> None:
@@ -124,12 +130,19 @@ def _legend(ax: Axes, labels: Sequence[str], names: Sequence[str], drawn: set[in
 
     handles = []
     if not by_variant:
-        handles += [Line2D([], [], color=COLOURS[k % len(COLOURS)], label=label) for k, label in enumerate(labels)]
+        handles += [Line2D([], [], color=_colour(k, len(labels)), label=x) for k, x in enumerate(labels)]
     for k, name in enumerate(names):
         if k in drawn:
-            style = _style(k, 0, by_variant) | ({} if by_variant else {"color": "#444444"})
+            style = _style(k, 0, 1, by_variant) | ({} if by_variant else {"color": "#444444"})
             handles.append(Line2D([], [], label=name, **style))
-    ax.legend(handles=handles, loc="upper left", bbox_to_anchor=(1.01, 1.02), borderaxespad=0.0, handlelength=2.6)
+    ax.legend(
+        handles=handles,
+        loc="upper left",
+        bbox_to_anchor=(1.01, 1.02),
+        borderaxespad=0.0,
+        handlelength=2.6,
+        ncols=1 + (len(handles) - 1) // 14,
+    )
 
 
 def _known_curves(panel: Mapping[str, Any], results: Results) -> list[Curve]:

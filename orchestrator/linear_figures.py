@@ -43,7 +43,7 @@ def draw_linear(
     Returns:
         The files.
     """
-    title = f"{model.system.title or model.system.name}, linear at t = {model.time:g} s"
+    title = f"{model.system.title or model.system.name}\nLinear at t = {model.time:g} s"
     paths = [_poles(stability, title, directory / "eigenvalues.png")]
     if not model.inputs:
         return paths
@@ -131,7 +131,7 @@ def _bracketed(unit: str) -> str:
 
 def _poles(stability: Stability, title: str, path: Path) -> Path:
     """Eigenvalues in the s plane; of a pair both. Modes that are gone after one step have no place in it."""
-    with _Canvas(f"{title}\nEigenvalues", 1, path) as canvas:
+    with _Canvas(f"{title}: eigenvalues", 1, path) as canvas:
         ax = canvas.axes[0]
         for seen, mark, label in ((True, "x", "seen in the outputs"), (False, "+", "not seen")):
             poles = [m.pole for m in stability.modes if m.seen == seen and abs(m.pole) < np.inf]
@@ -154,7 +154,7 @@ def _steps(model: Linearization, index: int, duration: float, title: str, direct
     families = _families(model)
     times, found = step_response(model, index, duration)
     path = directory / f"step-{re.sub(r'[^a-z0-9]+', '-', name.lower()).strip('-')}.png"
-    with _Canvas(f"{title}\nStep of 1 {unit} at {name}", len(families), path) as canvas:
+    with _Canvas(f"{title}: step of 1 {unit} at {name}", len(families), path) as canvas:
         for ax, (panel, curves) in zip(canvas.axes, families.items(), strict=True):
             for k, (label, row, _) in enumerate(curves):
                 style: Any = {"drawstyle": "steps-post"} if model.step is not None and len(times) < 200 else {}
@@ -170,7 +170,7 @@ def _bode(model: Linearization, title: str, path: Path) -> Path:
     index, frequencies = default_input(model), default_frequencies(model)
     response = FrequencyResponse(model)(frequencies, index)
     families = {k: v for k, v in _families(model).items() if any(np.abs(row @ response).any() for _, row, _ in v)}
-    with _Canvas(f"{title}\nFrequency response to {model.inputs[index]}", 2 * len(families), path) as canvas:
+    with _Canvas(f"{title}: frequency response to {model.inputs[index]}", 2 * len(families), path) as canvas:
         for k, (panel, curves) in enumerate(families.items()):
             size, phase = canvas.axes[2 * k : 2 * k + 2]
             for n, (label, row, _) in enumerate(curves):
@@ -191,7 +191,7 @@ def _bode(model: Linearization, title: str, path: Path) -> Path:
 
 def _string(model: Linearization, passings: Sequence[Passing], title: str, path: Path) -> Path:
     quantities = list(dict.fromkeys(passing.quantity for passing in passings))
-    heading = f"{title}\nString stability under {model.inputs[default_input(model)]}"
+    heading = f"{title}: string stability under {model.inputs[default_input(model)]}"
     with _Canvas(heading, len(quantities), path) as canvas:
         for ax, quantity in zip(canvas.axes, quantities, strict=True):
             mine = [passing for passing in passings if passing.quantity == quantity]

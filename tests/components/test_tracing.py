@@ -136,10 +136,13 @@ def test_feedthrough_of_the_shipped_components():
     assert train["acceleration"] == {"force", "disturbance", "line_resistance"}
     assert train["applied_force"] == {"force"}
     cruise = feedthrough(ComfortCruise())
-    neighbours = {"has_ahead", "has_behind", "ahead_position", "behind_position", "ahead_speed", "behind_speed"}
-    assert cruise["demand"] == neighbours | {"position", "speed", "target_speed"}
+    # A neighbour's position is extrapolated from its speed over its age, so the range depends on all three.
+    heard = {f"{who}_{what}" for who in ("ahead", "behind") for what in ("position", "speed", "age")}
+    neighbours = heard | {"has_ahead", "has_behind"}
+    assert cruise["demand"] == neighbours | {"position", "speed", "target_speed", "has_leader", "leader_speed"}
     assert cruise["force"] == cruise["demand"] | {"line_resistance"}
-    assert cruise["range_violated"] == {n for n in neighbours if "speed" not in n} | {"position"}
+    assert cruise["range_violated"] == neighbours | {"position"}
+    assert cruise["degraded"] == {"ahead_age", "behind_age", "leader_age", "has_ahead", "has_behind", "has_leader"}
     assert feedthrough(Gust()) == {"acceleration": frozenset()}
     assert feedthrough(Schedule(points=3)) == {"value": frozenset()}
 

@@ -245,10 +245,13 @@ def test_comfort_cruise_by_hand(model):
     root = model("ComfortCruise")
     direct = unknowns(root, "Outputs")
     heard = {"position", "speed", "target_speed", "has_ahead", "ahead_position", "ahead_speed"}
-    heard |= {"has_behind", "behind_position", "behind_speed"}
+    heard |= {"has_behind", "behind_position", "behind_speed", "has_leader", "leader_speed", "ahead_age", "behind_age"}
     assert direct["force"] == heard | {"line_resistance"}
     assert direct["demand"] == direct["bottom_demand"] == heard
-    assert direct["range_violated"] == {"position", "has_ahead", "ahead_position", "has_behind", "behind_position"}
+    neighbours = {f"{side}_{what}" for side in ("ahead", "behind") for what in ("position", "speed", "age")}
+    assert direct["range_violated"] == {"position", "has_ahead", "has_behind"} | neighbours
+    sides = ("ahead", "behind", "leader")
+    assert direct["degraded"] == {f"has_{side}" for side in sides} | {f"{side}_age" for side in sides}
     entry = root.find("VendorAnnotations/Tool/component")
     optional = entry.get("optionalInputs").split()
     assert {"ahead_position", "has_leader", "line_resistance"} <= set(optional)

@@ -132,10 +132,10 @@ def test_what_is_said_when_there_is_no_such_scenario(monkeypatch, tmp_path):
     (tmp_path / "mine.toml").write_text(EXAMPLE)
     for name, message in {
         "comfort_crise": "there is no shipped scenario 'comfort_crise'; did you mean 'comfort_cruise'?",
-        "zzz": "there is no shipped scenario 'zzz'; there are braking_wave, ",
+        "zzz": "there is no shipped scenario 'zzz'; there are ato_comparison, ",
         "mine": "there is no shipped scenario 'mine'; did you mean './mine.toml'?",
         "min.toml": "there is no file 'min.toml'; did you mean 'mine.toml'?",
-        "gone/x.toml": "there is no file 'gone/x.toml'; shipped scenarios are braking_wave, ",
+        "gone/x.toml": "there is no file 'gone/x.toml'; shipped scenarios are ato_comparison, ",
         str(tmp_path): f"'{tmp_path}' is a folder; name the scenario file in it",
     }.items():
         with pytest.raises(ScenarioError) as caught:

@@ -16,7 +16,7 @@ class Trips:
 
     Args:
         trips: how many. step: of communication and control, s. algorithm: ``"jacobi"`` delays the loop by one sample.
-        ato, train: components, with values for each in ``law`` and ``plant``; ``build`` are the train's build arguments.
+        ato, train: components, with values for each in ``law`` and ``plant``; ``build``: the train's build arguments.
         table: values of the timetable. sensor: values of a sensor between train and controller, if there is to be one.
         record: distance of recorded points, s; the step where left out. kind: of the FMUs.
     """
@@ -58,7 +58,7 @@ class Trips:
         return self.result[name]
 
     def largest(self, name, trip):
-        """The largest ``position_error``, ``speed_error``, ``augmented_error`` or ``overspeed`` of a trip, from 1 on."""
+        """The largest ``position_error``, ``speed_error``, ``augmented_error`` or ``overspeed`` of a trip."""
         time = self.result.time
         k = min(int(np.searchsorted(time, trip * self.cycle + 2.5 * self.step)), len(time) - 1)
         return float(self.result[f"monitor.finished_{name}"][k])

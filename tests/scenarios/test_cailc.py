@@ -17,7 +17,7 @@ CASES = [
     ("cailc", "as-stated", 3),
     ("cailc", "as-stated-no-bounds", 24),
     ("cailc_disturbed", "corrected", 5),
-    BREAKS_THE_BARRIER + (3,),
+    (*BREAKS_THE_BARRIER, 3),
     *(
         pytest.param(*case, marks=pytest.mark.long)
         for case in [
@@ -90,7 +90,7 @@ def test_orderings(comparison):
 
 @pytest.mark.long
 def test_the_protection_brakes_pd_ilc_and_never_cailc():
-    """With the protection active PDILC is braked at 22.55 s of trip 1; its own memory then drives it too fast each time."""
+    """PDILC is braked at 22.55 s of trip 1; what it learns from that drives it too fast again on every trip."""
     result = run(load("ato_comparison", preset="protected"), figures=False)
     assert judged(result, 3) == set()
     speed, limit = result["train[3].speed"], result["timetable.speed_limit"]

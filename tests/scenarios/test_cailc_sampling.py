@@ -1,7 +1,7 @@
 """CAILC under other samples, delays, loads, drives and trains: sections 5 to 9 of the specification.
 
-Expected numbers are those of `papers/cailc_ato.md`, from an independent NumPy implementation. Tolerances are its own, 2 %
-on trip 1 and 5 % later; wider ones, where another drive or integration is compared, stand beside the case.
+Expected numbers are those of `papers/cailc_ato.md`, from an independent NumPy implementation. Tolerances are its own,
+2 % on trip 1 and 5 % later; wider ones, where another drive or integration is compared, stand beside the case.
 """
 
 import runpy
@@ -57,7 +57,7 @@ def test_golden_values_of_the_three_units(algorithm, step, law, golden):
     ],
 )
 def test_sampling_table(step, rows):
-    """Section 7: as stated without bounds, corrected, corrected and filtered; without delay and with one sample of it."""
+    """Section 7: as stated without bounds, corrected, and filtered; without delay and with one sample of it."""
     law = {0: AS_STATED, 1: {}, 2: FILTERED}
     for column in range(3):
         for delay, algorithm in enumerate(("gauss-seidel", "jacobi")):
@@ -68,15 +68,14 @@ def test_sampling_table(step, rows):
 
 @fast
 @pytest.mark.parametrize(
-    ("step", "algorithm", "preview", "expected"),
-    [(0.05, "jacobi", 1, 0.098), (0.1, "gauss-seidel", 0, 0.079), (0.1, "jacobi", 1, 0.152)],
+    ("step", "algorithm", "expected"),
+    [(0.05, "jacobi", 0.098), (0.1, "gauss-seidel", 0.079), (0.1, "jacobi", 0.152)],
 )
-def test_acceleration_at_the_start_of_the_sample_is_an_error_force(step, algorithm, preview, expected):
+def test_acceleration_at_the_start_of_the_sample_is_an_error_force(step, algorithm, expected):
     """Section 7, as stated without bounds; 6 %: at such steps integration within trips differs."""
     law = AS_STATED | {"check_sampling": False}
     trips = Trips(1, step=step, algorithm=algorithm, law=law, table={"mean_acceleration": False, "preview": 0})
     check(trips, {1: expected}, rel=0.06)
-    assert preview in (0, 1)
 
 
 @fast
@@ -102,7 +101,7 @@ def test_a_sampled_loop_that_is_unstable_is_refused():
     ],
 )
 def test_many_trips(step, algorithm, law, expected):
-    """Section 7 with the noise of example 2, drawn anew each sample: growth without the filter. 30 %: other random numbers."""
+    """Section 7 with the noise of example 2: growth without the filter. 30 %, for the random numbers are others."""
     plant = {"disturbance_size": 0.01, "disturbance_hold": step}
     trips = Trips(max(expected), step=step, algorithm=algorithm, law=law, plant=plant, record=0.05)
     check(trips, expected, rel=0.3)
@@ -110,14 +109,14 @@ def test_many_trips(step, algorithm, law, expected):
 
 @fast
 def test_start_offset():
-    """Section 5: a train that keeps 2 cm of position error at departure starts at delta = 0.16, outside the band."""
+    """Section 5: a train whose position is not zeroed but 2 cm off departs at delta = 0.16, outside the band."""
     trips = Trips(1, plant={"start_offset": 0.02})
     check(trips, {1: 0.16}, rel=1e-9)
     assert trips.during("ato.barrier_reached", 1).any()
     assert trips.during("ato.violated_at", 1).max() == 0.0
     stopping = Trips(1, plant={"start_offset": 0.02}, law={"stop_at_barrier": True})
     assert (stopping.during("ato.status", 1)[1:] == 3).all()
-    assert np.abs(stopping["train.position"] - 0.02).max() < 0.02
+    assert np.abs(stopping.during("train.position", 1) - 0.02).max() < 0.012
 
 
 @fast
@@ -174,7 +173,7 @@ def test_drive_limits(plant, expected):
 
 @fast
 def test_a_drive_that_is_too_weak_says_when_the_barrier_was_reached():
-    """Section 5, 310 kN and 2.3 MW: reached at 16.24 s; catching up it would exceed the limit, and is braked at 24.0 s."""
+    """Section 5, 310 kN and 2.3 MW: reached at 16.24 s; catching up it exceeds the limit, and is braked at 24.0 s."""
     weak = {"limit_force": True, "traction_limit": 310e3, "limit_power": True, "traction_power": 2.3e6}
     trips = Trips(1, plant=weak)
     assert trips.during("ato.violated_at", 1).max() == pytest.approx(16.24, abs=0.011)
@@ -212,12 +211,12 @@ def test_comfort_at_every_sample():
 @fast
 def test_the_printed_train_rolls_back_a_little():
     """Section 2: a_k acts at v = 0 too, 0.035 mm at the start."""
-    assert Trips(1).during("train.position", 1).min() == pytest.approx(-0.035e-3, abs=0.003e-3)
+    assert Trips(1, law=AS_STATED).during("train.position", 1).min() == pytest.approx(-0.035e-3, abs=0.002e-3)
 
 
 @fast
 def test_spring_damper_couplers_and_where_the_speed_is_measured():
-    """Section 6: fed back from the leading trailer the corrected gains are unstable, from the motor cars they are not."""
+    """Section 6: fed back from the leading trailer the corrected gains are unstable, from all cars they are not."""
     leading = Trips(1, train="CoupledSubwayTrain", plant={"measured_at": 2})
     check(leading, {1: 0.23})
     assert np.abs([leading[f"train.coupler_force[{k}]"] for k in range(1, 6)]).max() == pytest.approx(174e3, rel=0.05)
