@@ -284,10 +284,10 @@ static fmi2Status refresh(Instance *s)
 static void restart(Instance *s)
 {
     memset(s->values, 0, sizeof s->values);
-    memset(s->texts, 0, sizeof s->texts);
     for (int n = 0; n < N_VARIABLES; n++) {
         s->values[n] = model_variables[n].start;
         if (model_variables[n].text >= 0) {
+            /* It fills what is left with zeros. */
             strncpy(s->texts[model_variables[n].text], model_texts[model_variables[n].text], MAX_TEXT - 1);
         }
     }
