@@ -9,48 +9,30 @@ import typer
 
 from . import console
 from .better import read_directions
+from .cli_options import (
+    FAILED,
+    FMU_FAILED,
+    INTERRUPTED,
+    OK,
+    Kind,
+    KindName,
+    Preset,
+    Quiet,
+    Scenario,
+    Set,
+    Step,
+    Stop,
+    Swap,
+    With,
+)
 from .compare import compare as compare_systems
 from .compare import variants
 from .compare_report import show_comparison
-from .linear_figures import draw_linear
-from .linear_report import show_linear, write_linear
-from .linearize import linearize as linearize_system
-from .loading import KINDS, Kind
-from .modes import stability
-from .responses import string_stability
 from .scenario import load
 
-OK, FAILED, FMU_FAILED, INTERRUPTED = 0, 1, 3, 130
-
-Scenario = Annotated[
-    str, typer.Argument(metavar="SCENARIO", help="A shipped scenario (see 'orchestrate list'), or a .toml file.")
-]
 Scenarios = Annotated[
     list[str], typer.Argument(metavar="SCENARIO...", help="Shipped scenarios (see 'orchestrate list'), or .toml files.")
 ]
-Set = Annotated[
-    list[str] | None,
-    typer.Option("--set", help="Set a parameter or start value, in all variants: train[4].speed=10."),
-]
-With = Annotated[
-    list[str] | None, typer.Option("--with", help="Give a build argument, in all variants: train.carriages=8.")
-]
-Quiet = Annotated[bool, typer.Option("--quiet", "-q", help="Print nothing but errors.")]
-KindText = Annotated[
-    str,
-    typer.Option(
-        "--kind",
-        metavar="[" + "|".join(KINDS) + "]",
-        help="native: compiled FMUs; python: Python FMUs; plain: Python objects, to debug; auto: native if possible.",
-    ),
-]
-
-
-def _kind(text: str) -> Kind:
-    for kind in KINDS:
-        if kind == text:
-            return kind
-    raise typer.BadParameter(f"'{text}' is not one of {', '.join(map(repr, KINDS))}.", param_hint="'--kind'")
 
 
 def compare(
@@ -65,13 +47,13 @@ def compare(
     ] = None,
     settings: Set = None,
     builds: With = None,
-    stop: Annotated[float | None, typer.Option(help="Stop time in s, of all variants.")] = None,
-    step: Annotated[float | None, typer.Option(help="Communication step in s, of all variants.")] = None,
+    stop: Stop = None,
+    step: Step = None,
     directions: Annotated[
         list[str] | None,
         typer.Option("--better", help="What is better, where the metric does not say: gap_at_end=larger; repeatable."),
     ] = None,
-    kind: KindText = "auto",
+    kind: Kind = KindName.auto,
     output: Annotated[
         Path | None, typer.Option("--output", "-o", help="Directory; results/compare-<scenarios> by default.")
     ] = None,
@@ -84,7 +66,6 @@ def compare(
     variant are parted by commas: --swap cruise=A,train=B. Exit codes: 0 fine; 1 a requirement failed in a variant; 2
     the input is wrong; 3 a variant failed; 130 interrupted.
     """
-    chosen = _kind(kind)
     systems = variants(
         scenarios,
         presets=presets or (),
@@ -99,7 +80,7 @@ def compare(
     directory = output or Path("results") / "-".join(["compare", *names])
     comparison = compare_systems(
         systems,
-        kind=chosen,
+        kind=kind.value,
         output=directory,
         figures=not no_figures,
         directions=read_directions(directions or (), metrics),
@@ -130,21 +111,12 @@ def linearize(
         bool, typer.Option("--sampled", help="The model of one communication step, also of a continuous system.")
     ] = False,
     duration: Annotated[float | None, typer.Option(help="Length of the step responses in s.")] = None,
-    preset: Annotated[str | None, typer.Option(help="Apply a preset of the scenario.")] = None,
-    settings: Annotated[
-        list[str] | None, typer.Option("--set", help="Set a parameter or start value: train[4].speed=10.")
-    ] = None,
-    builds: Annotated[
-        list[str] | None, typer.Option("--with", help="Give a build argument: train.carriages=8.")
-    ] = None,
-    swaps: Annotated[
-        list[str] | None,
-        typer.Option("--swap", help="Put in another model: cruise=other.fmu, or OtherComponent, or my_file.py:Class."),
-    ] = None,
-    step: Annotated[
-        float | None, typer.Option(help="Communication step in s; sample times equal to it follow.")
-    ] = None,
-    kind: KindText = "auto",
+    preset: Preset = None,
+    settings: Set = None,
+    builds: With = None,
+    swaps: Swap = None,
+    step: Step = None,
+    kind: Kind = KindName.auto,
     output: Annotated[
         Path | None, typer.Option("--output", "-o", help="Directory; results/<scenario>-linear by default.")
     ] = None,
@@ -155,7 +127,13 @@ def linearize(
 
     Exit codes: 0 stable (string stability is told, not judged); 1 not stable; 2 the input is wrong; 3 an FMU failed.
     """
-    chosen = _kind(kind)
+    # SciPy, which only this command needs, would slow every other one down.
+    from .linear_figures import draw_linear  # noqa: PLC0415
+    from .linear_report import show_linear, write_linear  # noqa: PLC0415
+    from .linearize import linearize as linearize_system  # noqa: PLC0415
+    from .modes import stability  # noqa: PLC0415
+    from .responses import string_stability  # noqa: PLC0415
+
     if duration is not None and not 0.0 < duration < float("inf"):
         raise typer.BadParameter("it must be a positive time in s.", param_hint="'--duration'")
     system = load(scenario, preset=preset, settings=settings or (), builds=builds or (), swaps=swaps or (), step=step)
@@ -165,7 +143,7 @@ def linearize(
             at,
             inputs=inputs or (),
             outputs=outputs or (),
-            kind=chosen,
+            kind=kind.value,
             sampled=sampled,
             progress=progress,
         )

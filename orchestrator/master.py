@@ -106,6 +106,7 @@ class Master:
         self._history: deque[list[Any]] = deque(maxlen=self.depth)
         self.feeds = {name: self._plan_inputs(slave, incoming[name], index) for name, slave in slaves.items()}
         self.sequence = [slaves[name] for name in sequence]
+        self._compiled: CompiledLoop | None = None
 
     # ---------------------------------------------------------------- plan
 
@@ -172,6 +173,7 @@ class Master:
         for slave in self.slaves.values():
             self._read_finite(slave)
         self._remember()
+        self._compiled = CompiledLoop(self) if can_run(self) else None
 
     def _set_starts(self, slave: Slave) -> None:
         given = self._starts.get(slave.name, {})
@@ -218,8 +220,8 @@ class Master:
         Raises:
             FmuError: a model failed, or a value is not finite; instance, variable and time are named.
         """
-        if can_run(self):
-            return CompiledLoop(self).run(start_time, step, count, every, observe)
+        if self._compiled is not None:
+            return self._compiled.run(start_time, step, count, every, observe)
         advance = self._gauss_seidel if self.algorithm == "gauss-seidel" else self._jacobi
         for k in range(count):
             advance(start_time + k * step, step)
