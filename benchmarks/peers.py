@@ -1,3 +1,4 @@
+# ruff: noqa: PLC0415 (a peer that is not installed is left out)
 """Other masters on the ring of benchmarks/ring.py, each driven the way it is fastest; all outputs recorded.
 
 A candidate is built (set-up, not timed as stepping), then told to ``run`` more steps; ``values`` are the outputs now.
@@ -150,15 +151,16 @@ class FmpyContainer(_Container):
         time = ModelVariable("time", 0, "Real", causality="independent", variability="continuous")
         variables, mappings = [time], {}
 
-        def add(name: str, causality: str, variability: str, k: int, target: str, start: str | None = None) -> None:
+        def add(name: str, causality: str, k: int, target: str, start: str | None = None) -> None:
+            variability = "continuous" if causality == "output" else "fixed"
             variable = ModelVariable(name, 0, "Real", causality=causality, variability=variability, start=start)
             variables.append(variable)
             mappings[variable] = [(parts[k], inner[target])]
 
         for k, start in enumerate(ring.starts):
-            add(f"out{k}", "output", "continuous", k, "x")
-            add(f"x{k}", "parameter", "fixed", k, "x", repr(start))
-            add(f"u{k}", "parameter", "fixed", k, "u", repr(ring.starts[ring.before(k)]))
+            add(f"out{k}", "output", k, "x")
+            add(f"x{k}", "parameter", k, "x", repr(start))
+            add(f"u{k}", "parameter", k, "u", repr(ring.starts[ring.before(k)]))
         outputs = [v for v in variables if v.causality == "output"]
         outer = ModelDescription(
             fmiVersion="2.0",

@@ -16,6 +16,7 @@ import argparse
 import ctypes
 import gc
 import multiprocessing
+import os
 import resource
 import shutil
 import statistics
@@ -153,6 +154,7 @@ CANDIDATES: dict[str, type[Any]] = {BARE: BareLoop, OURS: Ours, "railcosim, no c
 
 def serve(pipe: Any, name: str, ring: Ring) -> None:
     """Build a candidate, then obey: ("run" or "finish", steps) -> (CPU seconds, values)."""
+    os.dup2(os.open(os.devnull, os.O_WRONLY), 1)  # some peers' libraries chat
     try:
         begin, before = time.process_time(), resident()
         candidate: Candidate = (CANDIDATES | {"disk": OursToDisk})[name](ring)
@@ -261,7 +263,12 @@ def compare(ring: Ring, names: list[str], repetitions: int, budget: float) -> di
 
 
 def table(path: Path, counts: list[int], names: list[str], options: argparse.Namespace) -> None:
-    found = {n: compare(Ring(path, n, options.steps), names, options.repetitions, options.budget) for n in counts}
+    found = {}
+    for n in counts:
+        begin = time.perf_counter()
+        found[n] = compare(Ring(path, n, options.steps), names, options.repetitions, options.budget)
+        costs = ", ".join(f"{name}: {cost:.3g}" for name, cost in found[n].items())
+        note(f"N = {n}: {time.perf_counter() - begin:.0f} s; {costs}")
     print("| master | " + " | ".join(f"N = {n}" for n in counts) + " |")
     print("| --- |" + " --- |" * len(counts))
     for name in names:

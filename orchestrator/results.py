@@ -112,7 +112,8 @@ class Recorder:
         """Append rows of time and values; an array is kept, not copied."""
         if isinstance(rows, np.ndarray):
             self._seal()
-            self._blocks.append(rows)
+            if len(rows):
+                self._blocks.append(rows)
         else:
             self._rows.extend(rows)
         if self._writer is not None and clock.monotonic() - self._flushed > _FLUSH_SECONDS:

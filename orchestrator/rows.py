@@ -3,7 +3,8 @@
 ``results.csv`` is for people and other programs. Its numbers are the shortest that read back to the same bits, and
 finding those takes longer than many a step. While a run goes its rows are therefore appended to ``results.bin``: one
 line of JSON with the ``columns`` and the places of those that hold ``whole`` numbers, then each row as 64-bit
-little-endian floats. That file is removed when ``results.csv`` is complete; where it is still there, the run was killed.
+little-endian floats. That file is removed when ``results.csv`` is complete: where it is still there, the run was
+killed, and `recover` makes the text of it.
 """
 
 from __future__ import annotations

@@ -27,7 +27,7 @@ class Ailc(LearningAto):
     def outputs(self) -> Values:
         errors = self._errors()
         estimate = self._corrected(errors.augmented)
-        return {**self._report(self._law(estimate, errors), errors), "estimate": estimate}
+        return self._report(self._law(estimate, errors), errors, estimate)
 
     def update(self) -> Values:
         return self._record(self._corrected(self._errors().augmented))

@@ -106,8 +106,7 @@ class Cailc(LearningAto):
         beyond = where(size >= self.barrier, VIOLATED, where(size >= self.stretch_begin * self.barrier, STRETCHED, OK))
         reached = logical_or(self.reached, size >= self.barrier)
         return {
-            **self._report(where(braking, stop, self._law(estimate, errors)), errors, reached),
-            "estimate": estimate,
+            **self._report(where(braking, stop, self._law(estimate, errors)), errors, estimate, reached),
             "status": where(self.refused, REFUSED, where(braking, EMERGENCY, beyond)),
         }
 

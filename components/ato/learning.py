@@ -6,7 +6,7 @@ from abc import ABC
 from typing import Any
 
 from ..component import Values
-from ..declarations import Memory, Output, Parameter, Tape
+from ..declarations import Memory, Parameter, Tape
 from .port import AtoController, Errors
 
 
@@ -24,8 +24,6 @@ class LearningAto(AtoController, ABC):
 
     learned = Tape("1", 0.0, shape=(3,), description="estimates of the trip before at this instant")
     recorded_trip = Memory("1", 0, type=int, description="the trip that is being recorded")
-
-    estimate = Output("1", shape=(3,), description="estimates of R1 (N), R2 (N.s/m) and R3 (N.s2/m2)")
 
     def keep(self) -> Any:
         """A trip is learned from if it was a trip of this controller: those before trip 1 are rehearsals."""

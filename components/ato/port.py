@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from abc import ABC
+from collections.abc import Sequence
 from typing import Any, NamedTuple
 
 from ..component import Component, Values
@@ -43,6 +44,9 @@ class AtoController(Component, ABC):
     position_error = Output("m", description="position less reference; 0 while waiting")
     speed_error = Output("m/s", description="speed less reference; 0 while waiting")
     augmented_error = Output("m/s", description="alpha times position error plus speed error; 0 while waiting")
+    estimate = Output(
+        "1", shape=(3,), description="estimates of R1 (N), R2 (N.s/m) and R3 (N.s2/m2); 0 of a controller without"
+    )
     barrier_reached = Output("1", bool, description="whether the augmented error reached the barrier on this trip")
 
     def _waiting(self) -> Any:
@@ -55,12 +59,15 @@ class AtoController(Component, ABC):
         speed = where(waiting, 0.0, self.speed - self.reference_speed)
         return Errors(position, speed, self.alpha * position + speed)
 
-    def _report(self, force: Any, errors: Errors, barrier_reached: Any = False) -> Values:
+    def _report(
+        self, force: Any, errors: Errors, estimate: Sequence[Any] = (0.0, 0.0, 0.0), barrier_reached: Any = False
+    ) -> Values:
         """The port's outputs; no force while waiting."""
         return {
             "force": where(self._waiting(), 0.0, force),
             "position_error": errors.position,
             "speed_error": errors.speed,
             "augmented_error": errors.augmented,
+            "estimate": list(estimate),
             "barrier_reached": barrier_reached,
         }

@@ -1,4 +1,4 @@
-/* Saved states: one flat block that can be copied, compared and moved to another process. */
+/* Saved states and their FMI 2.0 functions: one flat block that can be copied, compared and moved to another process. */
 
 #include <stdlib.h>
 #include <string.h>
@@ -104,5 +104,103 @@ static fmi2Status restore_state(Instance *s, const State *state)
     s->tape.trip = state->tape_trip;
     s->tape.first = state->tape_first;
     s->tape.last = state->tape_last;
+    return fmi2OK;
+}
+
+fmi2Status fmi2GetFMUstate(fmi2Component c, fmi2FMUstate *state)
+{
+    Instance *s = enter(c, ANY_PHASE, "fmi2GetFMUstate");
+    if (s == NULL) {
+        return fmi2Error;
+    }
+    if (state == NULL) {
+        return fail(s, "fmi2GetFMUstate: NULL instead of a place for the state");
+    }
+    /* A state handed in is overwritten, and its memory reused where it fits. */
+    State *block = *state;
+    if (block == NULL || block->head.size != state_size(s)) {
+        free(block);
+        *state = block = malloc(state_size(s));
+        if (block == NULL) {
+            return fail(s, "out of memory for a saved state");
+        }
+    }
+    save_state(s, block);
+    return fmi2OK;
+}
+
+fmi2Status fmi2SetFMUstate(fmi2Component c, fmi2FMUstate state)
+{
+    Instance *s = enter(c, ANY_PHASE, "fmi2SetFMUstate");
+    if (s == NULL) {
+        return fmi2Error;
+    }
+    return state == NULL ? fail(s, "fmi2SetFMUstate: NULL is no state") : restore_state(s, state);
+}
+
+fmi2Status fmi2FreeFMUstate(fmi2Component c, fmi2FMUstate *state)
+{
+    Instance *s = enter(c, ANY_PHASE, "fmi2FreeFMUstate");
+    if (s == NULL) {
+        return fmi2Error;
+    }
+    if (state != NULL) {
+        free(*state);
+        *state = NULL;
+    }
+    return fmi2OK;
+}
+
+fmi2Status fmi2SerializedFMUstateSize(fmi2Component c, fmi2FMUstate state, size_t *size)
+{
+    Instance *s = enter(c, ANY_PHASE, "fmi2SerializedFMUstateSize");
+    if (s == NULL) {
+        return fmi2Error;
+    }
+    if (state == NULL || size == NULL) {
+        return fail(s, "fmi2SerializedFMUstateSize: NULL is no state");
+    }
+    *size = ((const State *)state)->head.size;
+    return fmi2OK;
+}
+
+fmi2Status fmi2SerializeFMUstate(fmi2Component c, fmi2FMUstate state, fmi2Byte bytes[], size_t size)
+{
+    Instance *s = enter(c, ANY_PHASE, "fmi2SerializeFMUstate");
+    if (s == NULL) {
+        return fmi2Error;
+    }
+    if (state == NULL || bytes == NULL) {
+        return fail(s, "fmi2SerializeFMUstate: NULL is no state");
+    }
+    size_t needed = ((const State *)state)->head.size;
+    if (size < needed) {
+        return fail(s, "fmi2SerializeFMUstate: the state has %lu bytes, there is room for %lu", (unsigned long)needed,
+                    (unsigned long)size);
+    }
+    memcpy(bytes, state, needed);
+    return fmi2OK;
+}
+
+fmi2Status fmi2DeSerializeFMUstate(fmi2Component c, const fmi2Byte bytes[], size_t size, fmi2FMUstate *state)
+{
+    Instance *s = enter(c, ANY_PHASE, "fmi2DeSerializeFMUstate");
+    StateHead head;
+    if (s == NULL) {
+        return fmi2Error;
+    }
+    if (bytes == NULL || state == NULL || size < sizeof head) {
+        return fail(s, "fmi2DeSerializeFMUstate: %lu bytes are no saved state", (unsigned long)size);
+    }
+    memcpy(&head, bytes, sizeof head);
+    if (!is_ours(&head, size)) {
+        return fail(s, "fmi2DeSerializeFMUstate: the bytes are no saved state of this model");
+    }
+    State *block = malloc(head.size);
+    if (block == NULL) {
+        return fail(s, "out of memory for a saved state");
+    }
+    memcpy(block, bytes, head.size);
+    *state = block;
     return fmi2OK;
 }

@@ -136,7 +136,8 @@ def scripts(draw, component):
     step = draw(st.sampled_from([0.125, 0.1, 0.3, 0.01, 1.0 / 3.0, 20.0]))
     lengths = [step] * 8
     if component.is_sampled:
-        starts["sample_time"] = 0.0 if not has_tape and draw(st.booleans()) else step / draw(st.integers(1, 4))
+        once_a_step = not has_tape and not component.declarations["sample_time"].minimum and draw(st.booleans())
+        starts["sample_time"] = 0.0 if once_a_step else step / draw(st.integers(1, 4))
         if not has_tape and starts["sample_time"] > 0.0:
             lengths = [starts["sample_time"] * k for k in draw(st.lists(st.integers(1, 3), min_size=6, max_size=6))]
     for noise in component.noises.values():

@@ -21,7 +21,7 @@ from railcosim.fmus.build import build, build_component, resolve
 from railcosim.fmus.toolchain import CompilerError
 
 HERE = Path(__file__).parent
-MIXED = f"{HERE / 'native_samples.py'}:Mixed"
+MIXED, FUNCTIONS = (f"{HERE / 'native_samples.py'}:{name}" for name in ("Mixed", "Functions"))
 TEXTS = {"Types", "Everything"}
 STRICT = ("-std=c11", "-Wall", "-Wextra", "-Wconversion", "-Wshadow", "-pedantic", "-Werror")
 HEADERS = Path(fmpy.__file__).parent / "c-code"
@@ -62,7 +62,7 @@ def test_the_archive_is_whole(tmp_path):
         "documentation/index.html",
         f"binaries/{toolchain.PLATFORMS[toolchain.here()].folder}/PointMassTrain{toolchain.PLATFORMS[toolchain.here()].suffix}",
         *(f"sources/{name}" for name in ("all.c", "model.h", "equations.c", "instance.h", "fmi2.c", "simulation.c")),
-        *(f"sources/{name}" for name in ("state.c", "tape.c", "noise.c", "log.c")),
+        *(f"sources/{name}" for name in ("values.c", "derivatives.c", "state.c", "tape.c", "noise.c", "log.c")),
     } <= files
     assert not any("fmi2Functions" in name for name in files)
 
@@ -322,6 +322,20 @@ def test_fmpy_compiles_the_sources_to_the_same_results(tmp_path, monkeypatch, wh
     theirs = fmpy.simulate_fmu(str(folder), stop_time=5.0, output_interval=0.25)
     for name in ours.dtype.names:
         assert np.array_equal(ours[name], theirs[name]), name
+
+
+@pytest.mark.long
+@pytest.mark.skipif(not toolchain.has_zig(), reason="ziglang is not installed")
+@pytest.mark.parametrize("what", ["ComfortCruise", MIXED, FUNCTIONS], ids=["ComfortCruise", "Mixed", "Functions"])
+def test_the_cross_compiler_gives_the_same_bits(tmp_path, what):
+    """An FMU for several platforms is compiled by ziglang, this machine's library included, against an old glibc."""
+    others = ("aarch64-linux",) if toolchain.here() != "aarch64-linux" else ("linux64",)
+    fmus = [build(what, kind="native"), build(what, kind="native", platforms=(toolchain.here(), *others))]
+    folders = [unzip(path, tmp_path / str(k)) for k, path in enumerate(fmus)]
+    assert len(list(folders[1].glob("binaries/*/*"))) == 2
+    ours, cross = (fmpy.simulate_fmu(str(folder), stop_time=20.0, output_interval=0.25) for folder in folders)
+    for name in ours.dtype.names:
+        assert np.array_equal(ours[name], cross[name]), name
 
 
 @pytest.mark.parametrize("what", ["PointMassTrain", MIXED, "Learner", "Dice", "Counter"])

@@ -6,6 +6,7 @@ from pathlib import Path
 
 import pytest
 from fmpy.fmi2 import FMU2Slave
+from railcosim.orchestrator import fmu as module
 from railcosim.orchestrator.errors import FmuError, ScenarioError
 from railcosim.orchestrator.fmu import FmuSlave, forget_paths
 from railcosim.orchestrator.loading import load_fmu, load_models
@@ -200,6 +201,32 @@ def test_after_a_fatal_status_nothing_is_called_any_more(slave, components, monk
     bad.free()
     good.free()
     assert freed == ["good"]
+
+
+def test_instances_share_a_library_which_is_given_back_with_the_last(slave, components):
+    """FMPy loads and inspects it for each instance: half a second for 256 of them."""
+    before = dict(module._LIBRARIES)
+    reference = components(TYPES)("Types")
+    first, second = (begin(slave(reference, name=name)) for name in ("first", "second"))
+    (path,) = module._LIBRARIES.keys() - before.keys()
+    assert module._LIBRARIES[path].users == 2
+    assert first.functions is second.functions
+    assert first.pointer != second.pointer
+    for one in (first, second):
+        one.channel("Real", ["u"]).set([float(one is second)])
+    assert [one.channel("Real", ["u"]).get() for one in (first, second)] == [[0.0], [1.0]]
+    first.free()
+    first.free()  # nothing more happens
+    second.step(0.0, 0.5)
+    second.free()
+    assert path not in module._LIBRARIES
+
+
+@pytest.mark.parametrize("status", [-1, 6, 42])
+def test_a_status_that_the_standard_does_not_know_is_a_failure(slave, components, status):
+    it = begin(slave(components(TYPES)("Types"), name="it"))
+    with pytest.raises(FmuError, match=rf"^it, t = 0 s, status {status} \(unknown\): fmi2GetReal failed$"):
+        it.check("fmi2GetReal", status)
 
 
 def test_loading_does_not_move_the_working_directory(slave, foreign, xml):

@@ -103,3 +103,10 @@ def test_the_protection_brakes_pd_ilc_and_never_cailc():
     assert not result["protection[3].emergency_brake"].any()
     standing = under_way & (result["timetable.trip_time"] > 60.0) & (result["timetable.trip_number"] > 0)
     assert np.abs(speed[standing]).max() < 0.01
+
+
+@pytest.mark.parametrize("controller", ["Ailc", "PdIlc", "AdaptiveAto", "PidAto"])
+def test_another_controller_takes_the_place_by_one_line(controller):
+    """Every connection of the scenario stays; the trip is driven to its end."""
+    result = run(load("cailc", swaps=[f"ato={controller}"], stop_time=201.0), figures=False)
+    assert abs(result["train.position"][2000] - 3512.0) < 3.0

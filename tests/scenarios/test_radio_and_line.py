@@ -1,10 +1,14 @@
 """Scenarios of our own around the reconstructed law: radio, fallback, slopes, braking wave, sinusoidal leader."""
 
 import itertools
+import runpy
+from pathlib import Path
 
 import numpy as np
 import pytest
 from railcosim.orchestrator import load, run
+
+close = runpy.run_path(str(Path(__file__).with_name("close_following.py")))
 
 
 def metrics(result):
@@ -111,3 +115,22 @@ def test_braking_wave(preset, dies_out):
 def test_sinusoidal_leader(preset, bounded):
     result = run(load("sinusoidal_leader", preset=preset))
     assert (verdicts(result)["no_growth"] == "pass") is bounded
+
+
+# ---------------------------------------------------------------- virtual coupling
+
+
+def margins(seeds, **safety):
+    return [close["braking_margin"](run(close["close_system"](seed, **safety))) for seed in seeds]
+
+
+def test_close_following_keeps_the_braking_distance_with_the_fallback_and_not_without():
+    """Distances of 400 m at 60 m/s, emergency braking in an outage; the safe bound acts at all times (guard)."""
+    assert min(margins(range(8))) > 0.0
+    assert max(margins(range(2), fallback=False)) < 0.0
+
+
+@pytest.mark.long
+def test_close_following_in_many_cases():
+    assert min(margins(range(50))) > 0.0
+    assert max(margins(range(50), fallback=False)) < 0.0

@@ -69,7 +69,7 @@ def test_all_have_the_port(component):
     declared = component.declarations
     assert set(AtoController.declarations) <= set(declared)
     out = component(trip_time=1.0, speed=1.0).outputs()
-    assert {"force", "position_error", "speed_error", "augmented_error", "barrier_reached"} <= out.keys()
+    assert {"force", "position_error", "speed_error", "augmented_error", "estimate", "barrier_reached"} <= out.keys()
 
 
 def test_the_port_is_filled_in_by_outputs_alone():
