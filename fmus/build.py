@@ -7,6 +7,7 @@ import difflib
 import hashlib
 import importlib
 import importlib.util
+import json
 import os
 import sys
 import tempfile
@@ -87,8 +88,26 @@ def build(
     Raises:
         ComponentError: the component or its arguments are unusable, cannot be traced, or do not compile.
     """
-    component = resolve(reference, folder)(**(arguments or {}))
+    component = resolve(reference, folder)(**read_arguments(arguments))
     return build_component(component, kind, platforms)
+
+
+def read_arguments(arguments: Mapping[str, Any] | None) -> dict[str, Any]:
+    """Build arguments with data files read: a text that ends in ``.json`` names one.
+
+    Raises:
+        ComponentError: the file is missing or is not JSON.
+    """
+    given = dict(arguments or {})
+    for name, value in given.items():
+        if isinstance(value, str) and value.endswith(".json"):
+            try:
+                given[name] = json.loads(Path(value).read_text(encoding="utf-8"))
+            except OSError as error:
+                raise ComponentError(f"{name}: {value} cannot be read: {error.strerror or error}") from error
+            except ValueError as error:
+                raise ComponentError(f"{name}: {value} is not JSON: {error}") from error
+    return given
 
 
 def build_component(component: Component, kind: Kind = "python", platforms: Sequence[str] = ()) -> Path:
@@ -129,8 +148,9 @@ def native_problem(component: type[Component]) -> str:
 def plain(reference: str, arguments: Mapping[str, Any] | None = None, *, folder: Path | None = None) -> Plain:
     """A component to run in this process as Python objects, for a debugger."""
     cls = resolve(reference, folder)
-    component = cls(**(arguments or {}))
-    return Plain(cls, dict(arguments or {}), write(component, "python", source_digest(component, "python")))
+    given = read_arguments(arguments)
+    component = cls(**given)
+    return Plain(cls, given, write(component, "python", source_digest(component, "python")))
 
 
 def cache_folder() -> Path:

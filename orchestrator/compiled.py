@@ -25,7 +25,7 @@ if TYPE_CHECKING:
 _SET, _STEP, _GET = 0, 1, 2
 _BLOCK_SECONDS = 0.05
 """Wall time a block is meant to take: short enough for Ctrl-C and a progress bar, long enough to cost nothing."""
-_GROWTH = 64
+_GROWTH = 256
 """How many times longer than the last a block may be: the first is a single step, of which nothing is known."""
 _MOST_VALUES = 4_000_000
 """Numbers a block may record, so that its buffer stays small."""
@@ -116,10 +116,10 @@ class CompiledLoop:
         """
         master = self._master
         values = np.array(master.values, dtype=np.float64)
-        history = np.tile(values, (master.depth, 1))
+        history = np.broadcast_to(values, (master.depth, len(values))).copy()
         newest, done, block = max(0, master.depth - 1), 0, 1
-        width = len(values) + 1
-        while done < count:
+        width, goes_on = len(values) + 1, True
+        while done < count and goes_on:
             block = min(block, count - done, max(1, _MOST_VALUES // width) * every)
             rows = np.empty((_rows_due(done, block, every, count), width))
             begin = clock.perf_counter()
@@ -130,15 +130,14 @@ class CompiledLoop:
             done += taken
             master.steps = done
             master.values[:] = values.tolist()
-            goes_on = observe(done, rows[:written]) if taken else True
+            if taken:
+                goes_on = observe(done, rows[:written])
             if failed >= 0:
                 self._raise(failed, status, start_time + done * step, step)
-            if not goes_on:
-                break
             block = max(1, int(taken * min(_BLOCK_SECONDS / max(seconds, 1e-9), _GROWTH)))
         for slave in master.slaves.values():
             slave.time = start_time + done * step
-        return done == count
+        return goes_on
 
     def _raise(self, failed: int, status: int, time: float, step: float) -> None:
         """Raise what `Master` does; with a status that is no failure, a value is not finite."""

@@ -78,6 +78,9 @@ class RadioLink(Component):
     burst_end = Parameter("1", 0.5, minimum=0.0, maximum=1.0, description="probability of becoming good, per message")
     burst_loss = Parameter("1", 1.0, minimum=0.0, maximum=1.0, description="probability of a loss, channel bad")
 
+    outage_begin = Parameter("s", 0.0, description="begin of one more outage, to vary without building anew")
+    outage_end = Parameter("s", 0.0, description="end of it; not after its begin: none")
+
     luck = Noise(refresh, "uniform", description="whether a message is lost")
     weather = Noise(refresh, "uniform", description="whether the channel changes")
     haste = Noise(refresh, "uniform", description="how much of the jitter a message takes")
@@ -135,8 +138,8 @@ class RadioLink(Component):
         """When the message that is due arrives."""
         lost = self.luck < where(self._turns_bad(), self.burst_loss, self.loss)
         silent = logical_not(self.sending)
-        for begin, end in self.outages:
-            now = self.time + _ROUNDING
+        now = self.time + _ROUNDING
+        for begin, end in [*self.outages, (self.outage_begin, self.outage_end)]:
             silent = logical_or(silent, logical_and(now >= begin, now < end))
         return where(logical_or(lost, silent), _NEVER, self.time + self.delay + self.jitter * self.haste)
 

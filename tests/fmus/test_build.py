@@ -401,3 +401,23 @@ def test_it_runs_where_the_project_is_not_installed(sample):
         slot = component.slots[last.partition("[")[0]]
         own = simulate(component, 1.0, 0.125)[slot.name].reshape(9, -1)[:, slot.scalars.index(last)]
         assert [float.fromhex(x) for x in line.split()] == own.tolist()
+
+
+# ---------------------------------------------------------------- data files
+
+
+def test_a_data_file_is_read_and_belongs_to_the_identity(tmp_path):
+    line = tmp_path / "line.json"
+    line.write_text('[{"position": 0.0, "gradient": 0.005}]', encoding="utf-8")
+    first = build("Line", {"profile": str(line)})
+    line.write_text('[{"position": 0.0, "gradient": 0.006}]', encoding="utf-8")
+    assert build("Line", {"profile": str(line)}) != first
+
+
+@pytest.mark.parametrize(("text", "complaint"), [(None, "cannot be read"), ("[1,", "is not JSON")])
+def test_a_data_file_that_cannot_be_used(tmp_path, text, complaint):
+    path = tmp_path / "line.json"
+    if text is not None:
+        path.write_text(text, encoding="utf-8")
+    with pytest.raises(ComponentError, match=complaint):
+        build("Line", {"profile": str(path)})

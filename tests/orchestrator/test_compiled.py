@@ -387,6 +387,7 @@ def test_an_observer_ends_a_run_between_blocks(workspace, odd):
     assert not master.run(0.0, 0.25, 10_000_000, 1, lambda k, rows: seen.append((k, len(rows))) or len(seen) < 4)
     assert seen[0] == (1, 1)
     assert sum(count for _, count in seen) == seen[-1][0] == master.steps < 10_000_000
+    assert not master.run(0.0, 0.25, 1, 1, lambda *_: False), "not even at the last step"
 
 
 def test_blocks_are_short_in_time(workspace, odd):

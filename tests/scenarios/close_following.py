@@ -35,8 +35,15 @@ def close_system(seed, *, fallback=True, guard=True):
     system.add("target", "Schedule", values=SPEED)
     system.add("stop", "Schedule", {"points": 2}, times=[0.0, float(moment)], values=[SPEED, 0.0])
     begin = float(moment - lead)
-    build = {"messages": 12, "outages": [[begin, begin + max(float(outage), 1e-3)]]}
-    channel = {"refresh": 0.1, "delay": float(delay), "jitter": 0.1, "loss": float(loss)}
+    build = {"messages": 12}
+    channel = {
+        "outage_begin": begin,
+        "outage_end": begin + float(outage),
+        "refresh": 0.1,
+        "delay": float(delay),
+        "jitter": 0.1,
+        "loss": float(loss),
+    }
     channel |= {"burst_begin": 0.02, "burst_end": 0.3}
     for i in range(1, TRAINS):
         for link, sender, receiver, side in (("radio", i, i + 1, "ahead"), ("radio_back", i + 1, i, "behind")):

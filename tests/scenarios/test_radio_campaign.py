@@ -10,7 +10,7 @@ from railcosim.fmus.build import native_problem
 
 SCRIPT = Path(__file__).parents[2] / "benchmarks" / "radio_campaign.py"
 SEED = 1
-TELLING = (NUMBERS)
+TELLING = (14, 15, 27, 28, 42)
 """Runs of the campaign in which the margin goes negative without the fallback."""
 
 pytestmark = [
@@ -42,7 +42,7 @@ def test_the_draws_are_reproducible_and_within_what_is_claimed(script):
     draws = [script.draw(SEED, number) for number in range(500)]
     assert draws[17] == script.draw(SEED, 17)
     assert len(set(draws)) == 500
-    assert set(x.law for x in draws) == set(script.LAWS)
+    assert {x.law for x in draws} == set(script.LAWS)
     assert 1.9 < max(x.outage for x in draws) <= 2.0
     assert 0.19 < max(x.loss for x in draws) <= 0.2
     assert 0.49 < max(x.delay for x in draws) <= 0.5
@@ -75,6 +75,6 @@ def test_the_radio_is_what_was_drawn(script):
 @pytest.mark.long
 def test_fifty_runs(script):
     found = margins(script, range(50))
-    assert sum(margin < 0.0 for margin in found["no fallback"]) >= FIFTY
+    assert sum(margin < 0.0 for margin in found["no fallback"]) == 7
     for variant in ("perfect radio, no fallback", *script.SAFE):
         assert min(found[variant]) > 0.0

@@ -98,6 +98,11 @@ def test_any_link_against_messages_kept_by_hand(values, begin, end):
     assert simulation.get("overrun") is False
 
 
+def test_an_outage_may_be_a_parameter():
+    rows, _ = listen(RadioLink(outage_begin=3.0, outage_end=5.0))
+    assert (rows == listen(RadioLink(outages=[[3.0, 5.0]]))[0]).all()
+
+
 def test_the_same_seed_gives_the_same_losses_and_another_one_others():
     first, second, other = (listen(RadioLink(seed=seed, loss=0.5))[0] for seed in (1, 1, 2))
     assert (first == second).all()
