@@ -44,6 +44,7 @@ from .reproduce import cases
 from .results import Results
 from .run import Run, execute
 from .scenario import load, shipped
+from .topology import describe as describe_topology
 
 app = typer.Typer(
     no_args_is_help=True,
@@ -201,6 +202,8 @@ def check(
         if connection.delay:
             points = f"{connection.delay} communication point{'s' * (connection.delay > 1)}"
             console.say(out, f"delay: {connection.target} receives {connection.source} {points} later")
+    for line in describe_topology({name: model.interface for name, model in checked.models.items()}, checked.wiring):
+        console.say(out, line)
     for note in console.folded(checked.notes):
         console.say(out, f"note: {note}", "yellow")
     console.say(out, "no errors", "green")
