@@ -47,7 +47,7 @@ from railcosim.orchestrator.system import System
 HERE = Path(__file__).parent
 PROBE = 100
 """Steps after which all candidates must agree, and from which the cost of a slow one is estimated."""
-SETUP_SECONDS = 120.0
+SETUP_SECONDS = 300.0
 STOP = 1e6
 
 

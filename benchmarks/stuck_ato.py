@@ -1,4 +1,4 @@
-"""The component of benchmarks/protection_campaign.py."""
+"""The component of benchmarks/protection_trial.py."""
 
 from railcosim.components import Cailc, Parameter
 from railcosim.components.maths import logical_and, where

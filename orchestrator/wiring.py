@@ -166,10 +166,10 @@ def _set_runtime(system: System, instance: Instance, interface: Interface, value
         return
     if "seed" in interface.variables and "seed" not in values:
         values["seed"] = instance_seed(system.seed, instance.name)
-    if "sample_time" in interface.variables and "sample_time" not in values and system.rescaled_from is not None:
-        # A value that was given has been rescaled where the step was changed; this is the FMU's own.
-        if interface.variables["sample_time"].start == system.rescaled_from:
-            values["sample_time"] = system.step
+    # A sample time that was given has been rescaled where the step was changed; this is about the FMU's own.
+    own = interface.variables.get("sample_time")
+    if own is not None and "sample_time" not in values and own.start == system.rescaled_from:
+        values["sample_time"] = system.step
 
 
 def instance_seed(seed: int, name: str) -> int:

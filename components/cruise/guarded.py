@@ -74,11 +74,14 @@ class GuardedCruise(CruiseController, ABC):
         """Speed difference to the leader, where it is heard, m/s."""
         return where(self.has_leader, (1.0 - self.caution_leader) * (self.leader_speed - self.speed), 0.0)
 
-    def _guarded(self, demand: Any) -> Any:
-        """The law's demand, lowered to the safe bound as far as the fallback asks for it."""
-        lost, bound = self._lost_ahead(), self._safe_bound()
+    def _guarded(self, demand: Any, surplus: Any = 0.0) -> Any:
+        """The law's demand, lowered to the safe bound as far as the fallback asks for it.
+
+        ``surplus`` is what the train accelerates beyond the demand, m/s2: the bound is on both together.
+        """
+        lost, bound = self._lost_ahead(), self._safe_bound() - surplus
         # Exactly the demand where there is no caution.
-        rejoining = demand + self.caution_ahead * minimum(self.held_bound - demand, 0.0)
+        rejoining = demand + self.caution_ahead * minimum(self.held_bound - surplus - demand, 0.0)
         careful = where(lost, minimum(demand, bound), rejoining)
         guarded = logical_and(logical_and(self.fallback, self.guard), self.has_ahead)
         return where(guarded, minimum(careful, bound), careful)

@@ -31,7 +31,11 @@ class PairwiseCruise(GuardedCruise, ABC):
     def outputs(self) -> Values:
         bottom = self._bottom()
         limit = self.acceleration_limit
-        demand = self._guarded(where(limit > 0.0, clip(bottom, -limit, limit), bottom))
+        law = where(limit > 0.0, clip(bottom, -limit, limit), bottom)
+        # The fallback's bound is on what the train does. A law that compensates the resistance of another speed than
+        # the train's own gives it the difference on top of its demand; it is exactly zero for the others.
+        surplus = self._davis(self._compensated_speed()) - self._davis(self.speed)
+        demand = self._guarded(law, surplus)
         resistance = self._davis(self._compensated_speed()) + self.line_resistance
         return {
             "demand": demand,
