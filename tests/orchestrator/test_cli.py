@@ -14,7 +14,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 from railcosim.orchestrator import Results, cli, load
-from railcosim.orchestrator.cli import AlgorithmName, KindName, call
+from railcosim.orchestrator.cli import call
+from railcosim.orchestrator.cli_options import AlgorithmName, KindName
 from railcosim.orchestrator.loading import KINDS
 from railcosim.orchestrator.run import execute
 from railcosim.orchestrator.system import ALGORITHMS

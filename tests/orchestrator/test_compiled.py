@@ -25,7 +25,7 @@ from railcosim.orchestrator.results import Results
 from railcosim.orchestrator.run import run
 from railcosim.orchestrator.system import System
 
-ORCHESTRATOR = Path(compiled.__file__).parent
+ORCHESTRATOR = Path(__file__).parents[2] / "orchestrator"
 HERE = Path(__file__).parent
 GCC = shutil.which("gcc")
 pytestmark = [
