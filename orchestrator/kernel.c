@@ -7,7 +7,9 @@
    flushing and interruption.
 
    Every block begins by turning the plan into calls, where all of it is checked, and runs of like calls into groups: what
-   is the same for a whole group stands in registers, and what is left of a call is the instance and a place. */
+   is the same for a whole group stands in registers, and what is left of a call is the instance and a place.
+
+   An extension is best one file, so this one is long: first the loop, then the way from Python's arrays to it. */
 
 #define PY_SSIZE_T_CLEAN
 #define Py_LIMITED_API 0x030B0000
