@@ -6,14 +6,13 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Literal
 
-from ..components.tracing import TracingError
-from ..fmus.build import Plain, build, native_problem, plain, resolve
-from ..fmus.toolchain import CompilerError
+from ..fmus.build import Plain, build, plain
 from .archive import Workspace
 from .errors import FmuFileError, ScenarioError
 from .fmu import FmuSlave, PlainSlave, Slave, library
 from .interface import Interface
 from .reader import read
+from .release import package
 from .system import Instance, System
 
 Kind = Literal["auto", "native", "python", "plain"]
@@ -96,14 +95,9 @@ def _load(instance: Instance, workspace: Workspace, kind: Kind) -> Model:
 
 def _load_best(instance: Instance, workspace: Workspace) -> Model:
     """A native FMU where one can be made here, a Python FMU with a note that says why not elsewhere."""
-    problem = native_problem(resolve(instance.model))
-    if not problem:
-        try:
-            return load_fmu(build(instance.model, instance.build, kind="native"), workspace, "native")
-        except (TracingError, CompilerError) as error:
-            problem = str(error).splitlines()[0]
-    model = load_fmu(build(instance.model, instance.build, kind="python"), workspace, "python")
-    return replace(model, note=f"running Python FMUs, not native ones: {problem}")
+    path, kind, problem = package(instance.model, instance.build, "auto")
+    model = load_fmu(path, workspace, kind)
+    return replace(model, note=f"running Python FMUs, not native ones: {problem}") if problem else model
 
 
 def load_fmu(path: Path, workspace: Workspace, kind: str = "fmu") -> Model:

@@ -60,10 +60,11 @@ def release(
     written: list[Path] = []
     for count, reference in enumerate(references, start=1):
         begin = time.perf_counter()
-        source, made, note = package(reference, arguments, kind, platforms)
+        source, made, problem = package(reference, arguments, kind, platforms)
         target = directory / source.name
         _copy(source, target)
         written.append(target)
+        note = f", not a native one: {problem}" if problem else ""
         what = f"native, {' '.join(chosen)}" if made == "native" else f"a Python FMU{note}"
         cost = f"{time.perf_counter() - begin:.1f} s, {target.stat().st_size / 1000:.0f} kB"
         tell(f"[{count}/{len(references)}] {target.stem}: {what} ({cost})")
@@ -96,7 +97,7 @@ def package(
             if platforms:
                 raise
             problem = str(error).splitlines()[0]
-    return build(reference, arguments, kind="python"), "python", f", not a native one: {problem}"
+    return build(reference, arguments, kind="python"), "python", problem
 
 
 def default_directory() -> Path:

@@ -122,8 +122,8 @@ def test_a_compiler_that_refuses_is_a_reason_unless_platforms_were_asked_for(tmp
 
     monkeypatch.setattr(module, "build", build)
     monkeypatch.setattr(module, "native_problem", lambda component: "")
-    path, kind, note = package("Gust", {}, "auto")
-    assert (kind_of(path), kind, note) == ("python", "python", ", not a native one: cc failed (exit code 1):")
+    path, kind, problem = package("Gust", {}, "auto")
+    assert (kind_of(path), kind, problem) == ("python", "python", "cc failed (exit code 1):")
     with pytest.raises(CompilerError):
         package("Gust", {}, "auto", ["win64"])
 
