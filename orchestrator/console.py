@@ -125,6 +125,13 @@ def _table(title: str, *columns: str, right: Sequence[str] = (), fold: Sequence[
 # -------------------------------------------------------------------- the end of a run
 
 
+def _kinds(outcome: Run) -> str:
+    """What the models are: all native, or how many of which kind."""
+    names = {"native": "native FMU", "python": "Python FMU", "plain": "Python object", "fmu": "given FMU"}
+    kinds = [names[model.kind] for model in outcome.checked.models.values()]
+    return ", ".join(f"{kinds.count(kind)} {kind}{'s' * (kinds.count(kind) > 1)}" for kind in dict.fromkeys(kinds))
+
+
 def show_run(outcome: Run, second: Run | None, quiet: bool) -> None:
     """The end of a run, verdicts and files last; when quiet, only what went wrong, on stderr."""
     system, out = outcome.system, console(stderr=quiet)
@@ -160,6 +167,7 @@ def _show_head(out: Console, outcome: Run) -> None:
     facts = [
         (system.preset or "as it stands") + (", modified" if system.modified else ""),
         f"{len(system.instances)} instances",
+        _kinds(outcome),
         system.algorithm,
         f"step {system.step:g} s",
     ]
