@@ -132,13 +132,11 @@ class Scene:
         return np.abs(values - ours) / np.maximum(1.0, np.abs(ours))
 
 
-@pytest.fixture(scope="session")
-def scene(native):
-    """The comfort scenario (four trains, four controllers, a schedule, a gust; 350 s at 0.1 s) with native FMUs."""
-    system = load("comfort_cruise")
+def make_scene(system, algorithms):
+    """A system for other tools, and our own results by algorithm; its FMUs are native."""
     with Workspace() as workspace:
         checked = check(system, workspace, "native")
-    ours = {name: run(system, algorithm=name, kind="native") for name in ("jacobi", "gauss-seidel")}
+    ours = {name: run(system, algorithm=name, kind="native") for name in algorithms}
     parts = {
         name: Part(
             name,
@@ -154,9 +152,20 @@ def scene(native):
             parts[link.source[0]].interface.variables[link.source[1]],
             parts[link.target[0]],
             parts[link.target[0]].interface.variables[link.target[1]],
-            ours["jacobi"][".".join(link.source)][0],
+            ours[algorithms[0]][".".join(link.source)][0],
         )
         for link in checked.wiring.links
     )
     results = {algorithm: {name: result[name] for name in result.names()} for algorithm, result in ours.items()}
     return Scene(parts, links, checked.order.sequence, system.step, system.stop_time, results)
+
+
+@pytest.fixture(scope="session", name="make_scene")
+def _make_scene():
+    return make_scene
+
+
+@pytest.fixture(scope="session")
+def scene(native):
+    """The comfort scenario (four trains, four controllers, a schedule, a gust; 350 s at 0.1 s) with native FMUs."""
+    return make_scene(load("comfort_cruise"), ("jacobi", "gauss-seidel"))
