@@ -36,6 +36,7 @@ from .cli_options import (
     Stop,
     Swap,
     With,
+    load_system,
 )
 from .errors import FmuError, RailcosimError, ScenarioError
 from .plots import draw
@@ -128,16 +129,7 @@ def run(
     Exit codes: 0 fine; 1 a requirement failed or a published value was missed; 2 the input is wrong; 3 an FMU failed;
     130 interrupted by Ctrl-C (what was computed is on disk).
     """
-    system = load(
-        scenario,
-        preset=preset,
-        settings=settings or (),
-        builds=builds or (),
-        swaps=swaps or (),
-        stop_time=stop,
-        step=step,
-        algorithm=algorithm.value if algorithm else None,
-    )
+    system = load_system(scenario, preset, settings, builds, swaps, stop=stop, step=step, algorithm=algorithm)
     directory = output or Path("results") / "-".join(filter(None, (system.name, preset)))
     with console.progress(system.name, quiet, system.start_time) as progress:
         outcome = execute(system, kind=kind.value, output=directory, figures=not no_figures, progress=progress)
@@ -186,7 +178,7 @@ def check(
     scenario: Scenario, preset: Preset = None, settings: Set = None, builds: With = None, swaps: Swap = None
 ) -> None:
     """Find what is wrong before a run, and show how the run would step."""
-    system = load(scenario, preset=preset, settings=settings or (), builds=builds or (), swaps=swaps or ())
+    system = load_system(scenario, preset, settings, builds, swaps)
     out = console.console()
     with Workspace() as workspace:
         checked = check_system(system, workspace)

@@ -24,11 +24,11 @@ from .cli_options import (
     Stop,
     Swap,
     With,
+    load_system,
 )
 from .compare import compare as compare_systems
 from .compare import variants
 from .compare_report import show_comparison
-from .scenario import load
 
 Scenarios = Annotated[
     list[str], typer.Argument(metavar="SCENARIO...", help="Shipped scenarios (see 'orchestrate list'), or .toml files.")
@@ -136,7 +136,7 @@ def linearize(
 
     if duration is not None and not 0.0 < duration < float("inf"):
         raise typer.BadParameter("it must be a positive time in s.", param_hint="'--duration'")
-    system = load(scenario, preset=preset, settings=settings or (), builds=builds or (), swaps=swaps or (), step=step)
+    system = load_system(scenario, preset, settings, builds, swaps, step=step)
     with console.progress(system.name, quiet, system.start_time) as progress:
         model = linearize_system(
             system,

@@ -27,12 +27,12 @@ from .cli_options import (
     Swap,
     With,
     build_arguments,
+    load_system,
 )
 from .errors import ScenarioError
 from .loading import load_fmu
 from .pack import pack as pack_system
 from .release import default_directory, release
-from .scenario import load
 from .skeleton import write_skeleton
 from .validate import TIMEOUT, show_report
 from .validate import validate as validate_fmu
@@ -129,16 +129,7 @@ def pack(
     ] = None,
 ) -> None:
     """Write one FMU that holds a whole scenario, for another tool to run as a block."""
-    system = load(
-        scenario,
-        preset=preset,
-        settings=settings or (),
-        builds=builds or (),
-        swaps=swaps or (),
-        stop_time=stop,
-        step=step,
-        algorithm=algorithm.value if algorithm else None,
-    )
+    system = load_system(scenario, preset, settings, builds, swaps, stop=stop, step=step, algorithm=algorithm)
     packed = pack_system(system, output, expose=expose or (), platforms=(platforms or "").split(","))
     out = console.console()
     for note in console.folded(packed.notes):

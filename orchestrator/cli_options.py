@@ -9,6 +9,8 @@ from typing import Annotated, Any
 import typer
 
 from .errors import ScenarioError
+from .scenario import load
+from .system import System
 
 OK, FAILED, WRONG_INPUT, FMU_FAILED, INTERRUPTED = 0, 1, 2, 3, 130
 
@@ -74,3 +76,27 @@ def build_arguments(builds: list[str] | None) -> dict[str, Any]:
         except tomllib.TOMLDecodeError:
             arguments[name.strip()] = value
     return arguments
+
+
+def load_system(
+    scenario: str,
+    preset: str | None,
+    settings: list[str] | None,
+    builds: list[str] | None,
+    swaps: list[str] | None,
+    *,
+    stop: float | None = None,
+    step: float | None = None,
+    algorithm: AlgorithmName | None = None,
+) -> System:
+    """The scenario as the options of a command change it."""
+    return load(
+        scenario,
+        preset=preset,
+        settings=settings or (),
+        builds=builds or (),
+        swaps=swaps or (),
+        stop_time=stop,
+        step=step,
+        algorithm=algorithm.value if algorithm else None,
+    )

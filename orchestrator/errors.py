@@ -27,10 +27,6 @@ class WindowError(ExpressionError):
     """A time window that the recorded points do not cover: a value for it would be a guess."""
 
 
-class UnitError(ScenarioError):
-    """Two units that cannot be converted into one another, or a unit nobody defined."""
-
-
 class FmuFileError(RailcosimError, ValueError):
     """An archive that cannot be used as an FMU."""
 
