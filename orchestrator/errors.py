@@ -31,7 +31,15 @@ class FmuFileError(RailcosimError, ValueError):
     """An archive that cannot be used as an FMU."""
 
 
-class FmuError(RailcosimError, RuntimeError):
+class RunError(RailcosimError, RuntimeError):
+    """A run that had begun could not go on; what was computed until then is kept."""
+
+
+class CouplingError(RunError):
+    """The values that instances exchange do not settle: a coupling diverges, or a loop has no solution."""
+
+
+class FmuError(RunError):
     """An FMU failed while it ran.
 
     Attributes: `instance` (its name in the scenario), `time` [s] or None when before the start, `status`
@@ -50,6 +58,10 @@ class FmuError(RailcosimError, RuntimeError):
         where += [f"status {self.status}"] if self.status else []
         head = f"{', '.join(where)}: " if where else ""
         return "\n".join([f"{head}{super().__str__()}", *(f"    {line}" for line in self.log)])
+
+
+class StoppedError(FmuError):
+    """An FMU asks for the end of the simulation: no failure, but the end."""
 
 
 def did_you_mean(word: str, valid: Iterable[str], *, cutoff: float = 0.6) -> str:

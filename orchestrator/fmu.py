@@ -1,34 +1,35 @@
-"""One model instance behind a small face: set, step, get. An FMU (FMPy underneath), or a component in this process."""
+"""An FMI 2.0 co-simulation FMU behind the face of an instance (FMPy underneath)."""
 
 from __future__ import annotations
 
 import copy
 import ctypes
-import functools
-import inspect
+import math
 import os
+import struct
 import sys
-import traceback
 from collections import deque
 from collections.abc import Callable, Sequence
 from pathlib import Path
-from typing import Any, ParamSpec, Protocol, TypeVar
+from typing import Any
 
 import fmpy
 from fmpy import fmi2
 from fmpy.fmi1 import printLogMessage
 from fmpy.logging import addLoggerProxy
 
-from ..components.simulate import Simulation
-from .errors import FmuError, FmuFileError
+from .errors import FmuError, FmuFileError, StoppedError
 from .interface import Interface, Type
+from .slave import STATUS, Channel
 
-P = ParamSpec("P")
-R = TypeVar("R")
-
-STATUS = ("ok", "warning", "discard", "error", "fatal", "pending")
-_WARNING, _FATAL = 1, 4
+_OK, _WARNING, _DISCARD, _FATAL = 0, 1, 2, 4
+_LAST_SUCCESSFUL_TIME, _TERMINATED = 2, 3
+"""What fmi2GetRealStatus and fmi2GetBooleanStatus are asked for."""
+_SHORTEST_PART = 1e-6
+"""The smallest part of a communication step in which an FMU that discards it is asked to take it."""
+_MOST_PARTS = 10_000
 _LOG_LINES = 50
+_TIME = struct.Struct("=d")
 _C_TYPES: dict[str, Any] = {
     "Real": ctypes.c_double,
     "Integer": ctypes.c_int,
@@ -37,45 +38,6 @@ _C_TYPES: dict[str, Any] = {
     "String": ctypes.c_char_p,
 }
 _SUFFIX = {"Enumeration": "Integer"}
-
-
-class Channel(Protocol):
-    """Some variables of one type of one instance, prepared for being set or read together."""
-
-    def set(self, values: Sequence[Any]) -> None:
-        """Set all of them."""
-
-    def get(self) -> list[Any]:
-        """Read all of them."""
-
-
-class Slave(Protocol):
-    """One instance. Every method raises `FmuError` with instance, time, status and log when the model fails."""
-
-    name: str
-    interface: Interface
-    time: float
-
-    def setup(self, start_time: float, stop_time: float) -> None:
-        """Announce the experiment and enter nothing yet."""
-
-    def enter_initialization(self) -> None:
-        """Enter initialization mode."""
-
-    def exit_initialization(self) -> None:
-        """Leave initialization mode: the first step may follow."""
-
-    def channel(self, kind: Type, names: Sequence[str]) -> Channel:
-        """Prepare variables of one type for being set or read together."""
-
-    def step(self, time: float, length: float) -> None:
-        """Advance from ``time`` by ``length``, both in s."""
-
-    def terminate(self) -> None:
-        """End the run."""
-
-    def free(self) -> None:
-        """Give everything back; nothing may follow. Never raises."""
 
 
 _LOGS: dict[int, deque[str]] = {}
@@ -102,9 +64,10 @@ _SIGNATURES: dict[str, list[Any]] = {
         for verb in ("Set", "Get")
         for suffix in ("Real", "Integer", "Boolean", "String")
     },
+    **{f"fmi2Get{suffix}Status": [ctypes.c_void_p, ctypes.c_int, ctypes.c_void_p] for suffix in ("Real", "Boolean")},
 }
-"""What is called at every step. FMPy's own methods check and log in Python at each call: here the library's functions
-are called directly."""
+"""What is called at steps. FMPy's own methods check and log in Python at each call: here the library's functions are
+called directly."""
 
 
 class _Library:
@@ -165,6 +128,8 @@ def _callbacks(environment: int, log: deque[str]) -> Any:
 class FmuSlave:
     """An FMU loaded into this process.
 
+    ``STATE_HEAD`` is how many bytes of ours stand before the FMU's own in a serialized state.
+
     Args:
         name: the instance's name in the system.
         interface: its interface.
@@ -173,6 +138,8 @@ class FmuSlave:
     Raises:
         FmuError: it cannot be loaded or instantiated.
     """
+
+    STATE_HEAD = _TIME.size
 
     def __init__(self, name: str, interface: Interface, folder: Path) -> None:
         self.name = name
@@ -202,17 +169,16 @@ class FmuSlave:
         if 0 <= status <= _WARNING:
             return
         self._dead = status == _FATAL
-        what = "discarded the step" if (call, status) == ("fmi2DoStep", 2) else f"{call} failed"
+        what = f"{call} failed"
+        if (call, status) == ("fmi2DoStep", _DISCARD):
+            what = "discarded the step"
         if status == len(STATUS) - 1:
             what = f"{call} is pending: asynchronous FMUs are not supported"
         label = STATUS[status] if 0 <= status < len(STATUS) else f"{status} (unknown)"
         raise FmuError(what, instance=self.name, time=self.time, status=label, log=list(self.log))
 
     def _call(self, name: str, *arguments: Any) -> None:
-        try:
-            getattr(self._fmu, name)(self.pointer, *arguments)
-        except Exception as error:
-            self.check(name, getattr(error, "status", _FATAL))
+        self._guarded(name, getattr(self._fmu, name), self.pointer, *arguments)
 
     def setup(self, start_time: float, stop_time: float) -> None:
         """Announce the experiment."""
@@ -231,13 +197,103 @@ class FmuSlave:
         """Prepare variables of one type for being set or read together."""
         return FmuChannel(self, kind, [self.interface.variables[name].reference for name in names])
 
-    def step(self, time: float, length: float) -> None:
-        """Advance from ``time`` by ``length``, both in s."""
+    def step(self, time: float, length: float, *, final: bool = True) -> None:
+        """Advance from ``time`` by ``length``, both in s; not ``final`` where an older state may be restored."""
         self.time = time
-        status = self._do_step(self.pointer, time, length, 1)
+        status = self._do_step(self.pointer, time, length, final)
         if status:
-            self.check("fmi2DoStep", status)
+            self.resume(time, length, status, final)
         self.time = time + length
+
+    def resume(self, time: float, length: float, status: int, final: bool) -> None:
+        """Go on after a step returned something else than ok: an FMU that discarded it may take it in parts.
+
+        The standard (FMI 2.0, 4.2.2) lets an FMU stop early, at its last successful time, or refuse a step that is too
+        long for it. The rest, or half of it, is then tried with the inputs held.
+
+        Raises:
+            StoppedError: it asks for the end of the simulation.
+            FmuError: it failed, or does not get on.
+        """
+        end, part = time + length, length
+        for _ in range(_MOST_PARTS):
+            if status in (_OK, _WARNING):
+                time, part = time + part, end - time - part
+            elif status == _DISCARD and (reached := self._last_successful_time()) is not None:
+                time, part = (reached, end - reached) if reached > time else (time, 0.5 * part)
+            else:
+                break
+            self.time = time
+            if status == _DISCARD and self._is_terminated():
+                raise StoppedError("asks for the end of the simulation", instance=self.name, time=time)
+            if time >= end - _SHORTEST_PART * length:
+                return
+            if part < _SHORTEST_PART * length or not self.interface.variable_step:
+                break
+            status = self._do_step(self.pointer, time, part, final)
+        self.check("fmi2DoStep", _DISCARD if status in (_OK, _WARNING) else status)
+
+    def _last_successful_time(self) -> float | None:
+        found = ctypes.c_double(math.nan)
+        status = self.functions["fmi2GetRealStatus"](self.pointer, _LAST_SUCCESSFUL_TIME, ctypes.byref(found))
+        return found.value if status in (_OK, _WARNING) and math.isfinite(found.value) else None
+
+    def _is_terminated(self) -> bool:
+        found = ctypes.c_int(0)
+        status = self.functions["fmi2GetBooleanStatus"](self.pointer, _TERMINATED, ctypes.byref(found))
+        return status in (_OK, _WARNING) and bool(found.value)
+
+    def save(self) -> Any:
+        """The present state: a handle of the FMU's, and the time."""
+        return self.time, self._guarded("fmi2GetFMUstate", self._fmu.getFMUstate)
+
+    def restore(self, state: Any) -> None:
+        """Come back to a saved state; it stays saved."""
+        self._guarded("fmi2SetFMUstate", self._fmu.setFMUstate, state[1])
+        self.time = state[0]
+
+    def forget(self, state: Any) -> None:
+        """Give a saved state back."""
+        if not self._dead and self._library is not None:
+            self._guarded("fmi2FreeFMUstate", self._fmu.freeFMUstate, state[1])
+
+    def serialize(self, state: Any) -> bytes:
+        """A saved state as bytes: the time, and what the FMU makes of its own."""
+        content = self._guarded("fmi2SerializeFMUstate", self._fmu.serializeFMUstate, state[1])
+        return _TIME.pack(state[0]) + bytes(content)
+
+    def deserialize(self, content: bytes) -> Any:
+        """A saved state, out of its bytes."""
+        (time,) = _TIME.unpack_from(content)
+        own = content[_TIME.size :]
+        return time, self._guarded("fmi2DeSerializeFMUstate", self._fmu.deSerializeFMUstate, own)
+
+    def directional_derivatives(
+        self, unknowns: Sequence[str], knowns: Sequence[str], seed: Sequence[float]
+    ) -> list[float]:
+        """How the unknowns change when the knowns change by ``seed``; all are Real variables."""
+        rows, columns = ([self.interface.variables[name].reference for name in names] for names in (unknowns, knowns))
+        call = self._fmu.getDirectionalDerivative
+        found: list[float] = self._guarded("fmi2GetDirectionalDerivative", call, rows, columns, list(seed))
+        return found
+
+    def interpolate(self, names: Sequence[str], orders: Sequence[int], values: Sequence[float]) -> None:
+        """Time derivatives of inputs over the coming step: one name, order (from 1) and value each."""
+        count = len(names)
+        references = (ctypes.c_uint * count)(*(self.interface.variables[name].reference for name in names))
+        call = self._fmu.fmi2SetRealInputDerivatives
+        given = (ctypes.c_int * count)(*orders), (ctypes.c_double * count)(*values)
+        self._guarded("fmi2SetRealInputDerivatives", call, self.pointer, references, count, *given)
+
+    def _guarded(self, name: str, call: Callable[..., Any], *arguments: Any) -> Any:
+        """The result of a call of FMPy's, whose failures become ours."""
+        try:
+            return call(*arguments)
+        except Exception as error:
+            status = getattr(error, "status", None)
+            if status is not None:
+                self.check(name, status)
+            raise FmuError(str(error), instance=self.name, time=self.time, log=list(self.log)) from error
 
     def addresses(self, call: str) -> tuple[int, int]:
         """Where a function and the instance stand in memory, for the kernel."""
@@ -322,117 +378,6 @@ def library(folder: Path, interface: Interface, name: str) -> Path:
         return others[0]
     found = sorted(p.name for p in binaries.iterdir() if any(p.iterdir())) if binaries.is_dir() else []
     raise FmuFileError(f"{name} has no binary for {fmpy.platform}; it brings {', '.join(found) or 'none at all'}")
-
-
-_RUNTIME = (Path(__file__).parent, Path(inspect.getfile(Simulation)).parent)
-
-
-def _telling(method: Callable[P, R]) -> Callable[P, R]:
-    """Turn any exception of a component into an `FmuError` with instance, time, file and line; it stays the cause."""
-
-    @functools.wraps(method)
-    def wrapped(*args: P.args, **kwargs: P.kwargs) -> R:
-        try:
-            return method(*args, **kwargs)
-        except Exception as error:
-            plain: Any = args[0]
-            frames = traceback.extract_tb(error.__traceback__)
-            authors = [f for f in frames if Path(f.filename).parent not in _RUNTIME]
-            frame = (authors or frames)[-1]
-            place = f"{Path(frame.filename).name}:{frame.lineno}, in {frame.name}"
-            message = f"{type(error).__name__}: {error} [{place}]"
-            raise FmuError(message, instance=plain.name, time=plain.time, status="error") from error
-
-    return wrapped
-
-
-class PlainSlave:
-    """A component as Python objects in this process: easy to debug, the same numbers."""
-
-    def __init__(self, name: str, interface: Interface, simulation: Simulation) -> None:
-        self.name = name
-        self.interface = interface
-        self.time = 0.0
-        self.simulation = simulation
-
-    def setup(self, start_time: float, stop_time: float) -> None:
-        """Announce the experiment; a component does not care when it ends."""
-        self.time = start_time
-
-    @_telling
-    def enter_initialization(self) -> None:
-        """Enter initialization mode."""
-        self.simulation.initialize(self.time)
-
-    @_telling
-    def exit_initialization(self) -> None:
-        """Leave initialization mode."""
-        self.simulation.start()
-
-    def channel(self, kind: Type, names: Sequence[str]) -> Channel:
-        """Prepare variables for being set or read together."""
-        return _PlainChannel(self, names)
-
-    @_telling
-    def step(self, time: float, length: float) -> None:
-        """Advance from ``time`` by ``length``, both in s."""
-        self.time = time
-        if self.simulation.time != time:
-            self.simulation.time = time
-        self.simulation.step(length)
-        self.time = time + length
-
-    @_telling
-    def terminate(self) -> None:
-        """End the run."""
-        self.simulation.terminate()
-
-    def free(self) -> None:
-        """Nothing to give back."""
-
-
-class _PlainChannel:
-    def __init__(self, slave: PlainSlave, names: Sequence[str]) -> None:
-        self._slave = slave
-        self._places = [_place(slave.simulation, name) for name in names]
-
-    @property
-    def name(self) -> str:
-        return self._slave.name
-
-    @property
-    def time(self) -> float:
-        return self._slave.time
-
-    @_telling
-    def set(self, values: Sequence[Any]) -> None:
-        simulation = self._slave.simulation
-        arrays: dict[str, Any] = {}
-        for (name, element, kind), value in zip(self._places, values, strict=True):
-            if element is None:
-                simulation.set(name, kind(value))
-            else:
-                if name not in arrays:
-                    arrays[name] = simulation.get(name).copy()
-                arrays[name].flat[element] = kind(value)
-        for name, array in arrays.items():
-            simulation.set(name, array)
-
-    @_telling
-    def get(self) -> list[Any]:
-        found = [(self._slave.simulation.get(name), element, kind) for name, element, kind in self._places]
-        # A boolean is 0 or 1 here, as it comes from an FMU.
-        return [
-            (int if kind is bool else kind)(value if element is None else value.flat[element])
-            for value, element, kind in found
-        ]
-
-
-def _place(simulation: Simulation, scalar: str) -> tuple[str, int | None, Any]:
-    for slot in simulation.component.slots.values():
-        if scalar in slot.scalars:
-            return slot.name, slot.scalars.index(scalar) if slot.shape else None, slot.type
-    raise KeyError(scalar)
 
 
 def forget_paths(folder: Path) -> None:

@@ -56,6 +56,7 @@ class Interface:
         arrays: names of scalars by the bare array name (``"force"`` -> ``"force[1]"``, ...).
         vendor: our own annotation: component, arguments, digest, optional inputs, recommended step, note; empty for
             an FMU of another maker.
+        version: of the FMI standard.
         warnings: what is wrong with the file though it can be used.
     """
 
@@ -69,7 +70,11 @@ class Interface:
     generator: str = ""
     default_step: float | None = None
     default_stop: float | None = None
+    version: str = "2.0"
     can_save_state: bool = False
+    can_serialize_state: bool = False
+    directional_derivatives: bool = False
+    interpolates_inputs: bool = False
     variable_step: bool = True
     single_instance: bool = False
     needs_tool: bool = False

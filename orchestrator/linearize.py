@@ -20,12 +20,13 @@ import numpy as np
 from .archive import Workspace
 from .check import Checked, check
 from .errors import FmuError, ScenarioError, did_you_mean
-from .fmu import Slave, forget_paths
+from .fmu import forget_paths
 from .loading import Kind
 from .local_model import Array, Continuous, Stepped, make_block
 from .master import Master
 from .one_step import Composition
 from .run import Progress
+from .slave import Slave
 from .system import System
 
 Signal = tuple[str, str]

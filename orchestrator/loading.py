@@ -9,10 +9,12 @@ from typing import Literal
 from ..fmus.build import Plain, build, plain
 from .archive import Workspace
 from .errors import FmuFileError, ScenarioError
-from .fmu import FmuSlave, PlainSlave, Slave, library
+from .fmu import FmuSlave, library
 from .interface import Interface
+from .plain import PlainSlave
 from .reader import read
 from .release import package
+from .slave import Slave
 from .system import Instance, System
 
 Kind = Literal["auto", "native", "python", "plain"]

@@ -8,7 +8,6 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
-from functools import partial
 from typing import Any, Literal
 
 import numpy as np
@@ -17,9 +16,10 @@ from numpy.typing import NDArray
 from scipy.linalg import expm
 
 from .errors import ScenarioError
-from .fmu import FmuSlave, Slave
+from .fmu import FmuSlave
 from .loading import Model
-from .snapshot import guarded, state_names, take
+from .slave import Slave
+from .snapshot import state_names, take
 
 Array = NDArray[np.float64]
 Way = Literal["derivatives", "differences", "source"]
@@ -222,12 +222,8 @@ def _derivatives(model: Model) -> tuple[dict[str, str], bool]:
 
 def _directional(slave: Slave, unknowns: Sequence[str], knowns: Sequence[str]) -> Array:
     """Partial derivatives of ``unknowns`` with respect to ``knowns``, one call a column."""
-    assert isinstance(slave, FmuSlave)
-    fmu, variables = slave._fmu, slave.interface.variables
-    rows = [variables[name].reference for name in unknowns]
-    columns = [variables[name].reference for name in knowns]
-    found = [guarded(slave, partial(fmu.getDirectionalDerivative, rows, [column], [1.0])) for column in columns]
-    return np.array(found).reshape(len(columns), len(rows)).T
+    found = [slave.directional_derivatives(unknowns, [known], [1.0]) for known in knowns]
+    return np.array(found).reshape(len(knowns), len(unknowns)).T
 
 
 def _input(slave: Slave, name: str) -> float:

@@ -17,8 +17,8 @@ from numpy.typing import NDArray
 
 from .compiled import CompiledLoop, can_run
 from .errors import FmuError, ScenarioError
-from .fmu import Channel, Slave
 from .interface import Type
+from .slave import Channel, Slave
 from .system import Algorithm
 from .wiring import Link
 

@@ -18,7 +18,7 @@ from . import record as record_file
 from .archive import Workspace
 from .check import Checked, check
 from .errors import FmuError, RailcosimError
-from .fmu import Slave, forget_paths
+from .fmu import forget_paths
 from .loading import Kind
 from .master import Master, Observer, Rows
 from .metrics import Metric, evaluate_metrics
@@ -26,6 +26,7 @@ from .plots import draw
 from .published import PublishedRow, judge
 from .requirements import Verdict, judge_requirements
 from .results import Recorder, Results
+from .slave import Slave
 from .system import Algorithm, Instance, System
 
 Status = Literal["completed", "interrupted", "failed"]

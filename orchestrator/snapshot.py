@@ -14,9 +14,11 @@ from typing import Any, Protocol
 
 import numpy as np
 
-from .errors import FmuError, RailcosimError
-from .fmu import FmuSlave, PlainSlave, Slave
+from .errors import FmuError
+from .fmu import FmuSlave
 from .interface import Interface
+from .plain import PlainSlave
+from .slave import Slave
 
 _NUMBER = struct.Struct("=d")
 
@@ -69,28 +71,18 @@ def state_names(slave: Slave) -> list[str]:
     return [name for name in kept if name.partition("[")[0] in saved["values"]]
 
 
-def _read_json(slave: Any) -> dict[str, Any]:
-    def read() -> dict[str, Any]:
-        state = slave._fmu.getFMUstate()
-        try:
-            content: dict[str, Any] = json.loads(slave._fmu.serializeFMUstate(state).rstrip(b"\0"))
-            return content
-        finally:
-            slave._fmu.freeFMUstate(state)
-
-    found: dict[str, Any] = guarded(slave, read)
-    return found
-
-
-def guarded(slave: Slave, call: Callable[[], Any]) -> Any:
-    """The result of a call of FMPy's, whose failures become ours."""
+def _read_json(slave: Slave) -> dict[str, Any]:
+    state = slave.save()
     try:
-        return call()
-    except RailcosimError:
-        raise
-    except Exception as error:
-        log = list(getattr(slave, "log", ()))
-        raise FmuError(str(error), instance=slave.name, time=slave.time, log=log) from error
+        return _content(slave.serialize(state))
+    finally:
+        slave.forget(state)
+
+
+def _content(serialized: bytes) -> dict[str, Any]:
+    """What stands in a Python FMU's saved state."""
+    content: dict[str, Any] = json.loads(serialized[FmuSlave.STATE_HEAD :].rstrip(b"\0"))
+    return content
 
 
 # -------------------------------------------------------------------- components as Python objects, and Python FMUs
@@ -138,48 +130,40 @@ class PlainSnapshot:
 
 
 class _FmuSnapshot:
-    """What snapshots of FMUs share: the handle that the FMU gives."""
+    """What snapshots of FMUs share: the state that the FMU saves."""
 
-    def __init__(self, slave: FmuSlave) -> None:
+    def __init__(self, slave: FmuSlave, states: Sequence[str]) -> None:
         self._slave = slave
-        self._time = slave.time
-        self._fmu = slave._fmu
-        self._handle = guarded(slave, self._fmu.getFMUstate)
+        self._state = slave.save()
 
-    def _give_back(self, handle: Any) -> None:
-        guarded(self._slave, lambda: self._fmu.setFMUstate(handle))
-        self._slave.time = self._time
-
-    def _give_back_bytes(self, content: bytes) -> None:
-        handle = guarded(self._slave, lambda: self._fmu.deSerializeFMUstate(content))
+    def _restore_bytes(self, content: bytes) -> None:
+        state = self._slave.deserialize(content)
         try:
-            self._give_back(handle)
+            self._slave.restore(state)
         finally:
-            guarded(self._slave, lambda: self._fmu.freeFMUstate(handle))
-
-    def _serialized(self) -> bytes:
-        content: bytes = guarded(self._slave, lambda: self._fmu.serializeFMUstate(self._handle))
-        return content
+            self._slave.forget(state)
 
     def free(self) -> None:
         """Give the saved state back."""
-        guarded(self._slave, lambda: self._fmu.freeFMUstate(self._handle))
+        self._slave.forget(self._state)
 
 
 class PythonSnapshot(_FmuSnapshot):
     """Of a Python FMU of ours: JSON."""
 
     def __init__(self, slave: FmuSlave, states: Sequence[str]) -> None:
-        super().__init__(slave)
-        self._saved = json.loads(self._serialized().rstrip(b"\0"))
+        super().__init__(slave, states)
+        self._serialized = slave.serialize(self._state)
+        self._saved = _content(self._serialized)
         self.values = _scalars(self._saved, slave.interface, states)
 
     def restore(self, changes: Mapping[str, float]) -> None:
         """Bring the instance back to it, with other values for some states."""
         if changes:
-            self._give_back_bytes(json.dumps(_changed(self._saved, self._slave.interface, changes)).encode())
+            content = json.dumps(_changed(self._saved, self._slave.interface, changes)).encode()
+            self._restore_bytes(self._serialized[: FmuSlave.STATE_HEAD] + content)
         else:
-            self._give_back(self._handle)
+            self._slave.restore(self._state)
 
 
 class NativeSnapshot(_FmuSnapshot):
@@ -187,8 +171,8 @@ class NativeSnapshot(_FmuSnapshot):
 
     def __init__(self, slave: FmuSlave, states: Sequence[str]) -> None:
         known = _numbers(slave)  # read first: it brings the outputs in the block up to date
-        super().__init__(slave)
-        self._block = self._serialized()
+        super().__init__(slave, states)
+        self._block = slave.serialize(self._state)
         self._place = _place_of_values(self._block, known)
         if self._place is None and states:
             raise FmuError("the values in its saved state are not found", instance=slave.name, time=slave.time)
@@ -199,16 +183,16 @@ class NativeSnapshot(_FmuSnapshot):
     def restore(self, changes: Mapping[str, float]) -> None:
         """Bring the instance back to it, with other values for some states."""
         if not changes:
-            self._give_back(self._handle)
+            self._slave.restore(self._state)
             return
         block = bytearray(self._block)
         for name, value in changes.items():
             _NUMBER.pack_into(block, (self._place or 0) + 8 * self._references[name], value)
-        self._give_back_bytes(bytes(block))
+        self._restore_bytes(bytes(block))
         if not self._trusted:
             found = self._slave.channel("Real", list(changes)).get()
             if found != list(changes.values()):
-                raise FmuError("its saved state does not take values", instance=self._slave.name, time=self._time)
+                raise FmuError("its saved state does not take values", instance=self._slave.name, time=self._slave.time)
             self._trusted = True
 
 
@@ -236,12 +220,12 @@ class ForeignSnapshot(_FmuSnapshot):
     """Of another maker's FMU: a handle; states are set like inputs, where the FMU lets us."""
 
     def __init__(self, slave: FmuSlave, states: Sequence[str]) -> None:
-        super().__init__(slave)
+        super().__init__(slave, states)
         self._channel = slave.channel("Real", states)
         self.values = dict(zip(states, self._channel.get(), strict=True))
 
     def restore(self, changes: Mapping[str, float]) -> None:
         """Bring the instance back to it, with other values for some states."""
-        self._give_back(self._handle)
+        self._slave.restore(self._state)
         if changes:
             self._channel.set(list({**self.values, **changes}.values()))

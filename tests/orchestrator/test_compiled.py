@@ -19,10 +19,10 @@ from railcosim.orchestrator import compiled, load
 from railcosim.orchestrator.check import check
 from railcosim.orchestrator.compiled import CompiledLoop
 from railcosim.orchestrator.errors import FmuError
-from railcosim.orchestrator.fmu import STATUS
 from railcosim.orchestrator.master import Master
 from railcosim.orchestrator.results import Results
 from railcosim.orchestrator.run import run
+from railcosim.orchestrator.slave import STATUS
 from railcosim.orchestrator.system import System
 
 ORCHESTRATOR = Path(__file__).parents[2] / "orchestrator"

@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 from fmpy.fmi2 import FMU2Slave
 from railcosim.orchestrator import fmu as module
-from railcosim.orchestrator.errors import FmuError, ScenarioError
+from railcosim.orchestrator.errors import FmuError, ScenarioError, StoppedError
 from railcosim.orchestrator.fmu import FmuSlave, forget_paths
 from railcosim.orchestrator.loading import load_fmu, load_models
 from railcosim.orchestrator.system import System
@@ -179,13 +179,13 @@ def test_what_an_fmu_says_is_not_printed(slave, components, capfd):
     assert capfd.readouterr().out == ""
 
 
-def test_a_discarded_step(slave, foreign, xml):
+def test_a_python_fmu_whose_step_says_no_ends_the_simulation(slave, foreign, xml):
     it = begin(
         slave(foreign([xml["variable"]("y", "output")], "    def step(self, t, h, v):\n        return t < 2.0\n"))
     )
     it.step(0.0, 1.0)
     it.step(1.0, 1.0)
-    with pytest.raises(FmuError, match="it, t = 2 s, status discard: discarded the step"):
+    with pytest.raises(StoppedError, match="it, t = 2 s: asks for the end of the simulation"):
         it.step(2.0, 1.0)
 
 

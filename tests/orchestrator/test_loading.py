@@ -5,8 +5,9 @@ from pathlib import Path
 import pytest
 from railcosim.fmus.build import build
 from railcosim.orchestrator.errors import ScenarioError
-from railcosim.orchestrator.fmu import FmuSlave, PlainSlave
+from railcosim.orchestrator.fmu import FmuSlave
 from railcosim.orchestrator.loading import load_fmu, load_models
+from railcosim.orchestrator.plain import PlainSlave
 from railcosim.orchestrator.system import System
 
 
