@@ -5,8 +5,13 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 from typing import Any, Literal
 
-Algorithm = Literal["gauss-seidel", "jacobi"]
-ALGORITHMS: tuple[Algorithm, ...] = ("gauss-seidel", "jacobi")
+Algorithm = Literal["gauss-seidel", "jacobi", "iterative", "adaptive"]
+ALGORITHMS: tuple[Algorithm, ...] = ("gauss-seidel", "jacobi", "iterative", "adaptive")
+Loops = Literal["delay", "solve"]
+LOOPS: tuple[Loops, ...] = ("delay", "solve")
+Acceleration = Literal["none", "aitken", "anderson"]
+ACCELERATIONS: tuple[Acceleration, ...] = ("none", "aitken", "anderson")
+ACTIONS = ("set", "override", "freeze", "bias", "ramp")
 
 
 @dataclass
@@ -21,6 +26,10 @@ class Instance:
             Text is an expression of ``i`` and ``count`` unless the variable is a string.
         index: 1-based place among its siblings; None where there is no count.
         count: how many siblings, itself included.
+        step: communication step of its own in s, a whole multiple of the system's; None for the system's.
+        isolate: whether it runs in a process of its own.
+        step_timeout: wall time in s after which a call of an isolated instance counts as hanging.
+        memory_limit: what an isolated instance may use, in MiB.
         swapped: whether another model stands here than the scenario wrote; start values it lacks are then dropped.
         origin: where it was written, for messages.
     """
@@ -31,6 +40,10 @@ class Instance:
     start: dict[str, Any] = field(default_factory=dict)
     index: int | None = None
     count: int = 1
+    step: float | None = None
+    isolate: bool = False
+    step_timeout: float | None = None
+    memory_limit: float | None = None
     swapped: bool = False
     origin: str = field(default="", compare=False)
 
@@ -55,6 +68,31 @@ class Connection:
 
 
 @dataclass
+class Event:
+    """Something that happens to a signal at a time: a new value, or a fault.
+
+    Attributes:
+        signal: ``"sensor.speed"`` (an output: changed for all who receive it, and recorded so) or
+            ``"cruise[2].ahead_speed"`` (an input: changed for this one alone). ``"set"`` takes an unconnected input or
+            a tunable parameter.
+        action: ``"set"`` (a new value from now on), ``"override"`` (another value while it lasts), ``"freeze"`` (the
+            value of the beginning), ``"bias"`` (an added value) or ``"ramp"`` (an added value that grows).
+        at: when it begins, s. duration: how long it lasts, s; None for ever. every: period of repetition, s.
+        value: of set, override and bias, in the signal's unit. rate: of a ramp, in the signal's unit per second.
+        origin: where it was written, for messages.
+    """
+
+    signal: str
+    action: str
+    at: float
+    value: Any = None
+    rate: float | None = None
+    duration: float | None = None
+    every: float | None = None
+    origin: str = field(default="", compare=False)
+
+
+@dataclass
 class System:
     """What is simulated and how.
 
@@ -63,6 +101,13 @@ class System:
         step: communication step in s.
         record: distance of recorded points in s; None records every step.
         order: instance names in the order they step; empty derives it from direct feed-through.
+        extrapolation: order of the polynomial by which inputs are continued over a step (0: held), for FMUs that can
+            interpolate their inputs.
+        algebraic_loops: ``"delay"`` (a loop acts one step late) or ``"solve"`` (solved at each communication point).
+        tolerance: relative; of ``iterative`` for what is exchanged, of ``adaptive`` for the error of a step; None for
+            the algorithm's default. tolerances: ``[relative, absolute]`` of single signals, by name.
+        max_iterations, relaxation, acceleration: of ``iterative``. min_step: of ``adaptive``, s.
+        events: what happens on the way.
         requirements, metrics: texts by name. published, figures: tables as the scenario has them.
         preset: the preset in force (``default_preset`` for the file as it stands); None where that has no name.
         presets: every name a preset may be asked for by. default_preset: the one that means the file as it stands.
@@ -83,6 +128,15 @@ class System:
     algorithm: Algorithm = "gauss-seidel"
     seed: int = 0
     order: list[str] = field(default_factory=list)
+    extrapolation: int = 0
+    algebraic_loops: Loops = "delay"
+    tolerance: float | None = None
+    tolerances: dict[str, list[float]] = field(default_factory=dict)
+    max_iterations: int = 50
+    relaxation: float = 1.0
+    acceleration: Acceleration = "anderson"
+    min_step: float | None = None
+    events: list[Event] = field(default_factory=list)
     instances: dict[str, Instance] = field(default_factory=dict)
     connections: list[Connection] = field(default_factory=list)
     requirements: dict[str, str] = field(default_factory=dict)
