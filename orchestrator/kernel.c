@@ -26,7 +26,7 @@ typedef int (*GetReal)(void *component, const unsigned int *references, size_t c
 typedef int (*SetInteger)(void *component, const unsigned int *references, size_t count, const int *values);
 typedef int (*GetInteger)(void *component, const unsigned int *references, size_t count, int *values);
 
-enum { OPERATION_SET = 0, OPERATION_STEP = 1, OPERATION_GET = 2 };
+enum { OPERATION_SET = 0, OPERATION_STEP = 1, OPERATION_GET = 2, OPERATION_CHANGE = 3 };
 enum { WARNING = 1 }; /* the last status of the standard that is no failure */
 
 /* ------------------------------------------------------------------------------------- the plan, as Python writes it */
@@ -47,24 +47,39 @@ typedef struct {
 typedef struct {
     int64_t place; /* among the values; the outputs of a channel stand side by side */
     int64_t age;   /* how many recorded points back to read; -1: the live value */
+    int64_t change; /* what events may do to it on the way; -1: nothing */
     double scale;
     double offset;
 } Entry;
 
+/* What an event makes of a value, while it is active; `place` is that of an output. */
+typedef struct {
+    int64_t active;
+    int64_t place;
+    int64_t is_real;
+    double scale;
+    double offset;
+    double slope;
+    double since;
+} Change;
+
 typedef struct {
     int32_t kind;
-    int32_t index; /* of the channel or instance */
+    int32_t index;  /* of the channel, instance or change */
+    int32_t period; /* it is due in every so manyth step, */
+    int32_t phase;  /* in those with this rest */
 } Operation;
 
 /* ------------------------------------------------------------------------------------------------ the plan, as it runs */
 
-typedef enum { STEP, SET_REALS_IN_PLACE, SET_REALS, SET_INTEGERS, GET_REALS, GET_INTEGERS } Kind;
+typedef enum { STEP, SET_REALS_IN_PLACE, SET_REALS, SET_INTEGERS, GET_REALS, GET_INTEGERS, CHANGE } Kind;
 
 /* One operation. */
 typedef struct {
     void *component;
     double *values;       /* where they are read or written in place */
     const Entry *entries; /* where they are gathered from */
+    const Change *change;
 } Call;
 
 /* Calls of one kind, one after the other, of one function with the same value references. */
@@ -73,6 +88,8 @@ typedef struct {
     uintptr_t function;
     const unsigned int *references;
     size_t count; /* of the references */
+    int32_t period;
+    int32_t phase;
     Call *begin;
     Call *end;
 } Group;
@@ -88,6 +105,7 @@ typedef struct {
     double *history; /* the last `depth` recorded points, a ring */
     size_t depth;
     size_t newest; /* the ring's newest row */
+    const Change *changes;
 } Plan;
 
 /* ---------------------------------------------------------------------------------------------------------- stepping */
@@ -97,7 +115,16 @@ static int is_failure(int status)
     return status < 0 || status > WARNING;
 }
 
-static double read_entry(const Plan *plan, const Entry *entry)
+static double changed(const Change *change, double value, double time)
+{
+    if (!change->active) {
+        return value;
+    }
+    value = change->scale * value + change->offset + change->slope * (time - change->since);
+    return change->is_real ? value : trunc(value);
+}
+
+static double read_entry(const Plan *plan, const Entry *entry, double time)
 {
     const double *row = plan->values;
     if (entry->age >= 0) {
@@ -105,7 +132,10 @@ static double read_entry(const Plan *plan, const Entry *entry)
         row = plan->history + (plan->newest + (plan->newest < age ? plan->depth : 0) - age) * plan->value_count;
     }
     double value = row[entry->place];
-    return entry->scale == 1.0 && entry->offset == 0.0 ? value : entry->scale * value + entry->offset;
+    if (entry->scale != 1.0 || entry->offset != 0.0) {
+        value = entry->scale * value + entry->offset;
+    }
+    return entry->change < 0 ? value : changed(&plan->changes[entry->change], value, time);
 }
 
 /* Each of these takes a group's calls; it returns the one that failed, or the end. A failure with a status that is none is
@@ -141,12 +171,12 @@ static const Call *set_reals_in_place(const Group *group, int *status)
     return end;
 }
 
-static const Call *set_reals(const Plan *plan, const Group *group, int *status)
+static const Call *set_reals(const Plan *plan, const Group *group, double time, int *status)
 {
     SetReal set = (SetReal)group->function;
     for (const Call *call = group->begin; call < group->end; call++) {
         for (size_t k = 0; k < group->count; k++) {
-            plan->reals[k] = read_entry(plan, &call->entries[k]);
+            plan->reals[k] = read_entry(plan, &call->entries[k], time);
         }
         *status = set(call->component, group->references, group->count, plan->reals);
         if (is_failure(*status)) {
@@ -156,12 +186,12 @@ static const Call *set_reals(const Plan *plan, const Group *group, int *status)
     return group->end;
 }
 
-static const Call *set_integers(const Plan *plan, const Group *group, int *status)
+static const Call *set_integers(const Plan *plan, const Group *group, double time, int *status)
 {
     SetInteger set = (SetInteger)group->function;
     for (const Call *call = group->begin; call < group->end; call++) {
         for (size_t k = 0; k < group->count; k++) {
-            plan->integers[k] = (int)read_entry(plan, &call->entries[k]);
+            plan->integers[k] = (int)read_entry(plan, &call->entries[k], time);
         }
         *status = set(call->component, group->references, group->count, plan->integers);
         if (is_failure(*status)) {
@@ -206,24 +236,43 @@ static const Call *get_integers(const Plan *plan, const Group *group, int *statu
     return group->end;
 }
 
+static const Call *change_values(const Group *group, double time)
+{
+    for (const Call *call = group->begin; call < group->end; call++) {
+        *call->values = changed(call->change, *call->values, time);
+    }
+    return group->end;
+}
+
 static const Call *take_group(const Plan *plan, const Group *group, double time, double step, int *status)
 {
     switch (group->kind) {
-    case STEP: return take_steps(group, time, step, status);
+    case STEP: return take_steps(group, time, (double)group->period * step, status);
     case SET_REALS_IN_PLACE: return set_reals_in_place(group, status);
-    case SET_REALS: return set_reals(plan, group, status);
-    case SET_INTEGERS: return set_integers(plan, group, status);
+    case SET_REALS: return set_reals(plan, group, time, status);
+    case SET_INTEGERS: return set_integers(plan, group, time, status);
     case GET_REALS: return get_reals(group, status);
-    default: return get_integers(plan, group, status);
+    case GET_INTEGERS: return get_integers(plan, group, status);
+    default: return change_values(group, time + step);
     }
 }
 
-/* One communication step; the operation that failed, or -1. */
-static int64_t advance(const Plan *plan, double time, double step, int *status)
+/* Communication step number `k`, from operation number `from` on; the operation that failed, or -1. */
+static int64_t advance(const Plan *plan, long long k, double time, double step, size_t from, int *status)
 {
     const Group *end = plan->groups + plan->group_count;
     for (const Group *group = plan->groups; group < end; group++) {
-        const Call *call = take_group(plan, group, time, step, status);
+        if (group->period > 1 && k % group->period != group->phase) {
+            continue;
+        }
+        const Call *call;
+        if (from > 0 && group->begin < plan->calls + from) { /* taken up again in the middle */
+            Group rest = *group;
+            rest.begin = plan->calls + from < group->end ? plan->calls + from : group->end;
+            call = take_group(plan, &rest, time, step, status);
+        } else {
+            call = take_group(plan, group, time, step, status);
+        }
         if (call < group->end) {
             return call - plan->calls;
         }
@@ -247,6 +296,7 @@ typedef struct {
     long long count;
     long long every;
     long long last; /* number of the step that is recorded whatever `every` says */
+    size_t from;    /* operation with which the first step is taken up */
     double *rows;
     size_t capacity;
 } Block;
@@ -268,7 +318,8 @@ static Outcome take_block(Plan *plan, const Block *block)
         if (is_due && outcome.written == block->capacity) {
             break;
         }
-        outcome.failed = advance(plan, block->start + (double)k * block->step, block->step, &outcome.status);
+        size_t from = outcome.done == 0 ? block->from : 0;
+        outcome.failed = advance(plan, k, block->start + (double)k * block->step, block->step, from, &outcome.status);
         if (outcome.failed >= 0) {
             break;
         }
@@ -288,13 +339,13 @@ static Outcome take_block(Plan *plan, const Block *block)
 /* --------------------------------------------------------------------------------------------- from arrays to a plan */
 
 /* Buffers in the sequence of the arguments, and the size of what they hold; `values` and what follows is written. */
-enum { OPERATIONS, CHANNELS, INSTANCES, ENTRIES, REFERENCES, VALUES, HISTORY, ROWS, N_BUFFERS };
+enum { OPERATIONS, CHANNELS, INSTANCES, ENTRIES, REFERENCES, CHANGES, VALUES, HISTORY, ROWS, N_BUFFERS };
 static const char *const buffer_names[N_BUFFERS] = {
-    "operations", "channels", "instances", "entries", "references", "values", "history", "rows",
+    "operations", "channels", "instances", "entries", "references", "changes", "values", "history", "rows",
 };
 static const size_t buffer_sizes[N_BUFFERS] = {
-    sizeof(Operation), sizeof(Channel),  sizeof(Instance), sizeof(Entry),
-    sizeof(unsigned),  sizeof(double),   sizeof(double),   sizeof(double),
+    sizeof(Operation), sizeof(Channel), sizeof(Instance), sizeof(Entry),  sizeof(unsigned),
+    sizeof(Change),    sizeof(double),  sizeof(double),   sizeof(double),
 };
 
 static size_t length(const Py_buffer *buffers, int which)
@@ -332,11 +383,12 @@ static int is_within(int64_t begin, int64_t count, size_t length)
 }
 
 /* Whether a channel's entries can be read (or, written, stand side by side among the values). */
-static int entries_fit(const Plan *plan, const Entry *entries, int64_t count, int is_written)
+static int entries_fit(const Plan *plan, const Entry *entries, int64_t count, size_t change_count, int is_written)
 {
     for (int64_t k = 0; k < count; k++) {
         const Entry *entry = &entries[k];
-        if (!is_within(entry->place, 1, plan->value_count) || entry->age < -1 ||
+        if (!is_within(entry->place, 1, plan->value_count) || entry->age < -1 || entry->change < -1 ||
+            (entry->change >= 0 && (uint64_t)entry->change >= change_count) ||
             (entry->age >= 0 && (uint64_t)entry->age >= plan->depth) ||
             (is_written && entry->place != entries[0].place + k)) {
             return 0;
@@ -349,7 +401,7 @@ static int entries_fit(const Plan *plan, const Entry *entries, int64_t count, in
 static int are_in_place(const Entry *entries, int64_t count)
 {
     for (int64_t k = 0; k < count; k++) {
-        if (entries[k].age >= 0 || entries[k].scale != 1.0 || entries[k].offset != 0.0 ||
+        if (entries[k].age >= 0 || entries[k].change >= 0 || entries[k].scale != 1.0 || entries[k].offset != 0.0 ||
             entries[k].place != entries[0].place + k) {
             return 0;
         }
@@ -360,8 +412,23 @@ static int are_in_place(const Entry *entries, int64_t count)
 /* One operation as a group of a single call; 0 if it points outside the plan. */
 static int resolve(const Plan *plan, const Py_buffer *buffers, const Operation *operation, Group *group, Call *call)
 {
-    *group = (Group){.begin = call, .end = call + 1};
+    *group = (Group){.begin = call, .end = call + 1, .period = operation->period, .phase = operation->phase};
     *call = (Call){0};
+    if (operation->period < 1 || operation->phase < 0 || operation->phase >= operation->period) {
+        return 0;
+    }
+    if (operation->kind == OPERATION_CHANGE) {
+        if (!is_within(operation->index, 1, length(buffers, CHANGES))) {
+            return 0;
+        }
+        group->kind = CHANGE;
+        call->change = plan->changes + operation->index;
+        if (!is_within(call->change->place, 1, plan->value_count)) {
+            return 0;
+        }
+        call->values = plan->values + call->change->place;
+        return 1;
+    }
     if (operation->kind == OPERATION_STEP) {
         if (!is_within(operation->index, 1, length(buffers, INSTANCES))) {
             return 0;
@@ -382,7 +449,7 @@ static int resolve(const Plan *plan, const Py_buffer *buffers, const Operation *
         return 0;
     }
     const Entry *entries = (const Entry *)buffers[ENTRIES].buf + channel->begin;
-    if (!entries_fit(plan, entries, channel->count, is_get)) {
+    if (!entries_fit(plan, entries, channel->count, length(buffers, CHANGES), is_get)) {
         return 0;
     }
     int in_place = channel->is_real && (is_get || are_in_place(entries, channel->count));
@@ -399,8 +466,8 @@ static int resolve(const Plan *plan, const Py_buffer *buffers, const Operation *
 
 static int are_alike(const Group *a, const Group *b)
 {
-    return a->kind == b->kind && a->function == b->function && a->count == b->count &&
-           (a->count == 0 || memcmp(a->references, b->references, a->count * sizeof *a->references) == 0);
+    return a->kind == b->kind && a->function == b->function && a->count == b->count && a->period == b->period &&
+           a->phase == b->phase && (a->count == 0 || memcmp(a->references, b->references, a->count * sizeof *a->references) == 0);
 }
 
 static void free_plan(Plan *plan)
@@ -421,6 +488,7 @@ static int make_plan(Plan *plan, const Py_buffer *buffers, Py_ssize_t newest)
     plan->history = buffers[HISTORY].buf;
     plan->depth = plan->value_count ? length(buffers, HISTORY) / plan->value_count : 0;
     plan->newest = (size_t)newest;
+    plan->changes = buffers[CHANGES].buf;
     plan->calls = calloc(count + 1, sizeof *plan->calls);
     plan->groups = calloc(count + 1, sizeof *plan->groups);
     if (plan->calls == NULL || plan->groups == NULL) {
@@ -450,9 +518,10 @@ static int make_plan(Plan *plan, const Py_buffer *buffers, Py_ssize_t newest)
 }
 
 PyDoc_STRVAR(run_doc,
-    "run(operations, channels, instances, entries, references, values, history, newest, rows, every,\n"
-    "    start, step, first, count, last) -> (done, written, failed, status, newest)\n\n"
-    "Take up to `count` communication steps from number `first`. Rows (time, values) are written for every `every`-th\n"
+    "run(operations, channels, instances, entries, references, changes, values, history, newest, rows, every,\n"
+    "    start, step, first, count, last, begin) -> (done, written, failed, status, newest)\n\n"
+    "Take up to `count` communication steps from number `first`, and from operation `begin` of that step, which one\n"
+    "that failed may have left undone. Rows (time, values) are written for every `every`-th\n"
     "step and for step number `last`; the block ends before a row for which there is no room. `failed` is the operation\n"
     "that ended the block, -1 if none did, and `status` its FMI status; of ok or warning, a value is not finite.");
 
@@ -463,18 +532,20 @@ static PyObject *run(PyObject *module, PyObject *arguments)
     Py_ssize_t newest;
     PyObject *result = NULL;
     (void)module;
-    if (!PyArg_ParseTuple(arguments, "y*y*y*y*y*w*w*nw*LddLLL:run", &b[OPERATIONS], &b[CHANNELS], &b[INSTANCES],
-                          &b[ENTRIES], &b[REFERENCES], &b[VALUES], &b[HISTORY], &newest, &b[ROWS], &block.every,
-                          &block.start, &block.step, &block.first, &block.count, &block.last)) {
+    Py_ssize_t from;
+    if (!PyArg_ParseTuple(arguments, "y*y*y*y*y*y*w*w*nw*LddLLLn:run", &b[OPERATIONS], &b[CHANNELS], &b[INSTANCES],
+                          &b[ENTRIES], &b[REFERENCES], &b[CHANGES], &b[VALUES], &b[HISTORY], &newest, &b[ROWS],
+                          &block.every, &block.start, &block.step, &block.first, &block.count, &block.last, &from)) {
         return NULL;
     }
     Plan plan = {0};
     if (check_buffers(b) && make_plan(&plan, b, newest)) {
         if (block.every < 1 || block.first < 0 || block.count < 0 || block.count > INT64_MAX - block.first ||
-            newest < 0 || (plan.depth > 0 && plan.newest >= plan.depth)) {
-            PyErr_SetString(PyExc_ValueError, "kernel: every, first, count and newest must fit the plan");
+            newest < 0 || from < 0 || (plan.depth > 0 && plan.newest >= plan.depth)) {
+            PyErr_SetString(PyExc_ValueError, "kernel: every, first, count, newest and begin must fit the plan");
         } else {
             Outcome outcome;
+            block.from = (size_t)from;
             block.rows = b[ROWS].buf;
             block.capacity = length(b, ROWS) / (plan.value_count + 1);
             Py_BEGIN_ALLOW_THREADS

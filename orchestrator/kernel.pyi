@@ -6,6 +6,7 @@ def run(
     instances: Any,
     entries: Any,
     references: Any,
+    changes: Any,
     values: Any,
     history: Any,
     newest: int,
@@ -16,4 +17,5 @@ def run(
     first: int,
     count: int,
     last: int,
+    begin: int,
 ) -> tuple[int, int, int, int, int]: ...

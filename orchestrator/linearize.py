@@ -18,14 +18,15 @@ import networkx as nx
 import numpy as np
 
 from .archive import Workspace
+from .binary import forget_paths
 from .check import Checked, check
 from .errors import FmuError, ScenarioError, did_you_mean
-from .fmu import forget_paths
 from .loading import Kind
 from .local_model import Array, Continuous, Stepped, make_block
-from .master import Master
+from .master import Master, Settings
 from .one_step import Composition
 from .run import Progress
+from .settling import settle
 from .slave import Slave
 from .system import System
 
@@ -119,7 +120,10 @@ def linearize(
             for name, model in checked.models.items():
                 slaves[name] = model.instantiate(name)
             wiring = checked.wiring
-            master = Master(slaves, checked.order.sequence, wiring.links, wiring.starts, system.algorithm)
+            settings = Settings.of(system)
+            master = Master(
+                slaves, checked.order.sequence, wiring.links, wiring.starts, system.algorithm, settings=settings
+            )
             master.initialize(system.start_time, stop)
             _advance(master, system, round(steps), progress)
             loop = Loop(system, checked, master, inputs, outputs)
@@ -135,7 +139,7 @@ def _advance(master: Master, system: System, count: int, progress: Progress | No
 
     def observe(k: int, _: Any) -> bool:
         if progress is not None and count:
-            progress(system.start_time + k * system.step, system.start_time + count * system.step)
+            progress(master.time, system.start_time + count * system.step)
         return True
 
     if count:
@@ -150,7 +154,7 @@ class Loop:
     ) -> None:
         self.system, self.master = system, master
         self.notes = list(checked.notes)
-        self.time = system.start_time + master.steps * system.step
+        self.time = master.time
         self.blocks = {name: make_block(slave, checked.models[name]) for name, slave in master.slaves.items()}
         self.notes += dict.fromkeys(block.note for block in self.blocks.values() if block.note)
         types = {
@@ -225,7 +229,7 @@ class Loop:
         return self._discrete()
 
     def _continuous(self) -> Linearization:
-        self.master._settle()
+        settle(self.master.exchange, self.master.sequence, self.master.time)
         sizes = {name: (block.states, block.inputs, block.outputs) for name, block in self.blocks.items()}
         x, u, y = ([(n, s) for n, names in sizes.items() for s in names[k]] for k in range(3))
         a, b = np.zeros((len(x), len(x))), np.zeros((len(x), len(u)))
@@ -278,6 +282,11 @@ class Loop:
 
     def _discrete(self) -> Linearization:
         """One communication step, in the master's own order; registers keep what is read a step late."""
+        if self.system.algorithm not in ("gauss-seidel", "jacobi") or self.master.settings.rates:
+            raise ScenarioError(
+                "the linear model of one communication step is that of gauss-seidel or jacobi with one step for all; "
+                "choose --algorithm gauss-seidel, and no step of an instance's own"
+            )
         matrices, states = Composition(self, self._step_models()).result()
         return self._result(matrices, states, self.system.step)
 
@@ -285,13 +294,13 @@ class Loop:
         master, models = self.master, {}
         if self.system.algorithm == "jacobi":
             for name in self.blocks:
-                master._write(name)
+                master.exchange.write(name, self.time)
         for slave in master.sequence:
             if self.system.algorithm != "jacobi":
-                master._write(slave.name)
+                master.exchange.write(slave.name, self.time)
             models[slave.name] = self.blocks[slave.name].step(self.time, self.system.step)
             if self.system.algorithm != "jacobi":
-                master._read_finite(slave)
+                master.exchange.read_finite(slave, self.time + self.system.step)
         rough = [name for model in models.values() for name in model.rough]
         if rough:
             self.notes.append(f"no slope here, what switches is held: {_families(rough)}")

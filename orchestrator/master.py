@@ -1,34 +1,36 @@
 """How time advances: initialization until connected values agree, then communication steps.
 
-`Master` is built from a flat plan (which values go where, in which order); the step loop touches nothing else. The
-point in time is always ``start + k * step``, never a running sum.
+The explicit algorithms, and the loop over steps with what happens between them; `iterative` and `adaptive` are files of
+their own, and so is the compiled loop. A point in time is always ``start + k * step``, never a running sum.
 """
 
 from __future__ import annotations
 
 import math
-from collections import deque
-from collections.abc import Callable, Collection, Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from . import adaptive, iterative
 from .compiled import CompiledLoop, can_run
-from .errors import FmuError, ScenarioError
-from .interface import Type
-from .slave import Channel, Slave
-from .system import Algorithm
-from .wiring import Link
+from .errors import CouplingError
+from .events import Schedule
+from .exchange import Exchange, types_of
+from .extrapolation import Extrapolator
+from .loops import LoopSolver, find_loops
+from .settling import settle
+from .slave import Slave
+from .system import Acceleration, Algorithm, Event, Loops, System
+from .wiring import Link, is_direct
 
-_SWEEPS = 100
-_SHRINKS = 0.8
-"""How much smaller each sweep's change must be than the last: slower than that, Newton's method is the better way."""
-_AGREE = 1e-12
-"""Relative change below which a connected value counts as settled; acyclic systems settle exactly."""
 _SOLVED = 1e-9
-"""The same after Newton's method, which ends at a residual, not at a fixed point."""
+"""Relative residual up to which an algebraic loop counts as solved."""
+_ROUNDING = 1e-9
+_TOLERANCE = {"iterative": 1e-8, "adaptive": 1e-4}
+_SHORTEST = 2.0**-20
 
 Rows = Sequence[Sequence[Any]] | NDArray[np.float64]
 Observer = Callable[[int, Rows], bool]
@@ -36,34 +38,43 @@ Observer = Callable[[int, Rows], bool]
 
 
 @dataclass(frozen=True)
-class Feed:
-    """Inputs of one type of one instance: where each value comes from, and how it is changed on the way.
+class Settings:
+    """How a master couples, as `System` describes it.
 
-    ``sources`` are indices into the values; ``ages`` say how many recorded points back to look (None: the live value).
+    Attributes:
+        rates: how many communication steps an instance takes at once, by name, where that is not one.
+        threads: how many threads step instances in parallel (``jacobi`` in the compiled loop).
     """
 
-    channel: Channel
-    sources: tuple[int, ...]
-    plain: bool
-    scales: tuple[float, ...]
-    offsets: tuple[float, ...]
-    ages: tuple[int | None, ...]
-    is_real: bool
+    extrapolation: int = 0
+    algebraic_loops: Loops = "delay"
+    tolerance: float | None = None
+    tolerances: Mapping[str, Sequence[float]] = field(default_factory=dict)
+    max_iterations: int = 50
+    relaxation: float = 1.0
+    acceleration: Acceleration = "anderson"
+    min_step: float | None = None
+    rates: Mapping[str, int] = field(default_factory=dict)
+    events: Sequence[Event] = ()
+    threads: int = 1
 
-
-@dataclass(frozen=True)
-class Yield:
-    """Outputs of one type of one instance, and where they stand among the values."""
-
-    channel: Channel
-    kind: Type
-    begin: int
-    end: int
-
-    @property
-    def is_real(self) -> bool:
-        """Whether the values are real numbers, which must be finite."""
-        return self.kind == "Real"
+    @classmethod
+    def of(cls, system: System, threads: int = 1) -> Settings:
+        """Those of a system."""
+        own = {name: round(x.step / system.step) for name, x in system.instances.items() if x.step is not None}
+        return cls(
+            extrapolation=system.extrapolation,
+            algebraic_loops=system.algebraic_loops,
+            tolerance=system.tolerance,
+            tolerances=system.tolerances,
+            max_iterations=system.max_iterations,
+            relaxation=system.relaxation,
+            acceleration=system.acceleration,
+            min_step=system.min_step,
+            rates={name: rate for name, rate in own.items() if rate > 1},
+            events=system.events,
+            threads=threads,
+        )
 
 
 class Master:
@@ -74,7 +85,9 @@ class Master:
         sequence: their names in the order in which a Gauss-Seidel sweep steps them.
         links: scalar connections.
         starts: start values by instance and scalar name.
-        algorithm: ``"gauss-seidel"`` (set, step, get per instance) or ``"jacobi"`` (all set, all step, all get).
+        algorithm: ``"gauss-seidel"`` (set, step, get per instance), ``"jacobi"`` (all set, all step, all get),
+            ``"iterative"`` (repeated until it agrees) or ``"adaptive"`` (sweeps of varying length).
+        settings: how it couples beyond that.
     """
 
     def __init__(
@@ -84,72 +97,71 @@ class Master:
         links: Sequence[Link],
         starts: Mapping[str, Mapping[str, Any]],
         algorithm: Algorithm,
+        *,
+        settings: Settings = Settings(),
     ) -> None:
         self.slaves = slaves
         self.algorithm = algorithm
-        self.signals: list[str] = []
-        """Names of the values, in the order in which they are recorded."""
+        self.settings = settings
+        self.sequence = [slaves[name] for name in sequence]
         self.steps = 0
         """Communication steps taken."""
+        self.time = 0.0
+        """The communication point that has been reached, in s."""
         self._starts = starts
-        index: dict[tuple[str, str], int] = {}
-        wanted: dict[str, set[str]] = {name: set() for name in slaves}
-        incoming: dict[str, list[Link]] = {name: [] for name in slaves}
-        for link in links:
-            wanted[link.source[0]].add(link.source[1])
-            incoming[link.target[0]].append(link)
-        self.yields = {name: self._plan_outputs(slave, wanted[name], index) for name, slave in slaves.items()}
-        self.values: list[Any] = [0.0] * len(self.signals)
-        deepest = max((link.delay for link in links), default=0)
-        self.depth = deepest + 1 if deepest else 0
-        """How many recorded points delayed connections look back on, the present one included."""
-        self._history: deque[list[Any]] = deque(maxlen=self.depth)
-        self.feeds = {name: self._plan_inputs(slave, incoming[name], index) for name, slave in slaves.items()}
-        self.sequence = [slaves[name] for name in sequence]
+        interfaces = {name: slave.interface for name, slave in slaves.items()}
+        blocks = iterative.find_blocks(interfaces, links) if algorithm == "iterative" else None
+        self.exchange = Exchange(
+            slaves,
+            links,
+            sweeping=algorithm != "jacobi",
+            parted=set(settings.rates) | set(blocks.sampled if blocks else ()),
+        )
+        self.signals = self.exchange.signals
+        self.values = self.exchange.values
+        self.kinds = self.exchange.kinds
+        self._extrapolator = self._make_extrapolator(blocks) if settings.extrapolation else None
+        self._iterative = None if blocks is None else self._make_iterative(blocks)
+        self.loops: LoopSolver | None = None
+        self._schedule: Schedule | None = None
         self._compiled: CompiledLoop | None = None
+        self.adaptive: adaptive.Adaptive | None = None
 
-    # ---------------------------------------------------------------- plan
+    def _make_extrapolator(self, blocks: iterative.Blocks | None) -> Extrapolator:
+        """With the inputs that are given values of the step's end: those whose source has stepped before."""
+        at = {slave.name: k for k, slave in enumerate(self.sequence)}
+        ahead: set[tuple[str, str]] = set()
+        for link in self.exchange.links:
+            a, b = link.source[0], link.target[0]
+            if self.algorithm == "jacobi":
+                continue
+            if blocks is not None or (at[a] < at[b] and not link.direct):
+                ahead.add(link.target)
+        return Extrapolator(self.exchange, self.exchange.links, self.settings.extrapolation, ahead)
 
-    def _plan_outputs(self, slave: Slave, wanted: Collection[str], index: dict[tuple[str, str], int]) -> list[Yield]:
-        """Every output, and whatever else is connected."""
-        shown = [v for v in slave.interface.variables.values() if v.causality == "output" or v.name in wanted]
-        plan = []
-        for kind in _types(v.type for v in shown):
-            names = [v.name for v in shown if v.type == kind]
-            begin = len(self.signals)
-            for name in names:
-                index[slave.name, name] = len(self.signals)
-                self.signals.append(f"{slave.name}.{name}")
-            plan.append(Yield(slave.channel(kind, names), kind, begin, len(self.signals)))
-        return plan
+    def _make_iterative(self, blocks: iterative.Blocks) -> iterative.Iterative:
+        how = self.settings
+        options = how.max_iterations, how.relaxation, how.acceleration
+        return iterative.Iterative(self.exchange, blocks, self._write, self._tolerances("iterative"), *options)
 
-    def _plan_inputs(self, slave: Slave, mine: Sequence[Link], index: Mapping[tuple[str, str], int]) -> list[Feed]:
-        variables = slave.interface.variables
-        plan = []
-        for kind in _types(variables[link.target[1]].type for link in mine):
-            links = [link for link in mine if variables[link.target[1]].type == kind]
-            plan.append(
-                Feed(
-                    channel=slave.channel(kind, [link.target[1] for link in links]),
-                    sources=tuple(index[link.source] for link in links),
-                    plain=all((x.scale, x.offset, x.delay) == (1.0, 0.0, 0) for x in links),
-                    scales=tuple(link.scale for link in links),
-                    offsets=tuple(link.offset for link in links),
-                    ages=tuple(self._age(link) for link in links),
-                    is_real=kind == "Real",
-                )
-            )
-        return plan
+    def _tolerances(self, algorithm: str) -> list[tuple[float, float]]:
+        """Relative and absolute tolerance of each value."""
+        given = self.settings.tolerance
+        tolerance = _TOLERANCE[algorithm] if given is None else given
+        found = []
+        for (instance, name), signal in zip(self.exchange.places, self.signals, strict=True):
+            nominal = self.slaves[instance].interface.variables[name].nominal
+            own = self.settings.tolerances.get(signal, (tolerance, tolerance * abs(nominal or 1.0)))
+            found.append((float(own[0]), float(own[1])))
+        return found
 
-    def _age(self, link: Link) -> int | None:
-        """How many recorded points back a delayed connection reads; 0 is the point at the begin of the step.
-
-        A feed-through output recorded at a point was computed from the inputs of the point before: read there, it is
-        already one communication point older than the live value of a Gauss-Seidel sweep.
-        """
-        if not link.delay:
-            return None
-        return link.delay - 1 if link.direct and self.algorithm == "gauss-seidel" else link.delay
+    def _make_loop_solver(self, unsettled: Sequence[int]) -> LoopSolver | None:
+        """For the loops that the FMUs' dependencies tell of, and those that exchange did not settle."""
+        interfaces = {name: slave.interface for name, slave in self.slaves.items()}
+        signals = {signal for loop in find_loops(interfaces, self.exchange.links) for signal in loop}
+        places = {k for k, signal in enumerate(self.signals) if signal in signals and self.kinds[k] == "Real"}
+        places.update(unsettled)
+        return LoopSolver(self.exchange, sorted(places)) if places else None
 
     # ---------------------------------------------------------------- initialization
 
@@ -160,75 +172,111 @@ class Master:
             FmuError: a model failed.
             ScenarioError: the connected values do not settle.
         """
+        self.time = start_time
         for slave in self.slaves.values():
             slave.setup(start_time, stop_time)
             self._set_starts(slave)
         for slave in self.slaves.values():
             slave.enter_initialization()
         for slave in self.slaves.values():
-            self._read(slave)
-        self._settle()
+            self.exchange.read(slave, start_time)
+        unsettled = settle(self.exchange, self.sequence, start_time)
         for slave in self.slaves.values():
             slave.exit_initialization()
         for slave in self.slaves.values():
-            self._read_finite(slave)
-        self._remember()
+            self.exchange.read_finite(slave, start_time)
+        if self.settings.algebraic_loops == "solve":
+            self.loops = self._make_loop_solver(unsettled)
+        if self._extrapolator is not None:
+            self._extrapolator.begin(start_time)
+        if self.settings.events:
+            self._schedule = Schedule(self.settings.events, self.exchange, start_time)
+            self._schedule.apply(start_time)
+        self.exchange.remember()
         self._compiled = CompiledLoop(self) if can_run(self) else None
 
     def _set_starts(self, slave: Slave) -> None:
         given = self._starts.get(slave.name, {})
         variables = slave.interface.variables
-        for kind in _types(variables[name].type for name in given):
+        for kind in types_of(variables[name].type for name in given):
             names = [name for name in given if variables[name].type == kind]
             slave.channel(kind, names).set([given[name] for name in names])
 
-    def _settle(self) -> None:
-        """Exchange until nothing changes; what is left after that is a loop, for Newton's method where it diverges."""
-        flushed = len(self.slaves) + 1  # sweeps after which every chain has settled, whatever the order
-        begin, last = list(self.values), math.inf
-        for count in range(max(_SWEEPS, flushed)):
-            before = list(self.values)
-            self._sweep()
-            change = _largest_change(before, self.values)
-            if change <= _AGREE:
-                return
-            if count >= flushed and not change < _SHRINKS * last:
-                break
-            last = change
-        solve_loops(self, begin, before)
-
-    def _sweep(self) -> None:
-        for slave in self.sequence:
-            if self.feeds[slave.name]:
-                self._write(slave.name)
-                self._read(slave)
-
     # ---------------------------------------------------------------- stepping
 
-    def run(self, start_time: float, step: float, count: int, every: int, observe: Observer) -> bool:
-        """Take ``count`` communication steps; True unless the observer stopped the run.
+    def run(
+        self,
+        start_time: float,
+        step: float,
+        count: int,
+        every: int,
+        observe: Observer,
+        *,
+        first: int = 0,
+        until: int | None = None,
+    ) -> bool:
+        """Take communication steps; True unless the observer stopped the run.
 
         The compiled kernel takes them where it can, with identical results.
 
         Args:
             start_time: in s.
             step: in s.
-            count: number of steps.
-            every: a row is due after every so many steps, and after the last.
+            count: number of the last communication point of the run, counted from 0.
+            every: a row is due after every so many steps, and after the last; 0 with ``adaptive``: after each.
             observe: given the rows.
+            first: number of the communication point to begin at.
+            until: number of the one to end at now; ``count`` by default.
 
         Raises:
             FmuError: a model failed, or a value is not finite; instance, variable and time are named.
+            CouplingError: what is exchanged does not settle, or cannot be kept within its tolerance.
         """
-        if self._compiled is not None:
-            return self._compiled.run(start_time, step, count, every, observe)
-        advance = self._gauss_seidel if self.algorithm == "gauss-seidel" else self._jacobi
-        for k in range(count):
-            advance(start_time + k * step, step)
-            self._remember()
+        end = count if until is None else until
+        if self.algorithm == "adaptive":
+            return self._run_adaptively(start_time, step, (end, count), every, observe)
+        self.steps = first
+        while self.steps < end:
+            stop = end
+            if self._schedule is not None:
+                stop = int(min(end, self._schedule.next_point(start_time, step, self.steps)))
+            take = self._compiled.run if self._compiled is not None else self._run_in_python
+            if not take(start_time, step, (self.steps, stop, count), every, self._eventful(step, stop, observe)):
+                return False
+        return True
+
+    def _eventful(self, step: float, stop: int, observe: Observer) -> Observer:
+        """An observer before whom the events at the last point happen, so that the row of that point shows them."""
+        schedule = self._schedule
+        if schedule is None:
+            return observe
+
+        def see(steps: int, rows: Rows) -> bool:
+            if steps == stop and schedule.apply(self.time, step):
+                if self.exchange.depth:
+                    self.exchange.history[-1] = list(self.values)
+                if len(rows) and rows[-1][0] == self.time:
+                    rows[-1][1:] = self.values  # type: ignore[index]
+            return observe(steps, rows)
+
+        return see
+
+    def _run_in_python(
+        self, start_time: float, step: float, points: tuple[int, int, int], every: int, observe: Observer
+    ) -> bool:
+        first, stop, count = points
+        advance = {"gauss-seidel": self._gauss_seidel, "jacobi": self._jacobi, "iterative": self._iterate}
+        take = advance[self.algorithm]
+        for k in range(first, stop):
+            time = start_time + k * step
+            take(k, time, step)
+            if self.loops is not None:
+                self._solve_loops(time + step)
+            self.exchange.remember()
             self.steps = k + 1
+            self.time = start_time + self.steps * step
             due = self.steps % every == 0 or self.steps == count
-            if not observe(self.steps, [[start_time + self.steps * step, *self.values]] if due else ()):
+            if not observe(self.steps, [[self.time, *self.values]] if due else ()):
                 return False
         return True
 
@@ -237,127 +285,119 @@ class Master:
         for slave in self.slaves.values():
             slave.terminate()
 
-    def _gauss_seidel(self, time: float, step: float) -> None:
+    def _write(self, name: str, time: float, length: float) -> None:
+        if self._extrapolator is None:
+            self.exchange.write(name, time)
+        else:
+            self._extrapolator.write(name, time, length)
+
+    def _gauss_seidel(self, k: int, time: float, step: float) -> None:
+        exchange, rates = self.exchange, self.settings.rates
         for slave in self.sequence:
-            self._write(slave.name)
-            slave.step(time, step)
-            self._read_finite(slave)
+            rate = rates.get(slave.name, 1)
+            if k % rate == 0:
+                self._write(slave.name, time, rate * step)
+                slave.step(time, rate * step)
+            self._read(slave, k, rate, time + step) if rate > 1 else exchange.read_finite(slave, time + step)
 
-    def _jacobi(self, time: float, step: float) -> None:
-        for name in self.slaves:
-            self._write(name)
-        for slave in self.slaves.values():
-            slave.step(time, step)
-        for slave in self.slaves.values():
-            self._read_finite(slave)
+    def _jacobi(self, k: int, time: float, step: float) -> None:
+        rates = self.settings.rates
+        stepping = [slave for name, slave in self.slaves.items() if k % rates.get(name, 1) == 0]
+        for slave in stepping:
+            self._write(slave.name, time, rates.get(slave.name, 1) * step)
+        for slave in stepping:
+            slave.step(time, rates.get(slave.name, 1) * step)
+        for name, slave in self.slaves.items():
+            rate = rates.get(name, 1)
+            self._read(slave, k, rate, time + step) if rate > 1 else self.exchange.read_finite(slave, time + step)
 
-    def _write(self, name: str) -> None:
-        values = self.values
-        for feed in self.feeds[name]:
-            if feed.plain:
-                feed.channel.set([values[k] for k in feed.sources])
-            else:
-                feed.channel.set(self._changed(feed))
+    def _read(self, slave: Slave, k: int, rate: int, end: float) -> None:
+        """Of an instance with a step of its own: direct outputs act at once, the others are of its step's end."""
+        if k % rate == 0:
+            self.exchange.read_finite(slave, end, direct=True)
+        if k % rate == rate - 1:
+            self.exchange.read_finite(slave, end, direct=False)
 
-    def _changed(self, feed: Feed) -> list[Any]:
-        """Input values with delay, scale and offset applied."""
-        result = []
-        for k, scale, offset, age in zip(feed.sources, feed.scales, feed.offsets, feed.ages, strict=True):
-            value = self.values[k] if age is None else self._aged(age, k)
-            result.append(scale * value + offset if feed.is_real and (scale, offset) != (1.0, 0.0) else value)
-        return result
+    def _iterate(self, k: int, time: float, step: float) -> None:
+        assert self._iterative is not None
+        self._iterative.advance(time, step)
 
-    def _aged(self, age: int, k: int) -> Any:
-        if not self._history:  # still initializing
-            return self.values[k]
-        return self._history[max(0, len(self._history) - 1 - age)][k]
+    def _solve_loops(self, time: float) -> None:
+        assert self.loops is not None
+        left = self.loops.solve(time)
+        if not left <= _SOLVED:
+            names = ", ".join(self.loops.signals[:6])
+            raise CouplingError(
+                f"t = {time:g} s: the algebraic loop through {names} has no solution near its last one: it is left "
+                f"with a relative residual of {left:.3g}; take a smaller step, or put a component with memory into it"
+            )
 
-    def _remember(self) -> None:
-        if self.depth:
-            self._history.append(list(self.values))
+    # ---------------------------------------------------------------- adaptive
 
-    def _read(self, slave: Slave) -> None:
-        for part in self.yields[slave.name]:
-            self.values[part.begin : part.end] = part.channel.get()
+    def _run_adaptively(
+        self, start_time: float, step: float, points: tuple[int, int], every: int, observe: Observer
+    ) -> bool:
+        end, last = (start_time + n * step for n in points)
+        stepper = self.adaptive = self.adaptive or self._make_adaptive(step)
+        while self.time < end:
+            row = last
+            if every:  # the next point at which a row is due
+                done = math.floor((self.time - start_time) / (every * step) + _ROUNDING)
+                row = min(last, start_time + (done + 1) * every * step)
+            due = math.inf if self._schedule is None else self._schedule.next_time()
+            self.time = stepper.advance(self.time, min(row, due))
+            self.steps += 1
+            if self._schedule is not None:
+                self._schedule.apply(self.time, _ROUNDING * step)
+            if not observe(self.steps, [[self.time, *self.values]] if not every or self.time == row else ()):
+                return False
+        return True
 
-    def _read_finite(self, slave: Slave) -> None:
-        """Read, and stop before anyone else is given what is not finite, so that the blame falls on its source."""
-        for part in self.yields[slave.name]:
-            found = part.channel.get()
-            self.values[part.begin : part.end] = found
-            # One sum instead of one test per value: it is finite unless a value is not (or all are astronomic).
-            if part.is_real and not math.isfinite(sum(found)):
-                self.check_finite(slave)
-
-    def check_finite(self, slave: Slave) -> None:
-        """Raise if a real output of an instance is not finite, naming it."""
-        for part in self.yields[slave.name]:
-            for k in range(part.begin, part.end):
-                if part.is_real and not math.isfinite(self.values[k]):
-                    variable = self.signals[k].removeprefix(f"{slave.name}.")
-                    raise FmuError(f"output {variable!r} is {self.values[k]!r}", instance=slave.name, time=slave.time)
-
-    @property
-    def kinds(self) -> list[Type]:
-        """The type of each of the values."""
-        return [part.kind for parts in self.yields.values() for part in parts for _ in range(part.begin, part.end)]
-
-
-def _types(kinds: Any) -> tuple[Type, ...]:
-    return tuple(dict.fromkeys(kinds))
-
-
-def _largest_change(before: Sequence[Any], after: Sequence[Any]) -> float:
-    return max(map(_change, before, after), default=0.0)
-
-
-def _change(a: Any, b: Any) -> float:
-    """How far a value has moved, relative to its size above 1; what stays NaN has not moved."""
-    if a == b:
-        return 0.0
-    if isinstance(a, str) or isinstance(b, str):
-        return 1.0
-    if not math.isfinite(b - a):
-        return 0.0 if math.isnan(a) and math.isnan(b) else math.inf
-    return float(abs(b - a) / max(1.0, abs(a), abs(b)))
-
-
-def solve_loops(master: Master, begin: Sequence[Any], before: Sequence[Any]) -> None:
-    """Newton's method (SciPy) on the connected real values that repeated exchange does not settle.
-
-    Args:
-        master: its last sweep ended in other values than it began with.
-        begin: values before any exchange, where the search starts: exchange that diverges leads away from them.
-        before: values before the last sweep.
-
-    Raises:
-        ScenarioError: no consistent initial values were found; the signals involved and the residual are named.
-    """
-    from scipy import optimize  # noqa: PLC0415 (a heavy import for a rare case)
-
-    moving = [k for k, (a, b) in enumerate(zip(before, master.values, strict=True)) if _change(a, b) > 0.0]
-    unknown = [k for k in moving if isinstance(begin[k], float)]
-    names = ", ".join(master.signals[k] for k in moving[:6]) + (", ..." if len(moving) > 6 else "")
-
-    def residual(candidate: Any) -> list[float]:
-        for k, value in zip(unknown, candidate, strict=True):
-            master.values[k] = float(value)
-        master._sweep()
-        return [master.values[k] - float(value) for k, value in zip(unknown, candidate, strict=True)]
-
-    master.values[:] = begin
-    try:
-        start = [begin[k] if math.isfinite(begin[k]) else 0.0 for k in unknown]
-        solution = optimize.root(residual, start, method="hybr", tol=1e-13).x if unknown else []
-        residual(solution)
-        found = list(master.values)
-        master._sweep()
-    except (FmuError, ValueError, OverflowError) as error:
-        raise ScenarioError(f"the initial values of {names} do not settle: {error}") from error
-    worst = _largest_change(found, master.values)
-    if not worst <= _SOLVED:
-        raise ScenarioError(
-            f"the initial values of {names} do not settle: they form an algebraic loop for which no solution was found "
-            f"(they still change by {worst:.3g} when exchanged); put a component with memory into the loop, or start "
-            "the search elsewhere by other start values"
+    def _make_adaptive(self, step: float) -> adaptive.Adaptive:
+        interfaces = {name: slave.interface for name, slave in self.slaves.items()}
+        watched = [
+            k
+            for (instance, name), k in self.exchange.places.items()
+            if self.kinds[k] == "Real"
+            and (variable := interfaces[instance].variables[name]).variability == "continuous"
+            and not is_direct(interfaces[instance], variable)
+        ]
+        memory = self._extrapolator
+        return adaptive.Adaptive(
+            self.exchange,
+            self._sweep,
+            watched,
+            self._tolerances("adaptive"),
+            longest=step,
+            shortest=step * _SHORTEST if self.settings.min_step is None else self.settings.min_step,
+            save=memory.save if memory else lambda: None,
+            restore=memory.restore if memory else lambda saved: None,
         )
+
+    def _sweep(self, time: float, length: float) -> None:
+        """A Gauss-Seidel sweep that may be taken back."""
+        for slave in self.sequence:
+            self._write(slave.name, time, length)
+            slave.step(time, length, final=False)
+            self.exchange.read_finite(slave, time + length)
+        if self.loops is not None:
+            self._solve_loops(time + length)
+
+    # ---------------------------------------------------------------- the record, and checkpoints
+
+    def report(self) -> dict[str, Any]:
+        """How the coupling went, for the record of the run; empty where there is nothing to tell."""
+        found: dict[str, Any] = {}
+        if self.loops is not None:
+            found["algebraic_loop"] = {
+                "signals": self.loops.signals,
+                "solutions": self.loops.solutions,
+                "worst_residual": self.loops.residual,
+            }
+        if self._iterative:
+            found["iterative"] = iterative.describe(self._iterative.tally)
+        if self.adaptive is not None:
+            found["adaptive"] = adaptive.describe(self.adaptive.tally)
+        if self._schedule is not None:
+            found["events"] = self._schedule.happened
+        return found

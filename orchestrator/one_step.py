@@ -51,7 +51,7 @@ class Composition:
 
     def _age(self, link: Link, is_fresh: bool) -> int | None:
         """How many communication points before the begin of the step the value read was recorded; None: just now."""
-        age = self.loop.master._age(link)
+        age = self.loop.master.exchange.age(link)
         if age is None:
             return None if is_fresh else 0
         return age

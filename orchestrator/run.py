@@ -16,11 +16,11 @@ from numpy.typing import NDArray
 
 from . import record as record_file
 from .archive import Workspace
+from .binary import forget_paths
 from .check import Checked, check
-from .errors import FmuError, RailcosimError
-from .fmu import forget_paths
+from .errors import RailcosimError, RunError, StoppedError
 from .loading import Kind
-from .master import Master, Observer, Rows
+from .master import Master, Observer, Rows, Settings
 from .metrics import Metric, evaluate_metrics
 from .plots import draw
 from .published import PublishedRow, judge
@@ -29,7 +29,7 @@ from .results import Recorder, Results
 from .slave import Slave
 from .system import Algorithm, Instance, System
 
-Status = Literal["completed", "interrupted", "failed"]
+Status = Literal["completed", "terminated", "interrupted", "failed"]
 Progress = Callable[[float, float], None]
 """Called now and then with the time reached and the stop time, both in s."""
 
@@ -40,9 +40,11 @@ class Run:
 
     Attributes:
         results: recorded signals. metrics, requirements, published: evaluated tables.
-        status: ``"completed"``, ``"interrupted"`` or ``"failed"``; error: why it failed.
+        status: ``"completed"``, ``"terminated"`` (an FMU asked for the end), ``"interrupted"`` or ``"failed"``; error:
+            why it failed or ended early.
         checked: models, wiring, order, and the notes a user should read.
         directory: where the files are, if there are any. figures: those that were drawn.
+        coupling: how the master's iterations, step sizes, loops and events went, where there were any.
         seconds: wall time of ``setup`` and ``stepping``, and the number of communication ``steps``.
     """
 
@@ -54,7 +56,8 @@ class Run:
     requirements: list[Verdict] = field(default_factory=list)
     published: list[PublishedRow] = field(default_factory=list)
     figures: list[Path] = field(default_factory=list)
-    error: FmuError | None = None
+    error: RunError | None = None
+    coupling: dict[str, Any] = field(default_factory=dict)
     directory: Path | None = None
     seconds: dict[str, float] = field(default_factory=dict)
 
@@ -85,6 +88,7 @@ def run(
     kind: Kind = "auto",
     output: str | Path | None = None,
     figures: bool = True,
+    threads: int = 1,
     progress: Progress | None = None,
 ) -> Run:
     """Run a system.
@@ -98,15 +102,18 @@ def run(
             process; ``"auto"`` takes native where it can.
         output: directory for results, metrics and figures; without one everything stays in memory.
         figures: whether to draw the system's figures (only with an output directory).
+        threads: how many threads step the instances in parallel, with ``jacobi`` and compiled FMUs; results are the
+            same to the bit.
         progress: called at every per cent of the run and at least ten times a second.
 
     Raises:
         ScenarioError: the system cannot run; all problems are listed.
         FmuError: a model failed. What was computed until then is on disk, and in the error's ``run``.
+        CouplingError: what the models exchange does not settle; as above.
     """
     system = _override(system, stop_time, step, algorithm)
-    outcome = execute(system, kind=kind, output=output, figures=figures, progress=progress)
-    if outcome.error is not None:
+    outcome = execute(system, kind=kind, output=output, figures=figures, threads=threads, progress=progress)
+    if outcome.error is not None and outcome.status == "failed":
         outcome.error.run = outcome  # type: ignore[attr-defined]
         raise outcome.error
     return outcome
@@ -118,6 +125,7 @@ def execute(
     kind: Kind = "auto",
     output: str | Path | None = None,
     figures: bool = True,
+    threads: int = 1,
     progress: Progress | None = None,
 ) -> Run:
     """As `run`, but a model that fails ends the run with ``status = "failed"`` instead of raising."""
@@ -129,7 +137,7 @@ def execute(
             system = checked.system
             if directory is not None:
                 _open_directory(directory, system, checked, kind)
-            outcome = _simulate(system, checked, directory, progress, begin)
+            outcome = _simulate(system, checked, directory, progress, begin, threads=threads)
         finally:
             forget_paths(workspace.folder)
     outcome.directory = directory
@@ -187,17 +195,29 @@ def _open_directory(directory: Path, system: System, checked: Checked, kind: Kin
         raise RailcosimError(f"the output directory {directory} cannot be used: {error.strerror or error}") from error
 
 
-def _simulate(system: System, checked: Checked, directory: Path | None, progress: Progress | None, begin: float) -> Run:
+def _simulate(
+    system: System,
+    checked: Checked,
+    directory: Path | None,
+    progress: Progress | None,
+    begin: float,
+    *,
+    threads: int,
+) -> Run:
     slaves: dict[str, Slave] = {}
     outcome = Run(system, _results(system, checked, None, "failed"), "failed", checked)
     outcome.seconds = {"setup": 0.0, "stepping": 0.0, "steps": 0}
     recorder: Recorder | None = None
+    master: Master | None = None
     with _interruptible() as stopped:
         try:
             for name, model in checked.models.items():
                 slaves[name] = model.instantiate(name)
             wiring = checked.wiring
-            master = Master(slaves, checked.order.sequence, wiring.links, wiring.starts, system.algorithm)
+            settings = Settings.of(system, threads)
+            master = Master(
+                slaves, checked.order.sequence, wiring.links, wiring.starts, system.algorithm, settings=settings
+            )
             master.initialize(system.start_time, system.stop_time)
             recorder = Recorder(master.signals, master.kinds, directory)
             recorder.extend([[system.start_time, *master.values]])
@@ -205,7 +225,9 @@ def _simulate(system: System, checked: Checked, directory: Path | None, progress
             observe = _observer(system, master, recorder, progress, stopped)
             outcome.status = "completed" if _step(system, master, observe, outcome.seconds) else "interrupted"
             master.terminate()
-        except FmuError as error:
+        except StoppedError as error:
+            outcome.status, outcome.error = "terminated", error
+        except RunError as error:
             outcome.status, outcome.error = "failed", error
         except KeyboardInterrupt:  # a second Ctrl-C
             outcome.status = "interrupted"
@@ -216,6 +238,8 @@ def _simulate(system: System, checked: Checked, directory: Path | None, progress
         finally:
             if recorder is not None:
                 recorder.close()
+            if master is not None:
+                outcome.coupling = master.report()
             for slave in slaves.values():
                 slave.free()
     outcome.results = _results(system, checked, recorder, outcome.status)
@@ -225,7 +249,7 @@ def _simulate(system: System, checked: Checked, directory: Path | None, progress
 def _step(system: System, master: Master, observe: Observer, seconds: dict[str, float]) -> bool:
     """The communication steps, with their wall time noted however they end."""
     count = round((system.stop_time - system.start_time) / system.step)
-    every = 1 if system.record is None else round(system.record / system.step)
+    every = round(system.record / system.step) if system.record is not None else int(system.algorithm != "adaptive")
     begin = clock.perf_counter()
     try:
         return master.run(system.start_time, system.step, count, every, observe)
@@ -236,18 +260,19 @@ def _step(system: System, master: Master, observe: Observer, seconds: dict[str, 
 def _observer(
     system: System, master: Master, recorder: Recorder, progress: Progress | None, stopped: threading.Event
 ) -> Observer:
-    last = round((system.stop_time - system.start_time) / system.step)
-    percent = max(1, last // 100)
-    shown, next_percent = clock.monotonic(), percent
+    last = system.stop_time - 0.5 * system.step
+    percent = 0.01 * (system.stop_time - system.start_time)
+    shown, told = clock.monotonic(), 0
 
     def observe(k: int, rows: Rows) -> bool:
-        nonlocal shown, next_percent
+        nonlocal shown, told
         recorder.extend(rows)
-        time = system.start_time + k * system.step
-        if stopped.is_set() and k < last and not (len(rows) and rows[-1][0] == time):
+        time = master.time
+        if stopped.is_set() and time < last and not (len(rows) and rows[-1][0] == time):
             recorder.extend([[time, *master.values]])  # the point at which the run was stopped
-        if progress is not None and (k >= next_percent or clock.monotonic() - shown > 0.1 or k == last):
-            shown, next_percent = clock.monotonic(), k - k % percent + percent
+        reached = int((time - system.start_time) / percent + 1e-9)
+        if progress is not None and (reached > told or clock.monotonic() - shown > 0.1 or time >= last):
+            shown, told = clock.monotonic(), reached
             progress(time, system.stop_time)
         return not stopped.is_set()
 

@@ -435,7 +435,10 @@ def test_ctrl_c_and_kill(odd, tmp_path):
 # -------------------------------------------------------------------- what the kernel is given
 
 
-NAMES = "operations channels instances entries references values history newest rows every start step first count last"
+NAMES = (
+    "operations channels instances entries references changes values history newest rows every start step first count "
+    "last begin"
+)
 
 
 @pytest.fixture
@@ -444,7 +447,9 @@ def arguments(workspace, odd):
     master = instantiated(ring(odd, 3), workspace)
     plan = [array.copy() for array in CompiledLoop(master)._plan]
     values = np.array(master.values)
-    given = [*plan, values, np.tile(values, (2, 1)), 1, np.empty((8, len(values) + 1)), 1, 0.0, 0.25, 0, 4, 4]
+    changes = np.zeros(1, compiled._CHANGES)
+    rows = np.empty((8, len(values) + 1))
+    given = [*plan, changes, values, np.tile(values, (2, 1)), 1, rows, 1, 0.0, 0.25, 0, 4, 4, 0]
     yield dict(zip(NAMES.split(), given, strict=True))
     for slave in master.slaves.values():
         slave.free()
@@ -491,7 +496,20 @@ WRONG = {
     "a channel of negative length": lambda a: {"channels": changed(a["channels"], "count", -1)},
     "a channel without function": lambda a: {"channels": changed(a["channels"], "function", 0)},
     "a step without function": lambda a: {"instances": changed(a["instances"], "function", 0)},
-    "an unknown operation": lambda a: {"operations": changed(a["operations"], "kind", 3)},
+    "an unknown operation": lambda a: {"operations": changed(a["operations"], "kind", 4)},
+    "an unknown change": lambda a: {"entries": changed(a["entries"], "change", 1)},
+    "a negative change": lambda a: {"entries": changed(a["entries"], "change", -2)},
+    "a change beyond the changes": lambda a: {
+        "operations": changed(changed(a["operations"], "kind", 3), "index", 1),
+    },
+    "a change of no value": lambda a: {
+        "operations": changed(changed(a["operations"], "kind", 3), "index", 0),
+        "changes": changed(a["changes"], "place", 10**6),
+    },
+    "an operation that is never due": lambda a: {"operations": changed(a["operations"], "period", 0)},
+    "a phase beyond the period": lambda a: {"operations": changed(a["operations"], "phase", 1)},
+    "a negative phase": lambda a: {"operations": changed(a["operations"], "phase", -1)},
+    "a begin before the first operation": lambda a: {"begin": -1},
     "a negative operation": lambda a: {"operations": changed(a["operations"], "kind", -1)},
     "an unknown channel": lambda a: {"operations": changed(a["operations"], "index", 10**6)},
     "a negative channel": lambda a: {"operations": changed(a["operations"], "index", -1)},

@@ -323,7 +323,7 @@ def test_a_loop_is_solved(system, gain, kind, algorithm):
 
 
 def test_a_contraction_is_solved_by_exchange_alone(system, monkeypatch):
-    monkeypatch.setattr("railcosim.orchestrator.master.solve_loops", lambda *_: pytest.fail("Newton was called"))
+    monkeypatch.setattr("railcosim.orchestrator.settling.LoopSolver.solve", lambda *_: pytest.fail("Newton was called"))
     assert go(loop(system, 0.5))["a.y"][0] == pytest.approx(2.0, abs=1e-11)
 
 

@@ -1,0 +1,129 @@
+"""Inputs that go on during a step: polynomials through former values, for FMUs that interpolate their inputs.
+
+A held input makes any coupling of first order in the step. An FMU that takes time derivatives of its inputs is given
+those of the polynomial of order 1 or 2 through the last values, each at the time that it belongs to.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+from .exchange import Exchange, Feed
+from .wiring import Link
+
+Point = tuple[float, list[float]]
+"""A time in s, and the inputs that belong to it."""
+
+
+@dataclass(frozen=True)
+class _Course:
+    """The inputs of one instance that are continued: which of its feed's, and which are already of the step's end."""
+
+    feed: Feed
+    members: tuple[int, ...]
+    names: tuple[str, ...]
+    ahead: tuple[bool, ...]
+
+
+class Extrapolator:
+    """Continues inputs over a step.
+
+    Args:
+        exchange: whose inputs they are.
+        links: scalar connections. Delayed ones are held, and so is what a sampled component gives or what is discrete.
+        order: of the polynomial: 1 or 2.
+        ahead: targets that are given values of the end of the step, because their source has stepped before them.
+    """
+
+    def __init__(
+        self, exchange: Exchange, links: Sequence[Link], order: int, ahead: Collection[tuple[str, str]] = ()
+    ) -> None:
+        self._order = order
+        self._exchange = exchange
+        smooth = {link.target for link in links if _is_smooth(exchange, link)}
+        self._courses: dict[str, _Course] = {}
+        for name, feeds in exchange.feeds.items():
+            for feed in feeds:
+                members = tuple(k for k, target in enumerate(feed.targets) if (name, target) in smooth)
+                if members:
+                    names = tuple(feed.targets[k] for k in members)
+                    self._courses[name] = _Course(feed, members, names, tuple((name, n) in ahead for n in names))
+        self.past: dict[str, list[list[tuple[float, float]]]] = {}
+        """For each continued input of an instance, the last values and the times they belong to, newest last."""
+
+    def begin(self, time: float) -> None:
+        """Note the values at the start, in s."""
+        for name, course in self._courses.items():
+            values = self._exchange.inputs(course.feed, time)
+            self.past[name] = [[(time, values[k])] for k in course.members]
+
+    def write(self, name: str, time: float, length: float) -> None:
+        """Set the inputs of an instance for a step from ``time`` of ``length``, both in s, with their derivatives."""
+        course = self._courses.get(name)
+        if course is None:
+            self._exchange.write(name, time)
+            return
+        for feed in self._exchange.feeds[name]:
+            values = self._exchange.inputs(feed, time)
+            orders: list[int] = []
+            derivatives: list[float] = []
+            if feed is course.feed:
+                for n, k in enumerate(course.members):
+                    course_of_input = self._continue(
+                        self.past[name][n], time + length * course.ahead[n], values[k], time
+                    )
+                    values[k] = course_of_input[0]
+                    orders += range(1, self._order + 1)
+                    derivatives += course_of_input[1:]
+            feed.channel.set(values)
+            if derivatives:
+                names = [n for n in course.names for _ in range(self._order)]
+                self._exchange.slaves[name].interpolate(names, orders, derivatives)
+
+    def _continue(self, past: list[tuple[float, float]], at: float, value: float, time: float) -> list[float]:
+        """Value and derivatives at ``time`` of the polynomial through the last points and the new one."""
+        past[:] = [*[point for point in past if point[0] < at][-self._order :], (at, value)]
+        return polynomial(past[-self._order - 1 :], time, self._order)
+
+    def save(self) -> Any:
+        """What it remembers."""
+        return {name: [list(points) for points in past] for name, past in self.past.items()}
+
+    def restore(self, saved: Mapping[str, Sequence[Sequence[Sequence[float]]]]) -> None:
+        """Remember what was saved."""
+        self.past = {
+            name: [[(float(t), float(v)) for t, v in points] for points in past] for name, past in saved.items()
+        }
+
+
+def _is_smooth(exchange: Exchange, link: Link) -> bool:
+    source, target = exchange.slaves[link.source[0]].interface, exchange.slaves[link.target[0]].interface
+    output, given = source.variables[link.source[1]], target.variables[link.target[1]]
+    return (
+        target.interpolates_inputs
+        and not link.delay
+        and output.type == given.type == "Real"
+        and "continuous" == output.variability == given.variability
+        and not source.vendor.get("sampled")
+        and not target.vendor.get("sampled")
+    )
+
+
+def polynomial(points: Sequence[tuple[float, float]], time: float, order: int) -> list[float]:
+    """Value and the first ``order`` derivatives (at most 2) at ``time`` of the polynomial through 1 to 3 points.
+
+    Newton's form: as many points as there are give as high an order as they can.
+    """
+    (t0, a), *rest = points
+    if not rest:
+        return [a] + [0.0] * order
+    t1, b = rest[0]
+    slope = (b - a) / (t1 - t0)
+    if len(rest) == 1:
+        return [a + slope * (time - t0), slope, 0.0][: order + 1]
+    t2, c = rest[1]
+    bend = ((c - b) / (t2 - t1) - slope) / (t2 - t0)
+    value = a + slope * (time - t0) + bend * (time - t0) * (time - t1)
+    return [value, slope + bend * ((time - t0) + (time - t1)), 2.0 * bend][: order + 1]
