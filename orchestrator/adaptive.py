@@ -1,7 +1,8 @@
 """Communication steps as long as a tolerance lets them be, by step doubling.
 
 Each step is taken once whole and, from the same saved state, in two halves; the difference estimates the error of the
-coupling, which is of second order in a step. The halves are kept (Hairer, Norsett and Wanner, section II.4).
+coupling: of second order in a step where inputs are held, of a higher one where they are continued. The halves are kept
+(Hairer, Norsett and Wanner 1993, section II.4).
 """
 
 from __future__ import annotations
@@ -39,6 +40,7 @@ class Adaptive:
         sweep: takes one step of given time and length, both in s; a newer state may be given up again.
         watched: places of the values whose error counts. tolerances: relative and absolute, by place.
         longest, shortest: bounds of the step in s.
+        order: of the coupling's error over the whole run.
         save, restore: what is remembered beside states and values.
     """
 
@@ -48,6 +50,7 @@ class Adaptive:
     tolerances: Sequence[tuple[float, float]]
     longest: float
     shortest: float
+    order: int = 1
     save: Callable[[], Any] = lambda: None
     restore: Callable[[Any], None] = lambda saved: None
     length: float = 0.0
@@ -82,7 +85,8 @@ class Adaptive:
                 self.sweep(time, 0.5 * length)
                 self.sweep(middle, end - middle)
                 error, place = self._error(whole)
-                factor = min(_LARGEST, max(_SMALLEST, _SAFETY / math.sqrt(error))) if error > 0.0 else _LARGEST
+                ideal = _SAFETY * error ** (-1.0 / (self.order + 1)) if error > 0.0 else _LARGEST
+                factor = min(_LARGEST, max(_SMALLEST, ideal))
                 if error <= 1.0:
                     self._accept(length, wanted, factor)
                     return end
@@ -101,7 +105,8 @@ class Adaptive:
         for k, coarse in zip(self.watched, whole, strict=True):
             fine = self.exchange.values[k]
             relative, absolute = self.tolerances[k]
-            error = abs(fine - coarse) / (absolute + relative * max(abs(fine), abs(coarse)) + 1e-300)
+            bound = absolute + relative * max(abs(fine), abs(coarse)) + 1e-300
+            error = abs(fine - coarse) / (2.0**self.order - 1.0) / bound
             if not error <= worst:
                 worst, where = (error, k) if math.isfinite(error) else (math.inf, k)
         return worst, where

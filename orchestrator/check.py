@@ -7,15 +7,19 @@ from collections.abc import Mapping
 from dataclasses import dataclass, replace
 
 from .archive import Workspace
+from .coupling import check_coupling, describe_coupling
 from .errors import ScenarioError, did_you_mean
+from .events import check_events
 from .interface import Interface
+from .isolation import check_isolation, check_once_per_process, isolation_notes
+from .iterative import find_blocks
 from .loading import Kind, Model, load_models
 from .metrics import check_metrics, metric_indices
 from .order import Order, derive
 from .plots import check_figures
 from .published import check_published, split_metric
 from .requirements import check_requirements
-from .system import ALGORITHMS, System
+from .system import ALGORITHMS, SWEEPING, System, split
 from .wiring import Wiring, wire
 
 
@@ -50,10 +54,13 @@ def check(system: System, workspace: Workspace, kind: Kind = "auto") -> Checked:
     interfaces = {name: model.interface for name, model in models.items()}
     wiring = wire(system, interfaces)
     problems += wiring.problems
-    problems += _check_once_per_process(interfaces)
+    problems += check_isolation(system) + check_once_per_process(system, interfaces)
     names = signal_names(interfaces, wiring)
     every_step = system.record is None or abs(system.record - system.step) < 1e-9 * system.step
-    system, left_out = _without_the_missing(system, names, every_step)
+    every_step &= system.algorithm != "adaptive"
+    system, left_out = _without_the_missing(system, interfaces, names, every_step)
+    problems += check_events(system.events, interfaces, wiring)
+    problems += check_coupling(system, interfaces, wiring)
     problems += check_requirements(system.requirements, names, every_step)
     found = check_metrics(system.metrics, names, every_step)
     problems += found
@@ -66,7 +73,9 @@ def check(system: System, workspace: Workspace, kind: Kind = "auto") -> Checked:
     return Checked(system, models, wiring, order, (*left_out, *_notes(system, models, wiring, order)))
 
 
-def _without_the_missing(system: System, names: list[str], every_step: bool) -> tuple[System, list[str]]:
+def _without_the_missing(
+    system: System, interfaces: Mapping[str, Interface], names: list[str], every_step: bool
+) -> tuple[System, list[str]]:
     """After a swap, a system without the tables that speak of variables the new model does not have, and what they are.
 
     A controller of one's own need not have every output that the scenario's own figures draw.
@@ -77,12 +86,28 @@ def _without_the_missing(system: System, names: list[str], every_step: bool) -> 
     metrics = {k: v for k, v in system.metrics.items() if not check_metrics({k: v}, names, every_step)}
     figures = [figure for figure in system.figures if not check_figures([figure], names, every_step)]
     published = [entry for entry in system.published if split_metric(str(entry.get("metric")))[0] in metrics]
+    lost = {event.signal for event in system.events} | set(system.tolerances)
+    lost -= {signal for signal in lost if _is_there(signal, interfaces)}
     gone = [f"requirement {name!r}" for name in system.requirements if name not in requirements]
     gone += [f"metric {name!r}" for name in system.metrics if name not in metrics]
     gone += [f"figure {figure.get('title')!r}" for figure in system.figures if figure not in figures]
+    gone += [f"event or tolerance of {signal!r}" for signal in sorted(lost)]
     notes = [f"left out, because the swapped model lacks what they speak of: {', '.join(gone)}"] if gone else []
-    kept = replace(system, requirements=requirements, metrics=metrics, figures=figures, published=published)
+    kept = replace(
+        system,
+        requirements=requirements,
+        metrics=metrics,
+        figures=figures,
+        published=published,
+        events=[event for event in system.events if event.signal not in lost],
+        tolerances={signal: value for signal, value in system.tolerances.items() if signal not in lost},
+    )
     return kept, notes
+
+
+def _is_there(signal: str, interfaces: Mapping[str, Interface]) -> bool:
+    instance, name = split(signal)
+    return instance in interfaces and interfaces[instance].scalars(name) is not None
 
 
 def signal_names(interfaces: Mapping[str, Interface], wiring: Wiring) -> list[str]:
@@ -117,6 +142,8 @@ def _check_times(system: System) -> list[str]:
         return [f"step must be a positive number, not {system.step!r} s"]
     if not 0.0 < system.stop_time - system.start_time < math.inf:
         return [f"stop_time {system.stop_time!r} s must lie after start_time {system.start_time!r} s"]
+    if system.algorithm == "adaptive":  # which lands wherever it is told to
+        return []
     record = system.step if system.record is None else system.record
     duration = "stop_time - start_time" if system.start_time else "stop_time"
     problems = []
@@ -127,16 +154,25 @@ def _check_times(system: System) -> list[str]:
     return problems
 
 
-def _check_once_per_process(interfaces: Mapping[str, Interface]) -> list[str]:
-    users: dict[str, list[str]] = {}
-    for name, interface in interfaces.items():
-        if interface.single_instance:
-            users.setdefault(interface.guid, []).append(name)
-    return [
-        f"{', '.join(names)}: this FMU can be instantiated only once per process"
-        for names in users.values()
-        if len(names) > 1
-    ]
+def describe_stepping(checked: Checked) -> list[str]:
+    """How a run would step, a line each."""
+    system = checked.system
+    lines = []
+    if system.algorithm in SWEEPING:
+        lines.append(f"{system.algorithm} steps in the order: {', '.join(checked.order.sequence)}")
+    elif system.algorithm == "jacobi":
+        lines.append("jacobi: all instances step in parallel; a feed-through output acts one step late")
+    else:
+        blocks = find_blocks({name: model.interface for name, model in checked.models.items()}, checked.wiring.links)
+        if blocks.sampled:
+            lines.append(f"iterative steps first, at the values of the step's begin: {', '.join(blocks.sampled)}")
+        for group in blocks.continuous:
+            repeated = not blocks.cyclic.isdisjoint(group)
+            lines.append(f"iterative {'repeats until they agree' if repeated else 'steps once'}: {', '.join(group)}")
+    for instance in system.instances.values():
+        if instance.step is not None:
+            lines.append(f"{instance.name} steps every {instance.step:g} s")
+    return lines
 
 
 def _notes(system: System, models: Mapping[str, Model], wiring: Wiring, order: Order) -> list[str]:
@@ -153,6 +189,8 @@ def _notes(system: System, models: Mapping[str, Model], wiring: Wiring, order: O
             ] = None
         if interface.needs_tool and not interface.vendor:
             notes[f"{model} says that it needs the tool it was made with ({interface.generator or 'unnamed'})"] = None
-    if system.algorithm == "gauss-seidel":
+    notes.update(dict.fromkeys(isolation_notes(system, models)))
+    notes.update(dict.fromkeys(describe_coupling(system, interfaces, wiring)))
+    if system.algorithm in SWEEPING:
         notes.update(dict.fromkeys(order.late))
     return list(notes)

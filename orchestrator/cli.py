@@ -9,7 +9,7 @@ from collections.abc import Sequence
 from contextlib import suppress
 from dataclasses import replace
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Any
 
 import typer
 
@@ -19,6 +19,7 @@ from ..fmus.description import summary
 from . import cli_analysis, cli_models, console
 from .archive import Workspace
 from .check import check as check_system
+from .check import describe_stepping
 from .cli_options import (
     FAILED,
     FMU_FAILED,
@@ -26,6 +27,7 @@ from .cli_options import (
     OK,
     WRONG_INPUT,
     Algorithm,
+    Isolate,
     Kind,
     KindName,
     Preset,
@@ -38,12 +40,13 @@ from .cli_options import (
     With,
     load_system,
 )
-from .errors import FmuError, RailcosimError, ScenarioError
+from .errors import FmuError, RailcosimError, RunError, ScenarioError
+from .isolation import isolate
 from .plots import draw
 from .published import PublishedRow
 from .reproduce import cases
 from .results import Results
-from .run import Run, execute
+from .run import Run, execute, resume
 from .scenario import load, shipped
 from .topology import describe as describe_topology
 
@@ -69,8 +72,9 @@ def call(arguments: Sequence[str] | None = None) -> int:
     """Run a command, with the arguments of the process by default, and return its exit code."""
     try:
         app(arguments)
-    except FmuError as error:
-        return _fail([f"an FMU failed: {error}"], FMU_FAILED)
+    except RunError as error:
+        what = "an FMU" if isinstance(error, FmuError) else "the run"
+        return _fail([f"{what} failed: {error}"], FMU_FAILED)
     except ScenarioError as error:
         return _fail(console.folded(error.problems), WRONG_INPUT)
     except (RailcosimError, ComponentError) as error:
@@ -105,7 +109,10 @@ def options(
 
 @app.command()
 def run(
-    scenario: Scenario,
+    scenario: Annotated[
+        str | None,
+        typer.Argument(metavar="SCENARIO", help="A shipped scenario (see 'orchestrate list'), or a .toml file."),
+    ] = None,
     *,
     preset: Preset = None,
     settings: Set = None,
@@ -115,6 +122,21 @@ def run(
     step: Step = None,
     algorithm: Algorithm = None,
     kind: Kind = KindName.auto,
+    isolated: Isolate = None,
+    threads: Annotated[
+        int,
+        typer.Option(
+            min=1, help="Threads that step instances in parallel: jacobi with compiled FMUs; pays for heavy FMUs only."
+        ),
+    ] = 1,
+    checkpoint_every: Annotated[
+        float | None,
+        typer.Option(metavar="T", help="Write a checkpoint every T seconds of the run, to go on from by --resume."),
+    ] = None,
+    resume_from: Annotated[
+        Path | None,
+        typer.Option("--resume", metavar="DIR", help="Go on with the run in DIR from its last checkpoint."),
+    ] = None,
     verify_step: Annotated[
         bool, typer.Option("--verify-step", help="Run again at half the step and print each metric's difference.")
     ] = False,
@@ -126,18 +148,30 @@ def run(
 ) -> None:
     """Run a scenario: results, metrics, verdicts, figures.
 
-    Exit codes: 0 fine; 1 a requirement failed or a published value was missed; 2 the input is wrong; 3 an FMU failed;
+    Exit codes: 0 fine; 1 a requirement failed or a published value was missed; 2 the input is wrong; 3 an FMU failed,
+    or what the FMUs exchange does not settle (what was computed is on disk);
     130 interrupted by Ctrl-C (what was computed is on disk).
     """
-    system = load_system(scenario, preset, settings, builds, swaps, stop=stop, step=step, algorithm=algorithm)
-    directory = output or Path("results") / "-".join(filter(None, (system.name, preset)))
-    with console.progress(system.name, quiet, system.start_time) as progress:
-        outcome = execute(system, kind=kind.value, output=directory, figures=not no_figures, progress=progress)
+    how: Any = {"figures": not no_figures, "threads": threads, "checkpoint_every": checkpoint_every}
+    if resume_from is not None:
+        given = (scenario, preset, settings, builds, swaps, step, algorithm, isolated, output)
+        if any(given) or kind is not KindName.auto:
+            raise ScenarioError("--resume takes the run as its directory has it: give no scenario, and only --stop")
+        with console.progress(str(resume_from), quiet) as progress:
+            outcome = resume(resume_from, stop_time=stop, progress=progress, **how)
+    else:
+        if scenario is None:
+            raise ScenarioError("name a scenario (see 'orchestrate list'), or a run to go on with by --resume DIR")
+        system = load_system(scenario, preset, settings, builds, swaps, stop=stop, step=step, algorithm=algorithm)
+        system = isolate(system, isolated or ())
+        directory = output or Path("results") / "-".join(filter(None, (system.name, preset)))
+        with console.progress(system.name, quiet, system.start_time) as progress:
+            outcome = execute(system, kind=kind.value, output=directory, progress=progress, **how)
     second = _at_half_the_step(outcome, kind, quiet) if verify_step else None
     console.show_run(outcome, second, quiet)
-    error = outcome.error or (second and second.error)
-    if error:
-        raise error
+    for ended in (outcome, second):
+        if ended is not None and ended.status == "failed" and ended.error is not None:
+            raise ended.error
     raise typer.Exit(_exit_code(outcome, second))
 
 
@@ -175,10 +209,16 @@ def list_all() -> None:
 
 @app.command()
 def check(
-    scenario: Scenario, preset: Preset = None, settings: Set = None, builds: With = None, swaps: Swap = None
+    scenario: Scenario,
+    *,
+    preset: Preset = None,
+    settings: Set = None,
+    builds: With = None,
+    swaps: Swap = None,
+    algorithm: Algorithm = None,
 ) -> None:
     """Find what is wrong before a run, and show how the run would step."""
-    system = load_system(scenario, preset, settings, builds, swaps)
+    system = load_system(scenario, preset, settings, builds, swaps, algorithm=algorithm)
     out = console.console()
     with Workspace() as workspace:
         checked = check_system(system, workspace)
@@ -186,10 +226,8 @@ def check(
     connections = len(checked.wiring.links)
     facts = f"{len(system.instances)} instances, {connections} scalar connections, step {system.step:g} s"
     console.say(out, facts, "dim")
-    if system.algorithm == "gauss-seidel":
-        console.say(out, f"gauss-seidel steps in the order: {', '.join(checked.order.sequence)}")
-    else:
-        console.say(out, "jacobi: all instances step in parallel; a feed-through output acts one step late")
+    for line in describe_stepping(checked):
+        console.say(out, line)
     for connection in system.connections:
         if connection.delay:
             points = f"{connection.delay} communication point{'s' * (connection.delay > 1)}"

@@ -37,6 +37,8 @@ class AlgorithmName(StrEnum):
 
     gauss_seidel = "gauss-seidel"
     jacobi = "jacobi"
+    iterative = "iterative"
+    adaptive = "adaptive"
 
 
 Scenario = Annotated[
@@ -59,6 +61,15 @@ Kind = Annotated[
     KindName,
     typer.Option(
         help="native: compiled FMUs; python: Python FMUs; plain: Python objects, to debug; auto: native if possible."
+    ),
+]
+Isolate = Annotated[
+    list[str] | None,
+    typer.Option(
+        "--isolate",
+        metavar="NAME",
+        help="Run an instance, a group such as 'train', or 'all' in processes of their own: a crash there ends no more "
+        "than the run.",
     ),
 ]
 Quiet = Annotated[bool, typer.Option("--quiet", "-q", help="Print nothing but errors.")]

@@ -17,6 +17,7 @@ from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn, Ti
 from rich.table import Table
 from rich.text import Text
 
+from .checkpoint import FILE as CHECKPOINT
 from .interface import Interface, Variable
 from .metrics import COMFORT_TITLE, Comparison, Metric, comfort_levels, compare
 from .published import PublishedRow
@@ -147,7 +148,10 @@ def show_run(outcome: Run, second: Run | None, quiet: bool) -> None:
         out.print()
     if outcome.status != "completed":
         reached = float(outcome.time[-1]) if len(outcome.time) else system.start_time
-        say(out, f"{outcome.status} at t = {reached:g} s of {system.stop_time:g} s", "bold red")
+        why = f": {outcome.error}" if outcome.status == "terminated" else ""
+        say(out, f"{outcome.status} at t = {reached:g} s of {system.stop_time:g} s{why}", "bold red")
+        if outcome.directory is not None and (outcome.directory / CHECKPOINT).is_file():
+            say(out, f"to go on from the last checkpoint: orchestrate run --resume {outcome.directory}", whole=True)
     else:
         for line, bad in summary(outcome.requirements, outcome.published):
             if bad or not quiet:
@@ -158,6 +162,25 @@ def show_run(outcome: Run, second: Run | None, quiet: bool) -> None:
         count = len(outcome.figures)
         figures = f", {count} figure{'s' * (count > 1)}" if count else ""
         say(out, f"Files in {outcome.directory}: results.csv, units.json, metrics.json, run.json{figures}", whole=True)
+
+
+def _coupling(how: Mapping[str, Any]) -> Iterator[str]:
+    """How iterations, step sizes and loops went, and how many events there were."""
+    if loop := how.get("algebraic_loop"):
+        signals, residual = len(loop["signals"]), loop["worst_residual"]
+        yield f"algebraic loop through {signals} signals: worst relative residual {residual:.2g}"
+    if it := how.get("iterative"):
+        yield (
+            f"{it['iterations_per_step']:.3g} iterations per step, at most {it['most_iterations']}; worst residual "
+            f"{it['worst_residual_per_tolerance']:.2g} of the tolerance"
+        )
+    if steps := how.get("adaptive"):
+        yield (
+            f"{steps['accepted']} steps accepted, {steps['rejected']} rejected, between "
+            f"{steps['shortest_step'] or 0.0:.3g} and {steps['longest_step']:.3g} s long"
+        )
+    if "events" in how:
+        yield f"{len(how['events'])} events, listed in run.json"
 
 
 def _show_head(out: Console, outcome: Run) -> None:
@@ -176,6 +199,8 @@ def _show_head(out: Console, outcome: Run) -> None:
             f"{seconds['steps']:g} steps in {seconds['stepping']:.2f} s after {seconds['setup']:.2f} s of set-up"
         )
     say(out, "; ".join(facts), "dim")
+    for line in _coupling(outcome.coupling):
+        say(out, line, "dim")
     if system.description:
         say(out, system.description, "yellow" if "WARNING" in system.description else "")
     for note in folded(outcome.checked.notes):
@@ -334,6 +359,7 @@ def show_interface(out: Console, interface: Interface) -> None:
     for causality, title in (
         ("parameter", "Parameters"),
         ("calculatedParameter", "Calculated parameters"),
+        ("structuralParameter", "Structural parameters (they keep their values)"),
         ("input", "Inputs"),
         ("output", "Outputs"),
         ("local", "Local variables"),
@@ -350,22 +376,24 @@ def _variables(title: str, variables: Sequence[Variable], interface: Interface) 
     columns = ["name", "type", "unit", *(["start"] if starts else []), "description"]
     columns += ["depends directly on"] if outputs else []
     table = _table(title, *columns, right=("start",), fold=("name", "description", "depends directly on"))
+    places = {v.name: k for k, v in enumerate(interface.of("input"))}
     for v in variables:
         cells = [v.name, v.type, v.unit or ""]
         cells += ["" if v.start is None else _start(v.start)] if starts else []
         hint = "optional" if v.name in interface.optional_inputs else ""
         hint = "tunable" if v.causality == "parameter" and v.variability == "tunable" else hint
+        hint = ", ".join([*([hint] if hint else []), *(f"{name} = {value}" for name, value in v.choices)])
         cells += [f"{v.description} ({hint})".strip() if hint else v.description]
         if outputs:
-            cells.append(_dependencies(v, interface))
+            cells.append(_dependencies(v, places))
         table.add_row(*map(Text, cells))
     return table
 
 
-def _dependencies(output: Variable, interface: Interface) -> str:
+def _dependencies(output: Variable, inputs: Mapping[str, int]) -> str:
     if output.dependencies is None:
         return "not said"
-    return ", ".join(v.name for v in interface.of("input") if v.name in output.dependencies) or "no input"
+    return ", ".join(sorted(output.dependencies & inputs.keys(), key=inputs.__getitem__)) or "no input"
 
 
 def _start(value: object) -> str:

@@ -2,6 +2,7 @@
 
 import difflib
 from collections.abc import Iterable, Sequence
+from itertools import groupby
 
 
 class RailcosimError(Exception):
@@ -57,7 +58,9 @@ class FmuError(RunError):
         where += [f"t = {self.time:g} s"] if self.time is not None else []
         where += [f"status {self.status}"] if self.status else []
         head = f"{', '.join(where)}: " if where else ""
-        return "\n".join([f"{head}{super().__str__()}", *(f"    {line}" for line in self.log)])
+        said = ((line, len(list(same))) for line, same in groupby(self.log))
+        lines = (f"    {line}" + (f" ({count} times)" if count > 1 else "") for line, count in said)
+        return "\n".join([f"{head}{super().__str__()}", *lines])
 
 
 class StoppedError(FmuError):

@@ -128,7 +128,7 @@ class LoopSolver:
             correction = np.linalg.solve(self._jacobian(solution, time), mismatch)
         except np.linalg.LinAlgError:
             return math.inf
-        return max(_relative(mismatch, solution), _relative(correction, solution))
+        return max(_relative(mismatch, solution), _relative(np.asarray(correction, dtype=np.float64), solution))
 
     def _mismatch(self, candidate: NDArray[np.float64], time: float) -> NDArray[np.float64]:
         """Outputs that the candidate values lead to, minus the candidate."""

@@ -109,6 +109,9 @@ class Master:
         self.time = 0.0
         """The communication point that has been reached, in s."""
         self._starts = starts
+        self._stop_time = 0.0
+        self._length = 0.0
+        """Step in s that an adaptive run begins with, where it goes on."""
         interfaces = {name: slave.interface for name, slave in slaves.items()}
         blocks = iterative.find_blocks(interfaces, links) if algorithm == "iterative" else None
         self.exchange = Exchange(
@@ -133,9 +136,7 @@ class Master:
         ahead: set[tuple[str, str]] = set()
         for link in self.exchange.links:
             a, b = link.source[0], link.target[0]
-            if self.algorithm == "jacobi":
-                continue
-            if blocks is not None or (at[a] < at[b] and not link.direct):
+            if self.algorithm != "jacobi" and (blocks is not None or at[a] < at[b]):
                 ahead.add(link.target)
         return Extrapolator(self.exchange, self.exchange.links, self.settings.extrapolation, ahead)
 
@@ -151,7 +152,9 @@ class Master:
         found = []
         for (instance, name), signal in zip(self.exchange.places, self.signals, strict=True):
             nominal = self.slaves[instance].interface.variables[name].nominal
-            own = self.settings.tolerances.get(signal, (tolerance, tolerance * abs(nominal or 1.0)))
+            ways = self.settings.tolerances
+            array = f"{instance}.{name.rpartition('[')[0]}"
+            own = ways.get(signal) or ways.get(array) or (tolerance, tolerance * abs(nominal or 1.0))
             found.append((float(own[0]), float(own[1])))
         return found
 
@@ -172,7 +175,7 @@ class Master:
             FmuError: a model failed.
             ScenarioError: the connected values do not settle.
         """
-        self.time = start_time
+        self.time, self._stop_time = start_time, stop_time
         for slave in self.slaves.values():
             slave.setup(start_time, stop_time)
             self._set_starts(slave)
@@ -209,7 +212,7 @@ class Master:
         start_time: float,
         step: float,
         count: int,
-        every: int,
+        every: float,
         observe: Observer,
         *,
         first: int = 0,
@@ -223,7 +226,8 @@ class Master:
             start_time: in s.
             step: in s.
             count: number of the last communication point of the run, counted from 0.
-            every: a row is due after every so many steps, and after the last; 0 with ``adaptive``: after each.
+            every: a row is due after every so many steps, and after the last; with ``adaptive`` they need not be
+                whole, and 0 means after each that it takes.
             observe: given the rows.
             first: number of the communication point to begin at.
             until: number of the one to end at now; ``count`` by default.
@@ -241,7 +245,7 @@ class Master:
             if self._schedule is not None:
                 stop = int(min(end, self._schedule.next_point(start_time, step, self.steps)))
             take = self._compiled.run if self._compiled is not None else self._run_in_python
-            if not take(start_time, step, (self.steps, stop, count), every, self._eventful(step, stop, observe)):
+            if not take(start_time, step, (self.steps, stop, count), int(every), self._eventful(step, stop, observe)):
                 return False
         return True
 
@@ -335,9 +339,10 @@ class Master:
     # ---------------------------------------------------------------- adaptive
 
     def _run_adaptively(
-        self, start_time: float, step: float, points: tuple[int, int], every: int, observe: Observer
+        self, start_time: float, step: float, points: tuple[int, int], every: float, observe: Observer
     ) -> bool:
-        end, last = (start_time + n * step for n in points)
+        last = self._stop_time
+        end = last if points[0] == points[1] else min(last, start_time + points[0] * step)
         stepper = self.adaptive = self.adaptive or self._make_adaptive(step)
         while self.time < end:
             row = last
@@ -370,6 +375,8 @@ class Master:
             self._tolerances("adaptive"),
             longest=step,
             shortest=step * _SHORTEST if self.settings.min_step is None else self.settings.min_step,
+            order=1 + self.settings.extrapolation,
+            length=self._length,
             save=memory.save if memory else lambda: None,
             restore=memory.restore if memory else lambda saved: None,
         )
@@ -384,6 +391,30 @@ class Master:
             self._solve_loops(time + length)
 
     # ---------------------------------------------------------------- the record, and checkpoints
+
+    def save(self) -> dict[str, Any]:
+        """What is carried from one communication point to the next beside the FMUs' states, as JSON-ready values."""
+        return {
+            "steps": self.steps,
+            "time": self.time,
+            "values": list(self.values),
+            "history": [list(row) for row in self.exchange.history],
+            "events": self._schedule and self._schedule.save(),
+            "extrapolation": self._extrapolator and self._extrapolator.save(),
+            "length": self.adaptive.length if self.adaptive is not None else 0.0,
+        }
+
+    def restore(self, saved: Mapping[str, Any]) -> None:
+        """Go on where `save` was called; the FMUs' states have been restored."""
+        self.steps, self.time = int(saved["steps"]), float(saved["time"])
+        self.values[:] = saved["values"]
+        self.exchange.history.clear()
+        self.exchange.history.extend(saved["history"])
+        if self._schedule is not None:
+            self._schedule.restore(saved["events"])
+        if self._extrapolator is not None:
+            self._extrapolator.restore(saved["extrapolation"])
+        self._length = float(saved["length"])
 
     def report(self) -> dict[str, Any]:
         """How the coupling went, for the record of the run; empty where there is nothing to tell."""

@@ -13,7 +13,9 @@ from typing import TYPE_CHECKING, Any
 
 from . import rows
 from .check import Checked
-from .system import System
+from .checkpoint import FILE as CHECKPOINT
+from .isolation import is_isolated
+from .system import SWEEPING, System
 
 if TYPE_CHECKING:
     from .run import Run
@@ -21,11 +23,19 @@ if TYPE_CHECKING:
 _PACKAGES = ("railcosim", "fmpy", "pythonfmu", "numpy", "scipy")
 
 
-def write(directory: Path, system: System, checked: Checked, kind: str) -> None:
-    """Write what is known before the first step, so that a run that is killed can be read."""
-    for name in (rows.CSV, rows.BINARY, "metrics.json"):  # of an earlier run: not to be taken for this one's
-        (directory / name).unlink(missing_ok=True)
-    _dump(directory / "run.json", _describe(system, checked, kind) | {"status": "running"})
+def write(directory: Path, checked: Checked, kind: str, *, anew: bool = True) -> None:
+    """Write what is known before the first step, so that a run that is killed can be read.
+
+    Args:
+        directory: where.
+        checked: what runs.
+        kind: as which kind of model.
+        anew: whether what an earlier run left there goes, so that it is not taken for this one's.
+    """
+    if anew:
+        for name in (rows.CSV, rows.BINARY, "metrics.json", CHECKPOINT):
+            (directory / name).unlink(missing_ok=True)
+    _dump(directory / "run.json", _describe(checked.system, checked, kind) | {"status": "running"})
     _dump(directory / "units.json", {"time": "s"} | _units(checked))
 
 
@@ -42,6 +52,7 @@ def finish(directory: Path, outcome: Run, kind: str) -> None:
     record["error"] = None if outcome.error is None else str(outcome.error)
     record["time_reached"] = float(outcome.time[-1]) if len(outcome.time) else None
     record["seconds"] = outcome.seconds
+    record["coupling"] = outcome.coupling
     record["figures"] = [path.name for path in outcome.figures]
     _dump(directory / "run.json", record)
     _dump(
@@ -80,8 +91,12 @@ def _describe(system: System, checked: Checked, kind: str) -> dict[str, Any]:
         "record": system.record or system.step,
         "seed": system.seed,
         "algorithm": system.algorithm,
-        "order": list(checked.order.sequence) if system.algorithm == "gauss-seidel" else None,
-        "late": list(checked.order.late) if system.algorithm == "gauss-seidel" else None,
+        "order": list(checked.order.sequence) if system.algorithm in SWEEPING else None,
+        "late": list(checked.order.late) if system.algorithm in SWEEPING else None,
+        "extrapolation": system.extrapolation,
+        "algebraic_loops": system.algebraic_loops,
+        "steps": {name: instance.step for name, instance in system.instances.items() if instance.step is not None},
+        "events": [dataclasses.asdict(event) for event in system.events],
         "delays": {c.target: c.delay for c in system.connections if c.delay},
         "kind": kind,
         "notes": list(checked.notes),
@@ -93,6 +108,7 @@ def _describe(system: System, checked: Checked, kind: str) -> dict[str, Any]:
                 "model": system.instances[name].model,
                 "build": system.instances[name].build,
                 "kind": model.kind,
+                "isolated": is_isolated(model, system.instances[name]),
                 "digest": model.digest,
                 "guid": model.interface.guid,
                 "generator": model.interface.generator,

@@ -2,36 +2,32 @@
 
 from __future__ import annotations
 
-import signal
-import threading
 import time as clock
-from collections.abc import Callable, Collection, Iterator
-from contextlib import contextmanager
+from collections.abc import Collection
 from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import Any, Literal
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from . import checkpoint
 from . import record as record_file
 from .archive import Workspace
 from .binary import forget_paths
 from .check import Checked, check
-from .errors import RailcosimError, RunError, StoppedError
+from .checkpoint import check_serializable
+from .errors import RailcosimError, RunError, ScenarioError
 from .loading import Kind
-from .master import Master, Observer, Rows, Settings
 from .metrics import Metric, evaluate_metrics
 from .plots import draw
 from .published import PublishedRow, judge
 from .requirements import Verdict, judge_requirements
-from .results import Recorder, Results
-from .slave import Slave
+from .results import Results
+from .session import Job, Progress, Session, Status, rows_before
 from .system import Algorithm, Instance, System
 
-Status = Literal["completed", "terminated", "interrupted", "failed"]
-Progress = Callable[[float, float], None]
-"""Called now and then with the time reached and the stop time, both in s."""
+__all__ = ["Progress", "Run", "evaluate", "execute", "resume", "run"]
 
 
 @dataclass
@@ -89,6 +85,7 @@ def run(
     output: str | Path | None = None,
     figures: bool = True,
     threads: int = 1,
+    checkpoint_every: float | None = None,
     progress: Progress | None = None,
 ) -> Run:
     """Run a system.
@@ -104,6 +101,7 @@ def run(
         figures: whether to draw the system's figures (only with an output directory).
         threads: how many threads step the instances in parallel, with ``jacobi`` and compiled FMUs; results are the
             same to the bit.
+        checkpoint_every: distance in s of the points from which `resume` can go on; needs an output directory.
         progress: called at every per cent of the run and at least ten times a second.
 
     Raises:
@@ -112,7 +110,15 @@ def run(
         CouplingError: what the models exchange does not settle; as above.
     """
     system = _override(system, stop_time, step, algorithm)
-    outcome = execute(system, kind=kind, output=output, figures=figures, threads=threads, progress=progress)
+    outcome = execute(
+        system,
+        kind=kind,
+        output=output,
+        figures=figures,
+        threads=threads,
+        checkpoint_every=checkpoint_every,
+        progress=progress,
+    )
     if outcome.error is not None and outcome.status == "failed":
         outcome.error.run = outcome  # type: ignore[attr-defined]
         raise outcome.error
@@ -126,26 +132,73 @@ def execute(
     output: str | Path | None = None,
     figures: bool = True,
     threads: int = 1,
+    checkpoint_every: float | None = None,
     progress: Progress | None = None,
 ) -> Run:
     """As `run`, but a model that fails ends the run with ``status = "failed"`` instead of raising."""
     directory = Path(output) if output is not None else None
+    if checkpoint_every is not None and directory is None:
+        raise ScenarioError("checkpoints are files: name an output directory for them")
+    return _execute(system, Job(kind, directory, threads, checkpoint_every, None, progress), figures)
+
+
+def resume(
+    directory: str | Path,
+    *,
+    stop_time: float | None = None,
+    figures: bool = True,
+    threads: int = 1,
+    checkpoint_every: float | None = None,
+    progress: Progress | None = None,
+) -> Run:
+    """Go on with a run from its last checkpoint, bit-identically with one that was never interrupted.
+
+    Args:
+        directory: of the run, which was given ``checkpoint_every``.
+        stop_time: another end in s, later than the checkpoint.
+        figures: whether to draw the system's figures.
+        threads: how many threads step the instances in parallel.
+        checkpoint_every: distance of further checkpoints in s; as before by default.
+        progress: as `run` has it.
+
+    Raises:
+        ScenarioError: there is no checkpoint that fits.
+    """
+    directory = Path(directory)
+    point = checkpoint.read(directory)
+    system = _override(point.system, stop_time, None, None)
+    if system.stop_time <= point.progress["time"]:
+        raise ScenarioError(
+            f"{directory}: its checkpoint is at t = {point.progress['time']:g} s; it cannot go on to an earlier stop "
+            f"time, {system.stop_time:g} s"
+        )
+    every = checkpoint_every if checkpoint_every is not None else point.every
+    return _execute(system, Job(point.kind, directory, threads, every, point, progress), figures)
+
+
+def _execute(system: System, job: Job, figures: bool) -> Run:
+    directory = job.directory
     begin = clock.perf_counter()
     with Workspace() as workspace:
         try:
-            checked = check(system, workspace, kind)
-            system = checked.system
+            checked = check(system, workspace, job.kind)
+            if job.begin is not None and directory is not None:
+                job.begin.check(checked.models, directory)
+            if job.checkpoint_every is not None:
+                check_serializable(checked.models)
+            session = Session(checked, job, rows_before(job))
             if directory is not None:
-                _open_directory(directory, system, checked, kind)
-            outcome = _simulate(system, checked, directory, progress, begin, threads=threads)
+                _open_directory(directory, checked, job)
+            session.run(begin)
         finally:
             forget_paths(workspace.folder)
-    outcome.directory = directory
+    outcome = Run(checked.system, session.results(), session.status, checked, error=session.error, directory=directory)
+    outcome.coupling, outcome.seconds = session.coupling, session.seconds
     evaluate(outcome)
     if directory is not None:
         if figures and len(outcome.results):
-            outcome.figures = draw(system.figures, outcome.results, directory)
-        record_file.finish(directory, outcome, kind)
+            outcome.figures = draw(checked.system.figures, outcome.results, directory)
+        record_file.finish(directory, outcome, job.kind)
     return outcome
 
 
@@ -187,136 +240,9 @@ def _rescaled(instance: Instance, before: float, step: float) -> Instance:
     return replace(instance, start={**instance.start, "sample_time": step})
 
 
-def _open_directory(directory: Path, system: System, checked: Checked, kind: Kind) -> None:
+def _open_directory(directory: Path, checked: Checked, job: Job) -> None:
     try:
         directory.mkdir(parents=True, exist_ok=True)
-        record_file.write(directory, system, checked, kind)
+        record_file.write(directory, checked, job.kind, anew=job.begin is None)
     except OSError as error:
         raise RailcosimError(f"the output directory {directory} cannot be used: {error.strerror or error}") from error
-
-
-def _simulate(
-    system: System,
-    checked: Checked,
-    directory: Path | None,
-    progress: Progress | None,
-    begin: float,
-    *,
-    threads: int,
-) -> Run:
-    slaves: dict[str, Slave] = {}
-    outcome = Run(system, _results(system, checked, None, "failed"), "failed", checked)
-    outcome.seconds = {"setup": 0.0, "stepping": 0.0, "steps": 0}
-    recorder: Recorder | None = None
-    master: Master | None = None
-    with _interruptible() as stopped:
-        try:
-            for name, model in checked.models.items():
-                slaves[name] = model.instantiate(name)
-            wiring = checked.wiring
-            settings = Settings.of(system, threads)
-            master = Master(
-                slaves, checked.order.sequence, wiring.links, wiring.starts, system.algorithm, settings=settings
-            )
-            master.initialize(system.start_time, system.stop_time)
-            recorder = Recorder(master.signals, master.kinds, directory)
-            recorder.extend([[system.start_time, *master.values]])
-            outcome.seconds["setup"] = clock.perf_counter() - begin
-            observe = _observer(system, master, recorder, progress, stopped)
-            outcome.status = "completed" if _step(system, master, observe, outcome.seconds) else "interrupted"
-            master.terminate()
-        except StoppedError as error:
-            outcome.status, outcome.error = "terminated", error
-        except RunError as error:
-            outcome.status, outcome.error = "failed", error
-        except KeyboardInterrupt:  # a second Ctrl-C
-            outcome.status = "interrupted"
-        except BaseException as error:  # initial values that do not settle
-            if directory is not None:
-                record_file.abandon(directory, error)
-            raise
-        finally:
-            if recorder is not None:
-                recorder.close()
-            if master is not None:
-                outcome.coupling = master.report()
-            for slave in slaves.values():
-                slave.free()
-    outcome.results = _results(system, checked, recorder, outcome.status)
-    return outcome
-
-
-def _step(system: System, master: Master, observe: Observer, seconds: dict[str, float]) -> bool:
-    """The communication steps, with their wall time noted however they end."""
-    count = round((system.stop_time - system.start_time) / system.step)
-    every = round(system.record / system.step) if system.record is not None else int(system.algorithm != "adaptive")
-    begin = clock.perf_counter()
-    try:
-        return master.run(system.start_time, system.step, count, every, observe)
-    finally:
-        seconds.update(stepping=clock.perf_counter() - begin, steps=master.steps)
-
-
-def _observer(
-    system: System, master: Master, recorder: Recorder, progress: Progress | None, stopped: threading.Event
-) -> Observer:
-    last = system.stop_time - 0.5 * system.step
-    percent = 0.01 * (system.stop_time - system.start_time)
-    shown, told = clock.monotonic(), 0
-
-    def observe(k: int, rows: Rows) -> bool:
-        nonlocal shown, told
-        recorder.extend(rows)
-        time = master.time
-        if stopped.is_set() and time < last and not (len(rows) and rows[-1][0] == time):
-            recorder.extend([[time, *master.values]])  # the point at which the run was stopped
-        reached = int((time - system.start_time) / percent + 1e-9)
-        if progress is not None and (reached > told or clock.monotonic() - shown > 0.1 or time >= last):
-            shown, told = clock.monotonic(), reached
-            progress(time, system.stop_time)
-        return not stopped.is_set()
-
-    return observe
-
-
-@contextmanager
-def _interruptible() -> Iterator[threading.Event]:
-    """Turn Ctrl-C into an event that is looked at between steps: never inside an FMU, and nothing is lost."""
-    stopped = threading.Event()
-    if threading.current_thread() is not threading.main_thread():
-        yield stopped
-        return
-    before = signal.getsignal(signal.SIGINT)
-
-    def stop(*_: Any) -> None:
-        stopped.set()
-        signal.signal(signal.SIGINT, before)  # a second Ctrl-C does not wait
-
-    signal.signal(signal.SIGINT, stop)
-    try:
-        yield stopped
-    finally:
-        signal.signal(signal.SIGINT, before)
-
-
-def _results(system: System, checked: Checked, recorder: Recorder | None, status: Status) -> Results:
-    time, columns = (np.empty(0), {}) if recorder is None else recorder.columns()
-    units, parameters = {}, {}
-    for instance, model in checked.models.items():
-        starts = checked.wiring.starts[instance]
-        for variable in model.interface.variables.values():
-            name = f"{instance}.{variable.name}"
-            if variable.unit is not None:
-                units[name] = variable.unit
-            if variable.causality == "parameter":
-                parameters[name] = starts.get(variable.name, variable.start)
-    return Results(
-        columns,
-        time,
-        units=units,
-        parameters=parameters,
-        step=system.step,
-        stop_time=system.stop_time,
-        completed=status == "completed",
-        figures=system.figures,
-    )

@@ -7,6 +7,8 @@ from typing import Any, Literal
 
 Algorithm = Literal["gauss-seidel", "jacobi", "iterative", "adaptive"]
 ALGORITHMS: tuple[Algorithm, ...] = ("gauss-seidel", "jacobi", "iterative", "adaptive")
+SWEEPING: tuple[Algorithm, ...] = ("gauss-seidel", "adaptive")
+"""Those that step one instance after the other, in an order."""
 Loops = Literal["delay", "solve"]
 LOOPS: tuple[Loops, ...] = ("delay", "solve")
 Acceleration = Literal["none", "aitken", "anderson"]
@@ -115,7 +117,9 @@ class System:
         rescaled_from: the step in s before `--step` changed it: every sample time equal to it follows the step.
         name, path: of the scenario file. text: the scenario as read, for the record of the run.
         origins: where things were written, for messages: by ``"train[1]"``, ``"train[1].speed"`` (a start value),
-            ``"simulation.step"``, ``"require.comfort"``, ``"metrics.settling"``, ``"published[1]"``, ``"figures[1]"``.
+            ``"instances.train[1].step"`` (an option of an instance), ``"simulation.step"``,
+            ``"simulation.tolerances.train[1].speed"``, ``"events[1]"``, ``"require.comfort"``, ``"metrics.settling"``,
+            ``"published[1]"``, ``"figures[1]"``.
     """
 
     title: str = ""

@@ -1,0 +1,187 @@
+"""Checkpoints: everything a run needs to go on, to the bit, in one file beside its results.
+
+`checkpoint.zip` holds `checkpoint.json` (the system, how far it got, the values under way) and each FMU's serialized
+state. It is replaced as a whole, so that there is always a complete one.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import json
+import os
+import zipfile
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from .errors import RailcosimError, ScenarioError
+from .loading import Kind, Model
+from .master import Master
+from .system import Connection, Event, Instance, System
+
+FILE = "checkpoint.zip"
+_FORMAT = 1
+_UNREADABLE = (OSError, ValueError, KeyError, TypeError, AttributeError, zipfile.BadZipFile, EOFError)
+
+
+@dataclass(frozen=True)
+class Checkpoint:
+    """A point at which a run can be taken up.
+
+    Attributes:
+        system: what is simulated. kind: how components became models.
+        rows: how many rows had been recorded.
+        digests: of the models, by instance.
+        progress: what the master carries between steps, from `Master.save`.
+        states: the FMUs' serialized states, by instance.
+        every: distance of checkpoints in s.
+    """
+
+    system: System
+    kind: Kind
+    rows: int
+    digests: Mapping[str, str]
+    progress: Mapping[str, Any]
+    states: Mapping[str, bytes]
+    every: float | None
+
+    @classmethod
+    def take(
+        cls,
+        system: System,
+        models: Mapping[str, Model],
+        master: Master,
+        *,
+        kind: Kind,
+        rows: int,
+        every: float | None,
+    ) -> Checkpoint:
+        """That of a master between two steps.
+
+        Raises:
+            FmuError: an FMU does not give its state.
+        """
+        states = {}
+        for name, slave in master.slaves.items():
+            state = slave.save()
+            try:
+                states[name] = slave.serialize(state)
+            finally:
+                slave.forget(state)
+        digests = {name: model.digest for name, model in models.items()}
+        return cls(system, kind, rows, digests, master.save(), states, every)
+
+    def write(self, directory: Path) -> None:
+        """Put it in the place of the one before.
+
+        Raises:
+            RailcosimError: the file cannot be written.
+        """
+        content = {
+            "format": _FORMAT,
+            "system": dataclasses.asdict(self.system),
+            "kind": self.kind,
+            "rows": self.rows,
+            "every": self.every,
+            "digests": self.digests,
+            "progress": self.progress,
+        }
+        part = directory / f"{FILE}.part"
+        try:
+            with zipfile.ZipFile(part, "w") as archive:
+                archive.writestr("checkpoint.json", json.dumps(content, default=_plain))
+                for number, name in enumerate(self.digests):
+                    archive.writestr(f"states/{number}", self.states[name])
+            os.replace(part, directory / FILE)
+        except OSError as error:
+            raise RailcosimError(f"{part} cannot be written: {error.strerror or error}") from error
+
+    def restore(self, master: Master) -> None:
+        """Bring an initialized master to this point.
+
+        Raises:
+            FmuError: an FMU does not take its state back.
+        """
+        for name, slave in master.slaves.items():
+            state = slave.deserialize(self.states[name])
+            slave.restore(state)
+            slave.forget(state)
+        master.restore(self.progress)
+
+    def check(self, models: Mapping[str, Model], directory: Path) -> None:
+        """Refuse to go on with other models than the run began with.
+
+        Raises:
+            ScenarioError: naming the instances.
+        """
+        other = [name for name, model in models.items() if model.digest != self.digests.get(name)]
+        if other:
+            raise ScenarioError(
+                f"{directory} cannot be resumed: {', '.join(other[:6])} {'is' if len(other) == 1 else 'are'} not the "
+                "model the run began with (its file, or this version of railcosim, has changed); run it from the start"
+            )
+
+
+def check_serializable(models: Mapping[str, Model]) -> None:
+    """Refuse checkpoints where an FMU cannot give its state away.
+
+    Raises:
+        ScenarioError: naming the instances.
+    """
+    unable = [name for name, model in models.items() if not model.interface.can_serialize_state]
+    if unable:
+        raise ScenarioError(
+            f"no checkpoints: {', '.join(unable[:6])}{' and more' if len(unable) > 6 else ''} cannot serialize "
+            f"{'its' if len(unable) == 1 else 'their'} state (canSerializeFMUstate is false); leave "
+            "--checkpoint-every out, or put another model in by --swap"
+        )
+
+
+def _plain(value: Any) -> Any:
+    if isinstance(value, np.ndarray | np.generic):
+        return value.tolist()
+    if isinstance(value, tuple | set | frozenset):
+        return list(value)
+    return str(value)
+
+
+def read(directory: Path) -> Checkpoint:
+    """The checkpoint of a run.
+
+    Raises:
+        ScenarioError: there is none that can be read.
+    """
+    path = directory / FILE
+    if not path.is_file():
+        raise ScenarioError(f"{directory} has no {FILE}: only a run with --checkpoint-every can be resumed")
+    try:
+        with zipfile.ZipFile(path) as archive:
+            content = json.loads(archive.read("checkpoint.json"))
+            if content["format"] != _FORMAT:
+                raise ScenarioError(f"{path} is of another version of railcosim; run the scenario from the start")
+            names = list(content["digests"])
+            states = {name: archive.read(f"states/{number}") for number, name in enumerate(names)}
+        return Checkpoint(
+            system=_system(content["system"]),
+            kind=content["kind"],
+            rows=int(content["rows"]),
+            digests=content["digests"],
+            progress=content["progress"],
+            states=states,
+            every=content["every"],
+        )
+    except ScenarioError:
+        raise
+    except _UNREADABLE as error:
+        raise ScenarioError(f"{path} cannot be read: {error}") from error
+
+
+def _system(data: dict[str, Any]) -> System:
+    instances = {name: Instance(**entry) for name, entry in data.pop("instances").items()}
+    connections = [Connection(**entry) for entry in data.pop("connections")]
+    events = [Event(**entry) for entry in data.pop("events")]
+    data["presets"] = tuple(data["presets"])
+    return System(**data, instances=instances, connections=connections, events=events)
