@@ -7,6 +7,7 @@ signals), `Master` steps in Python with identical results.
 from __future__ import annotations
 
 import time as clock
+from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -38,7 +39,7 @@ _ENTRY = np.dtype([("place", "i8"), ("age", "i8"), ("change", "i8"), ("scale", "
 _CHANGES = np.dtype(
     [("active", "i8"), ("place", "i8"), ("is_real", "i8"), *((n, "f8") for n in ("scale", "offset", "slope", "since"))]
 )
-_OPERATION = np.dtype([("kind", "i4"), ("index", "i4"), ("period", "i4"), ("phase", "i4")])
+_OPERATION = np.dtype([(name, "i4") for name in ("kind", "index", "period", "phase", "rank", "unused")])
 
 
 def can_run(master: Master) -> bool:
@@ -64,25 +65,44 @@ class CompiledLoop:
         self._culprits: list[tuple[FmuSlave | None, str]] = []
         self._instances: list[tuple[int, int]] = []
         self._changes: list[tuple[Change, int, bool]] = []
-        slaves = {name: slave for name, slave in master.slaves.items() if isinstance(slave, FmuSlave)}
-        sweep = [slave.name for slave in master.sequence]
-        # Instance by instance, or all of one operation before the first of the next.
-        parts = [[name] for name in sweep] if master.algorithm == "gauss-seidel" else [list(slaves)]
-        rates = {name: master.settings.rates.get(name, 1) for name in slaves}
-        for names in parts:
-            for name in names:
-                self._add_sets(slaves[name], rates[name])
-            for name in names:
-                self._add_step(slaves[name], rates[name])
-            for name in names:
-                self._add_gets(slaves[name], rates[name])
+        self._slaves = {name: slave for name, slave in master.slaves.items() if isinstance(slave, FmuSlave)}
+        is_shared = kernel.HAS_THREADS and master.algorithm == "jacobi"
+        self.threads = min(master.settings.threads, len(self._slaves)) if is_shared else 1
+        ends: list[int] = []
+        if master.algorithm == "gauss-seidel":  # instance by instance
+            for slave in master.sequence:
+                self._add([slave.name], (_SET, _STEP, _GET))
+        elif self.threads <= 1:  # all of one operation before the first of the next
+            self._add(list(self._slaves), (_SET, _STEP, _GET))
+        else:  # those of each thread; what all have set and stepped is read only then
+            shares = [list(share) for share in np.array_split(list(self._slaves), self.threads)]
+            for kinds in ((_SET, _STEP), (_GET,)):
+                for share in shares:
+                    self._add(share, kinds)
+                    ends.append(len(self._operations))
         self._plan = (
-            np.array(self._operations, dtype=_OPERATION),
+            np.array([(*o, rank, 0) for o, rank in zip(self._operations, self._ranks(), strict=True)], _OPERATION),
+            np.array(ends or [len(self._operations)], dtype=np.int64),
             np.array(self._channels, dtype=_CHANNEL),
             np.array(self._instances, dtype=_INSTANCE),
             np.array(self._entries, dtype=_ENTRY),
             np.array(self._references, dtype=np.uint32),
         )
+
+    def _add(self, names: Sequence[str], kinds: Sequence[int]) -> None:
+        add = {_SET: self._add_sets, _STEP: self._add_step, _GET: self._add_gets}
+        for kind in kinds:
+            for name in names:
+                add[kind](self._slaves[name], self._master.settings.rates.get(name, 1))
+
+    def _ranks(self) -> list[int]:
+        """Where each operation would stand without threads, so that of two that fail the first is told."""
+        stage = {_SET: 0, _STEP: 1, _GET: 2, _CHANGE: 2}
+        numbers = range(len(self._operations))
+        if self.threads > 1:
+            order = sorted(numbers, key=lambda n: (stage[self._operations[n][0]], n))
+            return [rank for rank, _ in sorted(enumerate(order), key=lambda pair: pair[1])]
+        return list(numbers)
 
     def _add_operation(self, kind: int, index: int, culprit: tuple[FmuSlave | None, str], due: tuple[int, int]) -> None:
         self._operations.append((kind, index, *due))
@@ -198,7 +218,7 @@ class CompiledLoop:
         slave, call = self._culprits[failed]
         assert slave is not None
         period = self._operations[failed][2]
-        if call == "fmi2DoStep" and status == _DISCARD:
+        if call == "fmi2DoStep" and status == _DISCARD and self.threads <= 1:
             slave.resume(time, period * step, status, final=True)
             return
         slave.time = time + step if call.startswith("fmi2Get") else time

@@ -1,351 +1,33 @@
 /* The step loop, compiled: whole blocks of communication steps from a flat plan, without the interpreter.
 
-   A plan is a list of operations on channels and instances, exactly those of the loop in master.py, in the same order and
-   with the same arithmetic, so that the two give the same bits. A channel is some variables of one type of one instance:
-   where their value references stand, and where their values come from or go to. All values are real numbers here;
-   integers and truth values are exact in them. Python builds the plan, and takes over between blocks for progress,
-   flushing and interruption.
+   A plan is a list of operations on channels and instances, exactly those of the loop in master.py, in the same order. A
+   channel is some variables of one type of one instance: where their value references stand, and where their values come
+   from or go to. All values are real numbers here; integers and truth values are exact in them. Python builds the plan,
+   and takes over between blocks for progress, flushing and interruption.
 
    Every block begins by turning the plan into calls, where all of it is checked, and runs of like calls into groups: what
    is the same for a whole group stands in registers, and what is left of a call is the instance and a place.
 
-   An extension is best one file, so this one is long: first the loop, then the way from Python's arrays to it. */
+   This file is the way from Python's arrays to a plan; stepping.c takes the steps, team.c with several threads. */
 
 #define PY_SSIZE_T_CLEAN
 #define Py_LIMITED_API 0x030B0000
 #include <Python.h>
 
-#include <math.h>
+#include "kernel.h"
+
 #include <stdint.h>
 #include <stdlib.h>
 #include <string.h>
 
-typedef int (*DoStep)(void *component, double time, double step, int no_set_state);
-typedef int (*SetReal)(void *component, const unsigned int *references, size_t count, const double *values);
-typedef int (*GetReal)(void *component, const unsigned int *references, size_t count, double *values);
-typedef int (*SetInteger)(void *component, const unsigned int *references, size_t count, const int *values);
-typedef int (*GetInteger)(void *component, const unsigned int *references, size_t count, int *values);
-
-enum { OPERATION_SET = 0, OPERATION_STEP = 1, OPERATION_GET = 2, OPERATION_CHANGE = 3 };
-enum { WARNING = 1 }; /* the last status of the standard that is no failure */
-
-/* ------------------------------------------------------------------------------------- the plan, as Python writes it */
-
-typedef struct {
-    uint64_t function;  /* address of fmi2SetReal, fmi2GetInteger, ... */
-    uint64_t component; /* address of the instance */
-    int64_t begin;      /* first of its entries */
-    int64_t count;      /* number of its entries */
-    int64_t is_real;
-} Channel;
-
-typedef struct {
-    uint64_t function; /* address of fmi2DoStep */
-    uint64_t component;
-} Instance;
-
-typedef struct {
-    int64_t place; /* among the values; the outputs of a channel stand side by side */
-    int64_t age;   /* how many recorded points back to read; -1: the live value */
-    int64_t change; /* what events may do to it on the way; -1: nothing */
-    double scale;
-    double offset;
-} Entry;
-
-/* What an event makes of a value, while it is active; `place` is that of an output. */
-typedef struct {
-    int64_t active;
-    int64_t place;
-    int64_t is_real;
-    double scale;
-    double offset;
-    double slope;
-    double since;
-} Change;
-
-typedef struct {
-    int32_t kind;
-    int32_t index;  /* of the channel, instance or change */
-    int32_t period; /* it is due in every so manyth step, */
-    int32_t phase;  /* in those with this rest */
-} Operation;
-
-/* ------------------------------------------------------------------------------------------------ the plan, as it runs */
-
-typedef enum { STEP, SET_REALS_IN_PLACE, SET_REALS, SET_INTEGERS, GET_REALS, GET_INTEGERS, CHANGE } Kind;
-
-/* One operation. */
-typedef struct {
-    void *component;
-    double *values;       /* where they are read or written in place */
-    const Entry *entries; /* where they are gathered from */
-    const Change *change;
-} Call;
-
-/* Calls of one kind, one after the other, of one function with the same value references. */
-typedef struct {
-    Kind kind;
-    uintptr_t function;
-    const unsigned int *references;
-    size_t count; /* of the references */
-    int32_t period;
-    int32_t phase;
-    Call *begin;
-    Call *end;
-} Group;
-
-typedef struct {
-    Call *calls;
-    Group *groups;
-    size_t group_count;
-    double *reals; /* scratch for the largest channel */
-    int *integers;
-    double *values;
-    size_t value_count;
-    double *history; /* the last `depth` recorded points, a ring */
-    size_t depth;
-    size_t newest; /* the ring's newest row */
-    const Change *changes;
-} Plan;
-
-/* ---------------------------------------------------------------------------------------------------------- stepping */
-
-static int is_failure(int status)
-{
-    return status < 0 || status > WARNING;
-}
-
-static double changed(const Change *change, double value, double time)
-{
-    if (!change->active) {
-        return value;
-    }
-    value = change->scale * value + change->offset + change->slope * (time - change->since);
-    return change->is_real ? value : trunc(value);
-}
-
-static double read_entry(const Plan *plan, const Entry *entry, double time)
-{
-    const double *row = plan->values;
-    if (entry->age >= 0) {
-        size_t age = (size_t)entry->age;
-        row = plan->history + (plan->newest + (plan->newest < age ? plan->depth : 0) - age) * plan->value_count;
-    }
-    double value = row[entry->place];
-    if (entry->scale != 1.0 || entry->offset != 0.0) {
-        value = entry->scale * value + entry->offset;
-    }
-    return entry->change < 0 ? value : changed(&plan->changes[entry->change], value, time);
-}
-
-/* Each of these takes a group's calls; it returns the one that failed, or the end. A failure with a status that is none is
-   a value that is not finite. */
-
-static const Call *take_steps(const Group *group, double time, double step, int *status)
-{
-    DoStep do_step = (DoStep)group->function;
-    const Call *end = group->end;
-    for (const Call *call = group->begin; call < end; call++) {
-        int found = do_step(call->component, time, step, 1);
-        if (is_failure(found)) {
-            *status = found;
-            return call;
-        }
-    }
-    return end;
-}
-
-static const Call *set_reals_in_place(const Group *group, int *status)
-{
-    SetReal set = (SetReal)group->function;
-    const unsigned int *references = group->references;
-    size_t count = group->count;
-    const Call *end = group->end;
-    for (const Call *call = group->begin; call < end; call++) {
-        int found = set(call->component, references, count, call->values);
-        if (is_failure(found)) {
-            *status = found;
-            return call;
-        }
-    }
-    return end;
-}
-
-static const Call *set_reals(const Plan *plan, const Group *group, double time, int *status)
-{
-    SetReal set = (SetReal)group->function;
-    for (const Call *call = group->begin; call < group->end; call++) {
-        for (size_t k = 0; k < group->count; k++) {
-            plan->reals[k] = read_entry(plan, &call->entries[k], time);
-        }
-        *status = set(call->component, group->references, group->count, plan->reals);
-        if (is_failure(*status)) {
-            return call;
-        }
-    }
-    return group->end;
-}
-
-static const Call *set_integers(const Plan *plan, const Group *group, double time, int *status)
-{
-    SetInteger set = (SetInteger)group->function;
-    for (const Call *call = group->begin; call < group->end; call++) {
-        for (size_t k = 0; k < group->count; k++) {
-            plan->integers[k] = (int)read_entry(plan, &call->entries[k], time);
-        }
-        *status = set(call->component, group->references, group->count, plan->integers);
-        if (is_failure(*status)) {
-            return call;
-        }
-    }
-    return group->end;
-}
-
-static const Call *get_reals(const Group *group, int *status)
-{
-    GetReal get = (GetReal)group->function;
-    const unsigned int *references = group->references;
-    size_t count = group->count;
-    const Call *end = group->end;
-    for (const Call *call = group->begin; call < end; call++) {
-        int found = get(call->component, references, count, call->values);
-        int finite = 1;
-        for (size_t k = 0; k < count; k++) {
-            finite &= isfinite(call->values[k]) != 0;
-        }
-        if (is_failure(found) || !finite) {
-            *status = found;
-            return call;
-        }
-    }
-    return end;
-}
-
-static const Call *get_integers(const Plan *plan, const Group *group, int *status)
-{
-    GetInteger get = (GetInteger)group->function;
-    for (const Call *call = group->begin; call < group->end; call++) {
-        *status = get(call->component, group->references, group->count, plan->integers);
-        if (is_failure(*status)) {
-            return call;
-        }
-        for (size_t k = 0; k < group->count; k++) {
-            call->values[k] = (double)plan->integers[k];
-        }
-    }
-    return group->end;
-}
-
-static const Call *change_values(const Group *group, double time)
-{
-    for (const Call *call = group->begin; call < group->end; call++) {
-        *call->values = changed(call->change, *call->values, time);
-    }
-    return group->end;
-}
-
-static const Call *take_group(const Plan *plan, const Group *group, double time, double step, int *status)
-{
-    switch (group->kind) {
-    case STEP: return take_steps(group, time, (double)group->period * step, status);
-    case SET_REALS_IN_PLACE: return set_reals_in_place(group, status);
-    case SET_REALS: return set_reals(plan, group, time, status);
-    case SET_INTEGERS: return set_integers(plan, group, time, status);
-    case GET_REALS: return get_reals(group, status);
-    case GET_INTEGERS: return get_integers(plan, group, status);
-    default: return change_values(group, time + step);
-    }
-}
-
-/* Communication step number `k`, from operation number `from` on; the operation that failed, or -1. */
-static int64_t advance(const Plan *plan, long long k, double time, double step, size_t from, int *status)
-{
-    const Group *end = plan->groups + plan->group_count;
-    for (const Group *group = plan->groups; group < end; group++) {
-        if (group->period > 1 && k % group->period != group->phase) {
-            continue;
-        }
-        const Call *call;
-        if (from > 0 && group->begin < plan->calls + from) { /* taken up again in the middle */
-            Group rest = *group;
-            rest.begin = plan->calls + from < group->end ? plan->calls + from : group->end;
-            call = take_group(plan, &rest, time, step, status);
-        } else {
-            call = take_group(plan, group, time, step, status);
-        }
-        if (call < group->end) {
-            return call - plan->calls;
-        }
-    }
-    return -1;
-}
-
-static void remember(Plan *plan)
-{
-    if (plan->depth > 0) {
-        plan->newest = plan->newest + 1 < plan->depth ? plan->newest + 1 : 0;
-        memcpy(plan->history + plan->newest * plan->value_count, plan->values, plan->value_count * sizeof(double));
-    }
-}
-
-/* Which steps to take, and where their rows go. */
-typedef struct {
-    double start;
-    double step;
-    long long first; /* number of the first step */
-    long long count;
-    long long every;
-    long long last; /* number of the step that is recorded whatever `every` says */
-    size_t from;    /* operation with which the first step is taken up */
-    double *rows;
-    size_t capacity;
-} Block;
-
-typedef struct {
-    long long done;
-    size_t written;
-    int64_t failed;
-    int status;
-} Outcome;
-
-static Outcome take_block(Plan *plan, const Block *block)
-{
-    Outcome outcome = {0, 0, -1, 0};
-    size_t width = plan->value_count + 1;
-    long long k = block->first, wait = block->every - k % block->every;
-    for (; outcome.done < block->count; outcome.done++) {
-        int is_due = wait == 1 || k + 1 == block->last;
-        if (is_due && outcome.written == block->capacity) {
-            break;
-        }
-        size_t from = outcome.done == 0 ? block->from : 0;
-        outcome.failed = advance(plan, k, block->start + (double)k * block->step, block->step, from, &outcome.status);
-        if (outcome.failed >= 0) {
-            break;
-        }
-        k++;
-        wait = wait > 1 ? wait - 1 : block->every;
-        remember(plan);
-        if (is_due) {
-            double *row = block->rows + outcome.written * width;
-            row[0] = block->start + (double)k * block->step;
-            memcpy(row + 1, plan->values, plan->value_count * sizeof(double));
-            outcome.written++;
-        }
-    }
-    return outcome;
-}
-
-/* --------------------------------------------------------------------------------------------- from arrays to a plan */
-
 /* Buffers in the sequence of the arguments, and the size of what they hold; `values` and what follows is written. */
-enum { OPERATIONS, CHANNELS, INSTANCES, ENTRIES, REFERENCES, CHANGES, VALUES, HISTORY, ROWS, N_BUFFERS };
+enum { OPERATIONS, PARTS, CHANNELS, INSTANCES, ENTRIES, REFERENCES, CHANGES, VALUES, HISTORY, ROWS, N_BUFFERS };
 static const char *const buffer_names[N_BUFFERS] = {
-    "operations", "channels", "instances", "entries", "references", "changes", "values", "history", "rows",
+    "operations", "parts", "channels", "instances", "entries", "references", "changes", "values", "history", "rows",
 };
 static const size_t buffer_sizes[N_BUFFERS] = {
-    sizeof(Operation), sizeof(Channel), sizeof(Instance), sizeof(Entry),  sizeof(unsigned),
-    sizeof(Change),    sizeof(double),  sizeof(double),   sizeof(double),
+    sizeof(Operation), sizeof(int64_t), sizeof(Channel), sizeof(Instance), sizeof(Entry),
+    sizeof(unsigned),  sizeof(Change),  sizeof(double),  sizeof(double),   sizeof(double),
 };
 
 static size_t length(const Py_buffer *buffers, int which)
@@ -412,7 +94,10 @@ static int are_in_place(const Entry *entries, int64_t count)
 /* One operation as a group of a single call; 0 if it points outside the plan. */
 static int resolve(const Plan *plan, const Py_buffer *buffers, const Operation *operation, Group *group, Call *call)
 {
-    *group = (Group){.begin = call, .end = call + 1, .period = operation->period, .phase = operation->phase};
+    *group = (Group){.begin = call, .end = call + 1};
+    group->period = operation->period;
+    group->phase = operation->phase;
+    group->rank = operation->rank;
     *call = (Call){0};
     if (operation->period < 1 || operation->phase < 0 || operation->phase >= operation->period) {
         return 0;
@@ -464,9 +149,10 @@ static int resolve(const Plan *plan, const Py_buffer *buffers, const Operation *
     return group->function != 0;
 }
 
+/* Whether the calls of `b` are like those of `a`, and follow them. */
 static int are_alike(const Group *a, const Group *b)
 {
-    return a->kind == b->kind && a->function == b->function && a->count == b->count && a->period == b->period &&
+    return a->rank + (int32_t)(a->end - a->begin) == b->rank && a->kind == b->kind && a->function == b->function && a->count == b->count && a->period == b->period &&
            a->phase == b->phase && (a->count == 0 || memcmp(a->references, b->references, a->count * sizeof *a->references) == 0);
 }
 
@@ -474,21 +160,47 @@ static void free_plan(Plan *plan)
 {
     free(plan->calls);
     free(plan->groups);
-    free(plan->reals);
-    free(plan->integers);
+    free(plan->bounds);
+}
+
+/* Where the operations of each part end: one part, or for each of n threads one that sets and steps, and then for each
+   one that reads. 0 with an exception if they are not that. */
+static int check_parts(Plan *plan, const Py_buffer *buffers, size_t count)
+{
+    const int64_t *ends = buffers[PARTS].buf;
+    size_t n = length(buffers, PARTS);
+    int is_sound = n == 1 || (HAS_THREADS && n >= 4 && n <= 2048 && n % 2 == 0);
+    for (size_t k = 0; is_sound && k < n; k++) {
+        is_sound = ends[k] >= (k > 0 ? ends[k - 1] : 0) && (uint64_t)ends[k] <= count;
+    }
+    if (!is_sound || (uint64_t)ends[n - 1] != count) {
+        PyErr_SetString(PyExc_ValueError, "kernel: the parts must end one after the other, the last with the operations");
+        return 0;
+    }
+    plan->thread_count = n == 1 ? 1 : (int)(n / 2);
+    plan->bounds = calloc(n + 1, sizeof *plan->bounds);
+    if (plan->bounds == NULL) {
+        PyErr_NoMemory();
+    }
+    return plan->bounds != NULL;
 }
 
 /* 0 with an exception if the plan is not sound. */
 static int make_plan(Plan *plan, const Py_buffer *buffers, Py_ssize_t newest)
 {
     const Operation *operations = buffers[OPERATIONS].buf;
-    size_t count = length(buffers, OPERATIONS), largest = 1;
+    const int64_t *ends = buffers[PARTS].buf;
+    size_t count = length(buffers, OPERATIONS), part = 0;
     plan->values = buffers[VALUES].buf;
     plan->value_count = length(buffers, VALUES);
     plan->history = buffers[HISTORY].buf;
     plan->depth = plan->value_count ? length(buffers, HISTORY) / plan->value_count : 0;
     plan->newest = (size_t)newest;
     plan->changes = buffers[CHANGES].buf;
+    plan->largest = 1;
+    if (!check_parts(plan, buffers, count)) {
+        return 0;
+    }
     plan->calls = calloc(count + 1, sizeof *plan->calls);
     plan->groups = calloc(count + 1, sizeof *plan->groups);
     if (plan->calls == NULL || plan->groups == NULL) {
@@ -496,29 +208,81 @@ static int make_plan(Plan *plan, const Py_buffer *buffers, Py_ssize_t newest)
         return 0;
     }
     for (size_t n = 0; n < count; n++) {
+        int begins = n == 0; /* a part, where no group may be continued */
+        while (n == (size_t)ends[part]) {
+            plan->bounds[++part] = plan->group_count;
+            begins = 1;
+        }
         Group *group = &plan->groups[plan->group_count];
         if (!resolve(plan, buffers, &operations[n], group, &plan->calls[n])) {
             PyErr_Format(PyExc_ValueError, "kernel: operation %zu does not fit the plan", n);
             return 0;
         }
-        largest = group->count > largest ? group->count : largest;
-        if (n > 0 && are_alike(group - 1, group)) {
+        plan->largest = group->count > plan->largest ? group->count : plan->largest;
+        if (!begins && are_alike(group - 1, group)) {
             group[-1].end++;
         } else {
             plan->group_count++;
         }
     }
-    plan->reals = malloc(largest * sizeof *plan->reals);
-    plan->integers = malloc(largest * sizeof *plan->integers);
-    if (plan->reals == NULL || plan->integers == NULL) {
-        PyErr_NoMemory();
-        return 0;
+    for (size_t n = part + 1; n <= length(buffers, PARTS); n++) {
+        plan->bounds[n] = plan->group_count;
     }
     return 1;
 }
 
+/* Room for each thread; NULL with an exception if there is none. They are freed by freeing the first one's. */
+static Hand *make_hands(const Plan *plan)
+{
+    size_t count = (size_t)plan->thread_count;
+    Hand *hands = calloc(count, sizeof *hands);
+    double *reals = calloc(count * plan->largest, sizeof *reals);
+    int *integers = calloc(count * plan->largest, sizeof *integers);
+    if (hands == NULL || reals == NULL || integers == NULL) {
+        free(hands);
+        free(reals);
+        free(integers);
+        PyErr_NoMemory();
+        return NULL;
+    }
+    for (size_t n = 0; n < count; n++) {
+        hands[n] = (Hand){plan, reals + n * plan->largest, integers + n * plan->largest};
+    }
+    return hands;
+}
+
+static void free_hands(Hand *hands)
+{
+    free(hands[0].reals);
+    free(hands[0].integers);
+    free(hands);
+}
+
+/* A block without the interpreter; 0 with an exception if its threads cannot be had. */
+static int take(Plan *plan, const Block *block, Outcome *outcome)
+{
+    Hand *hands = make_hands(plan);
+    int is_fine = 1;
+    if (hands == NULL) {
+        return 0;
+    }
+    Py_BEGIN_ALLOW_THREADS
+#if HAS_THREADS
+    if (plan->thread_count > 1) {
+        is_fine = take_block_together(plan, hands, block, outcome);
+    } else
+#endif
+        *outcome = take_block(plan, hands, block);
+    Py_END_ALLOW_THREADS
+    free_hands(hands);
+    if (!is_fine) {
+        PyErr_SetString(PyExc_RuntimeError, "kernel: no more threads can be started");
+    }
+    return is_fine;
+}
+
 PyDoc_STRVAR(run_doc,
-    "run(operations, channels, instances, entries, references, changes, values, history, newest, rows, every,\n"
+    "run(operations, parts, channels, instances, entries, references, changes, values, history, newest, rows, every,\n"
     "    start, step, first, count, last, begin) -> (done, written, failed, status, newest)\n\n"
     "Take up to `count` communication steps from number `first`, and from operation `begin` of that step, which one\n"
     "that failed may have left undone. Rows (time, values) are written for every `every`-th\n"
@@ -533,7 +297,7 @@ static PyObject *run(PyObject *module, PyObject *arguments)
     PyObject *result = NULL;
     (void)module;
     Py_ssize_t from;
-    if (!PyArg_ParseTuple(arguments, "y*y*y*y*y*y*w*w*nw*LddLLLn:run", &b[OPERATIONS], &b[CHANNELS], &b[INSTANCES],
+    if (!PyArg_ParseTuple(arguments, "y*y*y*y*y*y*y*w*w*nw*LddLLLn:run", &b[OPERATIONS], &b[PARTS], &b[CHANNELS], &b[INSTANCES],
                           &b[ENTRIES], &b[REFERENCES], &b[CHANGES], &b[VALUES], &b[HISTORY], &newest, &b[ROWS],
                           &block.every, &block.start, &block.step, &block.first, &block.count, &block.last, &from)) {
         return NULL;
@@ -548,11 +312,10 @@ static PyObject *run(PyObject *module, PyObject *arguments)
             block.from = (size_t)from;
             block.rows = b[ROWS].buf;
             block.capacity = length(b, ROWS) / (plan.value_count + 1);
-            Py_BEGIN_ALLOW_THREADS
-            outcome = take_block(&plan, &block);
-            Py_END_ALLOW_THREADS
-            result = Py_BuildValue("(LnLin)", outcome.done, (Py_ssize_t)outcome.written, (long long)outcome.failed,
-                                   outcome.status, (Py_ssize_t)plan.newest);
+            if (take(&plan, &block, &outcome)) {
+                result = Py_BuildValue("(LnLin)", outcome.done, (Py_ssize_t)outcome.written, (long long)outcome.failed,
+                                       outcome.status, (Py_ssize_t)plan.newest);
+            }
         }
     }
     free_plan(&plan);
@@ -570,5 +333,10 @@ static struct PyModuleDef module = {
 
 PyMODINIT_FUNC PyInit_kernel(void)
 {
-    return PyModule_Create(&module);
+    PyObject *made = PyModule_Create(&module);
+    if (made != NULL && PyModule_AddIntConstant(made, "HAS_THREADS", HAS_THREADS) < 0) {
+        Py_DECREF(made);
+        return NULL;
+    }
+    return made;
 }

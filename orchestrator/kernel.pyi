@@ -1,7 +1,10 @@
 from typing import Any
 
+HAS_THREADS: int
+
 def run(
     operations: Any,
+    parts: Any,
     channels: Any,
     instances: Any,
     entries: Any,

@@ -23,7 +23,7 @@ from railcosim.orchestrator.master import Master
 from railcosim.orchestrator.results import Results
 from railcosim.orchestrator.run import run
 from railcosim.orchestrator.slave import STATUS
-from railcosim.orchestrator.system import System
+from railcosim.orchestrator.system import Event, System
 
 ORCHESTRATOR = Path(__file__).parents[2] / "orchestrator"
 HERE = Path(__file__).parent
@@ -75,7 +75,7 @@ def used(monkeypatch):
         calls.append(arguments)
         return kernel.run(*arguments)
 
-    monkeypatch.setattr(compiled, "kernel", SimpleNamespace(run=counted))
+    monkeypatch.setattr(compiled, "kernel", SimpleNamespace(run=counted, HAS_THREADS=compiled.kernel.HAS_THREADS))
     return calls
 
 
@@ -288,7 +288,7 @@ if sys.argv[2] == "without":
     sys.modules["railcosim.orchestrator.kernel"] = None
 from railcosim.orchestrator import compiled
 from railcosim.orchestrator.run import run
-from railcosim.orchestrator.system import System
+from railcosim.orchestrator.system import Event, System
 assert (compiled.kernel is None) == (sys.argv[2] == "without")
 system = System(stop_time=9.0, step=0.25)
 system.add("a", sys.argv[1], u=1.5)
@@ -402,7 +402,7 @@ def test_blocks_are_short_in_time(workspace, odd):
 ENDLESS = """
 import sys
 from railcosim.orchestrator.run import run
-from railcosim.orchestrator.system import System
+from railcosim.orchestrator.system import Event, System
 system = System(stop_time=1e9, step=0.25, record=25.0)
 system.add("a", sys.argv[1], u=1.5)
 system.add("b", sys.argv[1], v=0.5)
@@ -432,12 +432,55 @@ def test_ctrl_c_and_kill(odd, tmp_path):
             assert json.loads((out / "run.json").read_text())["time_reached"] == loaded.time[-1]
 
 
+# -------------------------------------------------------------------- threads
+
+
+THREADS = pytest.mark.skipif(not getattr(compiled.kernel, "HAS_THREADS", 0), reason="no threads here")
+
+
+@THREADS
+@pytest.mark.parametrize("threads", [2, 3, 5, 64])
+def test_threads_give_the_same_bits(both, used, odd, threads):
+    """Also with instances that step at their own rate, delays, and events; more threads than instances are not had."""
+    system = ring(odd, 7, algorithm="jacobi")
+    system.instances["odd[3]"].step = 0.5
+    system.instances["odd[4]"].step = 2.5
+    system.events = [
+        Event("odd[2].x", "bias", at=2.0, value=0.5, duration=3.0),
+        Event("odd[5].u", "ramp", at=1.0, rate=0.1),
+        Event("odd[1].off", "override", at=4.0, value=True),
+    ]
+    alone = contents(run(system))
+    used.clear()
+    assert contents(both(system, threads=threads)) == alone
+    parts = [len(arguments[1]) for arguments in used]
+    assert set(parts) == {2 * min(threads, 7)}
+
+
+@THREADS
+@pytest.mark.parametrize("mode", [3, 4, 10, 23, 33])
+def test_of_several_threads_that_fail_the_first_is_told(both, odd, mode):
+    """As it would be without threads: the first instance of those whose call comes first."""
+    system = ring(odd, 6, algorithm="jacobi")
+    for k in (2, 3, 5):
+        system.instances[f"odd[{k}]"].start["mode"] = mode
+    assert both(system, threads=3).error.instance == "odd[2]"
+    system.instances["odd[5]"].start["mode"] = 33  # it is set before anyone is stepped, a step after others are read
+    assert both(system, threads=3).error.instance == ("odd[5]" if mode in (3, 4) else "odd[2]")
+
+
+@THREADS
+def test_gauss_seidel_has_nothing_to_share(both, used, odd):
+    both(ring(odd, 4, algorithm="gauss-seidel"), threads=2)
+    assert {len(arguments[1]) for arguments in used} == {1}
+
+
 # -------------------------------------------------------------------- what the kernel is given
 
 
 NAMES = (
-    "operations channels instances entries references changes values history newest rows every start step first count "
-    "last begin"
+    "operations parts channels instances entries references changes values history newest rows every start step first "
+    "count last begin"
 )
 
 
@@ -509,6 +552,11 @@ WRONG = {
     "an operation that is never due": lambda a: {"operations": changed(a["operations"], "period", 0)},
     "a phase beyond the period": lambda a: {"operations": changed(a["operations"], "phase", 1)},
     "a negative phase": lambda a: {"operations": changed(a["operations"], "phase", -1)},
+    "no parts": lambda a: {"parts": a["parts"][:0]},
+    "parts that do not end with the operations": lambda a: {"parts": a["parts"] - 1},
+    "parts that go back": lambda a: {"parts": np.array([3, 2, 3, len(a["operations"])])},
+    "an odd number of parts": lambda a: {"parts": np.array([1, 2, len(a["operations"])])},
+    "a negative part": lambda a: {"parts": np.array([-1, 2, 3, len(a["operations"])])},
     "a begin before the first operation": lambda a: {"begin": -1},
     "a negative operation": lambda a: {"operations": changed(a["operations"], "kind", -1)},
     "an unknown channel": lambda a: {"operations": changed(a["operations"], "index", 10**6)},
@@ -547,7 +595,8 @@ def test_what_is_not_an_array_is_refused(arguments):
 
 def compile_kernel(target, *flags):
     command = [GCC, "-Wall", "-Wextra", "-Wconversion", "-Wshadow", "-Werror", "-ffp-contract=off", "-shared", "-fPIC"]
-    command += [f"-I{sysconfig.get_paths()['include']}", *flags, ORCHESTRATOR / "kernel.c", "-o", target]
+    sources = [ORCHESTRATOR / name for name in ("kernel.c", "stepping.c", "team.c")]
+    command += [f"-I{sysconfig.get_paths()['include']}", *flags, *sources, "-o", target]
     subprocess.run(command, check=True)
     return target
 

@@ -1,0 +1,170 @@
+/* What the files of the compiled step loop share: the plan, and the block of steps that is taken with it. */
+
+#ifndef KERNEL_H
+#define KERNEL_H
+
+#ifdef _WIN32
+#define HAS_THREADS 0
+#else
+#define HAS_THREADS 1
+#endif
+
+#include <stddef.h>
+#include <stdint.h>
+
+enum { OPERATION_SET = 0, OPERATION_STEP = 1, OPERATION_GET = 2, OPERATION_CHANGE = 3 };
+
+/* ------------------------------------------------------------------------------------- the plan, as Python writes it */
+
+typedef struct {
+    uint64_t function;  /* address of fmi2SetReal, fmi2GetInteger, ... */
+    uint64_t component; /* address of the instance */
+    int64_t begin;      /* first of its entries */
+    int64_t count;      /* number of its entries */
+    int64_t is_real;
+} Channel;
+
+typedef struct {
+    uint64_t function; /* address of fmi2DoStep */
+    uint64_t component;
+} Instance;
+
+typedef struct {
+    int64_t place;  /* among the values; the outputs of a channel stand side by side */
+    int64_t age;    /* how many recorded points back to read; -1: the live value */
+    int64_t change; /* what events may do to it on the way; -1: nothing */
+    double scale;
+    double offset;
+} Entry;
+
+/* What an event makes of a value, while it is active; `place` is that of an output. */
+typedef struct {
+    int64_t active;
+    int64_t place;
+    int64_t is_real;
+    double scale;
+    double offset;
+    double slope;
+    double since;
+} Change;
+
+typedef struct {
+    int32_t kind;
+    int32_t index;  /* of the channel, instance or change */
+    int32_t period; /* it is due in every so manyth step, */
+    int32_t phase;  /* in those with this rest */
+    int32_t rank;   /* where it would stand if all were done one after the other */
+    int32_t unused;
+} Operation;
+
+/* ------------------------------------------------------------------------------------------------ the plan, as it runs */
+
+typedef enum { STEP, SET_REALS_IN_PLACE, SET_REALS, SET_INTEGERS, GET_REALS, GET_INTEGERS, CHANGE } Kind;
+
+/* One operation. */
+typedef struct {
+    void *component;
+    double *values;       /* where they are read or written in place */
+    const Entry *entries; /* where they are gathered from */
+    const Change *change;
+} Call;
+
+/* Calls of one kind, one after the other, of one function with the same value references. */
+typedef struct {
+    Kind kind;
+    uintptr_t function;
+    const unsigned int *references;
+    size_t count; /* of the references */
+    int32_t period;
+    int32_t phase;
+    int32_t rank; /* of the first call; they follow each other */
+    Call *begin;
+    Call *end;
+} Group;
+
+typedef struct {
+    Call *calls;
+    Group *groups;
+    size_t group_count;
+    size_t largest; /* channel, in values */
+    size_t *bounds; /* groups of each part: those of part n are from bounds[n] to bounds[n + 1] */
+    int thread_count;
+    double *values;
+    size_t value_count;
+    double *history; /* the last `depth` recorded points, a ring */
+    size_t depth;
+    size_t newest; /* the ring's newest row */
+    const Change *changes;
+} Plan;
+
+/* A thread with room for the values of the largest channel. */
+typedef struct {
+    const Plan *plan;
+    double *reals;
+    int *integers;
+} Hand;
+
+/* When a communication step is, and how far it got. */
+typedef struct {
+    long long number;
+    double time;
+    double step;
+    int is_due;     /* whether its row is to be written */
+    int64_t failed; /* operation, or -1 */
+    int32_t rank;   /* of the one that failed */
+    int status;
+} Advance;
+
+/* Which steps to take, and where their rows go. */
+typedef struct {
+    double start;
+    double step;
+    long long first; /* number of the first step */
+    long long count;
+    long long every;
+    long long last; /* number of the step that is recorded whatever `every` says */
+    size_t from;    /* operation with which the first step is taken up */
+    double *rows;
+    size_t capacity;
+} Block;
+
+/* How far a block got: steps done, rows written, the operation that failed or -1, and its status. */
+typedef struct {
+    long long done;
+    size_t written;
+    int64_t failed;
+    int status;
+    long long wait; /* steps to the next row that is due; counted, because to divide takes as long as a light FMU's step */
+} Outcome;
+
+
+
+/* Hidden, so that nothing of a name like one of theirs elsewhere in the process can stand in their place. */
+#ifdef __GNUC__
+#pragma GCC visibility push(hidden)
+#endif
+
+/* That of a block of which nothing is done. */
+Outcome outcome_of(const Block *block);
+
+/* One part of a communication step, from operation number `from` on. */
+void take_part(const Hand *hand, int part, size_t from, Advance *it);
+
+/* The block's next step; 0 if it is at its end, or has no room for the row that would be due. */
+int has_next(const Block *block, const Outcome *outcome, Advance *it);
+
+/* A step has been taken: remember its values, and write its row if it is due. */
+void finish_step(Plan *plan, const Block *block, const Advance *it, Outcome *outcome);
+
+Outcome take_block(Plan *plan, const Hand *hand, const Block *block);
+
+#if HAS_THREADS
+/* As `take_block`, by as many threads as the plan has parts for, and with a hand for each; 0 if they cannot be had. */
+int take_block_together(Plan *plan, const Hand *hands, const Block *block, Outcome *outcome);
+#endif
+
+#ifdef __GNUC__
+#pragma GCC visibility pop
+#endif
+
+#endif

@@ -1,0 +1,246 @@
+/* The step loop itself: calls of the FMUs' functions, group by group, and the rows they leave.
+
+   With the same arithmetic, in the same order, as `Exchange` and `Master` have it in Python, so that the two give the same
+   bits. */
+
+#include "kernel.h"
+
+#include <math.h>
+#include <string.h>
+
+typedef int (*DoStep)(void *component, double time, double step, int no_set_state);
+typedef int (*SetReal)(void *component, const unsigned int *references, size_t count, const double *values);
+typedef int (*GetReal)(void *component, const unsigned int *references, size_t count, double *values);
+typedef int (*SetInteger)(void *component, const unsigned int *references, size_t count, const int *values);
+typedef int (*GetInteger)(void *component, const unsigned int *references, size_t count, int *values);
+
+enum { WARNING = 1 }; /* the last status of the standard that is no failure */
+
+static int is_failure(int status)
+{
+    return status < 0 || status > WARNING;
+}
+
+static double changed(const Change *change, double value, double time)
+{
+    if (!change->active) {
+        return value;
+    }
+    value = change->scale * value + change->offset + change->slope * (time - change->since);
+    return change->is_real ? value : trunc(value);
+}
+
+static double read_entry(const Plan *plan, const Entry *entry, double time)
+{
+    const double *row = plan->values;
+    if (entry->age >= 0) {
+        size_t age = (size_t)entry->age;
+        row = plan->history + (plan->newest + (plan->newest < age ? plan->depth : 0) - age) * plan->value_count;
+    }
+    double value = row[entry->place];
+    if (entry->scale != 1.0 || entry->offset != 0.0) {
+        value = entry->scale * value + entry->offset;
+    }
+    return entry->change < 0 ? value : changed(&plan->changes[entry->change], value, time);
+}
+
+/* Each of these takes a group's calls; it returns the one that failed, or the end. A failure with a status that is none is
+   a value that is not finite. */
+
+static const Call *take_steps(const Group *group, double time, double step, int *status)
+{
+    DoStep do_step = (DoStep)group->function;
+    const Call *end = group->end;
+    for (const Call *call = group->begin; call < end; call++) {
+        int found = do_step(call->component, time, step, 1);
+        if (is_failure(found)) {
+            *status = found;
+            return call;
+        }
+    }
+    return end;
+}
+
+static const Call *set_reals_in_place(const Group *group, int *status)
+{
+    SetReal set = (SetReal)group->function;
+    const unsigned int *references = group->references;
+    size_t count = group->count;
+    const Call *end = group->end;
+    for (const Call *call = group->begin; call < end; call++) {
+        int found = set(call->component, references, count, call->values);
+        if (is_failure(found)) {
+            *status = found;
+            return call;
+        }
+    }
+    return end;
+}
+
+static const Call *set_reals(const Hand *hand, const Group *group, double time, int *status)
+{
+    SetReal set = (SetReal)group->function;
+    for (const Call *call = group->begin; call < group->end; call++) {
+        for (size_t k = 0; k < group->count; k++) {
+            hand->reals[k] = read_entry(hand->plan, &call->entries[k], time);
+        }
+        *status = set(call->component, group->references, group->count, hand->reals);
+        if (is_failure(*status)) {
+            return call;
+        }
+    }
+    return group->end;
+}
+
+static const Call *set_integers(const Hand *hand, const Group *group, double time, int *status)
+{
+    SetInteger set = (SetInteger)group->function;
+    for (const Call *call = group->begin; call < group->end; call++) {
+        for (size_t k = 0; k < group->count; k++) {
+            hand->integers[k] = (int)read_entry(hand->plan, &call->entries[k], time);
+        }
+        *status = set(call->component, group->references, group->count, hand->integers);
+        if (is_failure(*status)) {
+            return call;
+        }
+    }
+    return group->end;
+}
+
+static const Call *get_reals(const Group *group, int *status)
+{
+    GetReal get = (GetReal)group->function;
+    const unsigned int *references = group->references;
+    size_t count = group->count;
+    const Call *end = group->end;
+    for (const Call *call = group->begin; call < end; call++) {
+        int found = get(call->component, references, count, call->values);
+        int finite = 1;
+        for (size_t k = 0; k < count; k++) {
+            finite &= isfinite(call->values[k]) != 0;
+        }
+        if (is_failure(found) || !finite) {
+            *status = found;
+            return call;
+        }
+    }
+    return end;
+}
+
+static const Call *get_integers(const Hand *hand, const Group *group, int *status)
+{
+    GetInteger get = (GetInteger)group->function;
+    for (const Call *call = group->begin; call < group->end; call++) {
+        *status = get(call->component, group->references, group->count, hand->integers);
+        if (is_failure(*status)) {
+            return call;
+        }
+        for (size_t k = 0; k < group->count; k++) {
+            call->values[k] = (double)hand->integers[k];
+        }
+    }
+    return group->end;
+}
+
+static const Call *change_values(const Group *group, double time)
+{
+    for (const Call *call = group->begin; call < group->end; call++) {
+        *call->values = changed(call->change, *call->values, time);
+    }
+    return group->end;
+}
+
+static const Call *take_group(const Hand *hand, const Group *group, double time, double step, int *status)
+{
+    switch (group->kind) {
+    case STEP: return take_steps(group, time, (double)group->period * step, status);
+    case SET_REALS_IN_PLACE: return set_reals_in_place(group, status);
+    case SET_REALS: return set_reals(hand, group, time, status);
+    case SET_INTEGERS: return set_integers(hand, group, time, status);
+    case GET_REALS: return get_reals(group, status);
+    case GET_INTEGERS: return get_integers(hand, group, status);
+    default: return change_values(group, time + step);
+    }
+}
+
+void take_part(const Hand *hand, int part, size_t from, Advance *it)
+{
+    const Plan *plan = hand->plan;
+    const Group *end = plan->groups + plan->bounds[part + 1];
+    for (const Group *group = plan->groups + plan->bounds[part]; group < end; group++) {
+        if (group->period > 1 && it->number % group->period != group->phase) {
+            continue;
+        }
+        Group rest;
+        const Group *taken = group;
+        if (from > 0 && group->begin < plan->calls + from) { /* taken up again in the middle */
+            rest = *group;
+            rest.begin = plan->calls + from < rest.end ? plan->calls + from : rest.end;
+            taken = &rest;
+        }
+        const Call *call = take_group(hand, taken, it->time, it->step, &it->status);
+        if (call < group->end) {
+            it->failed = call - plan->calls;
+            it->rank = group->rank + (int32_t)(call - group->begin);
+            return;
+        }
+    }
+}
+
+static void remember(Plan *plan)
+{
+    if (plan->depth > 0) {
+        plan->newest = plan->newest + 1 < plan->depth ? plan->newest + 1 : 0;
+        memcpy(plan->history + plan->newest * plan->value_count, plan->values, plan->value_count * sizeof(double));
+    }
+}
+
+Outcome outcome_of(const Block *block)
+{
+    return (Outcome){.failed = -1, .wait = block->every - block->first % block->every};
+}
+
+int has_next(const Block *block, const Outcome *outcome, Advance *it)
+{
+    long long k = block->first + outcome->done;
+    int is_due = outcome->wait == 1 || k + 1 == block->last;
+    if (outcome->done == block->count || (is_due && outcome->written == block->capacity)) {
+        return 0;
+    }
+    it->number = k;
+    it->time = block->start + (double)k * block->step;
+    it->step = block->step;
+    it->is_due = is_due;
+    it->failed = -1;
+    return 1;
+}
+
+void finish_step(Plan *plan, const Block *block, const Advance *it, Outcome *outcome)
+{
+    outcome->done++;
+    outcome->wait = outcome->wait > 1 ? outcome->wait - 1 : block->every;
+    remember(plan);
+    if (it->is_due) {
+        double *row = block->rows + outcome->written * (plan->value_count + 1);
+        row[0] = block->start + (double)(it->number + 1) * block->step;
+        memcpy(row + 1, plan->values, plan->value_count * sizeof(double));
+        outcome->written++;
+    }
+}
+
+Outcome take_block(Plan *plan, const Hand *hand, const Block *block)
+{
+    Outcome outcome = outcome_of(block);
+    Advance it;
+    while (has_next(block, &outcome, &it)) {
+        take_part(hand, 0, outcome.done == 0 ? block->from : 0, &it);
+        if (it.failed >= 0) {
+            outcome.failed = it.failed;
+            outcome.status = it.status;
+            break;
+        }
+        finish_step(plan, block, &it, &outcome);
+    }
+    return outcome;
+}
+
