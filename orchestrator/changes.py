@@ -9,10 +9,11 @@ from dataclasses import dataclass
 from typing import Any
 
 from .draft import (
-    SIMULATION_KEYS,
+    OPTION_KEYS,
     Draft,
     Entry,
     Group,
+    Member,
     build_argument,
     is_plain,
     resolve_model,
@@ -20,7 +21,8 @@ from .draft import (
 )
 from .errors import ScenarioError, did_you_mean
 from .patterns import NAME, check_instance
-from .scenario_reader import check_count, place_of
+from .scenario_reader import check_count, flatten, place_of
+from .simulation_reader import SIMULATION_KEYS, set_tolerance
 from .toml_source import Source, parse_value
 
 _TARGET = re.compile(rf"({NAME})(?:\[([^\[\]]*)\])?(?:\.(.+))?", re.DOTALL)
@@ -61,7 +63,8 @@ def change(draft: Draft, key: str, entry: Entry, folder: str, problems: list[str
 
     Args:
         draft: what is changed.
-        key: `simulation.step`, `cruise.alpha`, `train[4].speed`, `cruise.component`, `train.build.carriages`, ...
+        key: `simulation.step`, `cruise.alpha`, `train[4].speed`, `cruise.component`, `train.build.carriages`,
+            `cruise.isolate`, ...
         entry: the new value.
         folder: what relative paths are relative to.
         problems: where problems go.
@@ -76,10 +79,27 @@ def change(draft: Draft, key: str, entry: Entry, folder: str, problems: list[str
 
 
 def _change_simulation(draft: Draft, key: str, entry: Entry) -> None:
+    word, _, signal = key.partition(".")
+    if word == "tolerances":
+        _change_tolerances(draft, signal, entry)
+        return
     if key not in SIMULATION_KEYS:
         near = did_you_mean(key, SIMULATION_KEYS) or f"; valid here: {', '.join(SIMULATION_KEYS)}"
         raise ScenarioError(f"unknown key 'simulation.{key}'{near}")
     draft.simulation[key] = entry
+
+
+def _change_tolerances(draft: Draft, signal: str, entry: Entry) -> None:
+    if signal:
+        set_tolerance(draft.simulation, signal, entry, draft.counts)
+    elif isinstance(entry.value, dict):
+        for keys, value in flatten(entry.value):
+            set_tolerance(draft.simulation, ".".join(keys), Entry(value, entry.origin, entry.place), draft.counts)
+    else:
+        raise ScenarioError(
+            f"is a table, not {shown(entry.value)}; "
+            "write simulation.tolerances.INSTANCE.VARIABLE = [relative, absolute]"
+        )
 
 
 def _change_instance(target: Target, entry: Entry, folder: str, problems: list[str]) -> None:
@@ -101,6 +121,8 @@ def _change_instance(target: Target, entry: Entry, folder: str, problems: list[s
             raise ScenarioError(
                 f"the instances of '{group.name}' are listed singly; there are only {len(group.members)}"
             )
+    elif word in OPTION_KEYS and not rest:
+        group.set_option(word, entry, target.index)
     elif word == "build" and rest:
         group.set_build(rest, build_argument(entry.value, folder), target.index)
     else:
@@ -144,7 +166,7 @@ def apply_settings(draft: Draft, settings: Sequence[str], problems: list[str], o
             example = "train[4].speed=10" if option == "--set" else "train.carriages=8"
             problems.append(entry.problem(f"is not of the form name=value, as in {option} {example}"))
             continue
-        if not is_plain(entry.value, tables=option == "--with"):
+        if not is_plain(entry.value, tables=option == "--with" or key.strip() == "simulation.tolerances"):
             entry = Entry(value.strip(), entry.origin)
         change(draft, key.strip() if option == "--set" else _build_key(key.strip()), entry, os.getcwd(), problems)
 
@@ -174,7 +196,7 @@ def apply_swaps(draft: Draft, swaps: Sequence[str], problems: list[str]) -> None
 
 
 def apply_step(draft: Draft, entry: Entry) -> float | None:
-    """Set the communication step, and every sample time in the scenario that equals the old one.
+    """Set the communication step, and every sample time and step of an instance's own that equals the old one.
 
     Returns:
         the old step, where it differs; the sample times that components have by default follow later.
@@ -185,10 +207,11 @@ def apply_step(draft: Draft, entry: Entry) -> float | None:
     if old == new or not isinstance(old, int | float) or not isinstance(new, int | float) or isinstance(new, bool):
         return None
     for group in draft.groups.values():
-        for start in (group.start, *(one.start for one in group.members.values())):
-            if "sample_time" in start:
-                known = start["sample_time"]
-                start["sample_time"] = Entry(_follow(known.value, old, new), known.origin, known.place)
+        parts: list[Group | Member] = [group, *group.members.values()]
+        for key, entries in [("sample_time", p.start) for p in parts] + [("step", p.options) for p in parts]:
+            if key in entries:
+                known = entries[key]
+                entries[key] = Entry(_follow(known.value, old, new), known.origin, known.place)
     return float(old)
 
 

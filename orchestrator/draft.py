@@ -9,18 +9,19 @@ from __future__ import annotations
 import math
 import os
 import re
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
 from .errors import ScenarioError, did_you_mean
 from .patterns import NAME, Rule, member
-from .system import ALGORITHMS, Instance
+from .system import Instance
 
 MAX_COUNT = 10_000
 RESERVED = frozenset(
-    {"simulation", "instances", "connections", "presets", "require", "metrics", "published", "figures"}
+    {"simulation", "instances", "connections", "events", "presets", "require", "metrics", "published", "figures"}
 )
-SIMULATION_KEYS = ("stop_time", "step", "start_time", "algorithm", "record", "seed", "order")
+OPTION_KEYS = ("step", "isolate", "step_timeout", "memory_limit")
 _PYTHON_CLASS = re.compile(rf"(.*\.py):({NAME})", re.DOTALL)
 
 
@@ -43,7 +44,8 @@ class Member:
 
     origin: str = ""
     model: str | None = None
-    swapped: bool = False
+    swapped: bool | None = None  # None: as the group
+    options: dict[str, Entry] = field(default_factory=dict)
     build: dict[str, Any] = field(default_factory=dict)
     start: dict[str, Entry] = field(default_factory=dict)
 
@@ -57,22 +59,30 @@ class Group:
     model: str = ""
     count: int | None = None
     swapped: bool = False
+    options: dict[str, Entry] = field(default_factory=dict)
     build: dict[str, Any] = field(default_factory=dict)
     start: dict[str, Entry] = field(default_factory=dict)
     members: dict[int, Member] = field(default_factory=dict)
 
     def swap(self, model: str, index: int | None = None) -> None:
         """Put another model in the place of all, or of one; connections, start values and build arguments stay."""
+        ones = list(self.members.values()) if index is None else [self.members.setdefault(index, Member())]
+        for one in ones:
+            was_swapped = self.swapped if one.swapped is None else one.swapped
+            one.swapped = was_swapped or model != (one.model or self.model)
+            one.model = None if index is None else model
+        if index is None:
+            self.swapped |= model != self.model
+            self.model = model
+
+    def set_option(self, name: str, entry: Entry, index: int | None = None) -> None:
+        """Give one of `OPTION_KEYS` to all, or to one."""
         if index is not None:
-            one = self.members.setdefault(index, Member())
-            one.swapped |= model != (one.model or self.model)
-            one.model = model
+            self.members.setdefault(index, Member()).options[name] = entry
             return
-        self.swapped |= model != self.model
-        self.model = model
+        self.options[name] = entry
         for one in self.members.values():
-            one.swapped |= one.model not in (None, model)
-            one.model = None
+            one.options.pop(name, None)
 
     def set_build(self, name: str, value: Any, index: int | None = None) -> None:
         """Give a build argument to all, or to one."""
@@ -177,7 +187,7 @@ def is_plain(value: Any, tables: bool = False) -> bool:
 
 
 def expand_group(group: Group, problems: list[str]) -> list[tuple[Instance, dict[str, str]]]:
-    """The instances of a group, each with the origin of its start values."""
+    """The instances of a group, each with the origins of its options and start values."""
     members: list[tuple[Instance, dict[str, str]]] = []
     total = 1 if group.count is None else group.count
     for entry_name, entry in group.start.items():
@@ -196,7 +206,8 @@ def expand_group(group: Group, problems: list[str]) -> list[tuple[Instance, dict
         for name, entry in one.start.items():
             _drop(start, name)
             start[name] = entry
-        model, swapped = one.model or group.model, one.swapped or group.swapped
+        options = {**group.options, **one.options}
+        model, swapped = one.model or group.model, group.swapped if one.swapped is None else one.swapped
         build = {**group.build, **one.build}
         if build and model.lower().endswith(".fmu"):  # what a swap left behind is nobody's mistake
             if not swapped:
@@ -211,11 +222,25 @@ def expand_group(group: Group, problems: list[str]) -> list[tuple[Instance, dict
             {name: entry.value for name, entry in start.items()},
             index,
             total,
-            swapped,
-            one.origin or group.origin,
+            **_options(options, problems),
+            swapped=swapped,
+            origin=one.origin or group.origin,
         )
-        members.append((instance, {f"{instance.name}.{name}": entry.origin for name, entry in start.items()}))
+        origins = {f"instances.{instance.name}.{key}": entry.origin for key, entry in options.items()}
+        origins |= {f"{instance.name}.{name}": entry.origin for name, entry in start.items()}
+        members.append((instance, origins))
     return members
+
+
+def _options(entries: dict[str, Entry], problems: list[str]) -> dict[str, Any]:
+    """The values of `OPTION_KEYS`, checked."""
+    values: dict[str, Any] = {}
+    for key, entry in entries.items():
+        if key == "isolate":
+            values[key] = truth(entry, problems)
+        else:
+            values[key] = positive(entry, problems, "MiB" if key == "memory_limit" else "s")
+    return values
 
 
 def _share(entry: Entry, k: int, index: int | None) -> Entry:
@@ -225,16 +250,52 @@ def _share(entry: Entry, k: int, index: int | None) -> Entry:
     return Entry(entry.value[k] if k < len(entry.value) else 0.0, entry.origin, entry.place)
 
 
-def number(entry: Entry, problems: list[str], default: float = 0.0) -> float:
-    """A finite number."""
+def number(
+    entry: Entry,
+    problems: list[str],
+    default: float = 0.0,
+    what: str = "a finite number",
+    fits: Callable[[float], bool] = math.isfinite,
+) -> float:
+    """A finite number that fits; `what` it has to be is said otherwise."""
     value = entry.value
     try:
-        if isinstance(value, int | float) and not isinstance(value, bool) and math.isfinite(value):
+        if isinstance(value, int | float) and not isinstance(value, bool) and math.isfinite(value) and fits(value):
             return float(value)
     except OverflowError:
         pass
-    problems.append(entry.problem(f"takes a finite number, not {shown(value)}"))
+    problems.append(entry.problem(f"takes {what}, not {shown(value)}"))
     return default
+
+
+def positive(entry: Entry, problems: list[str], unit: str = "s") -> float:
+    """A finite number greater than 0."""
+    return number(entry, problems, 1.0, f"a number greater than 0, in {unit}", lambda value: value > 0)
+
+
+def whole(entry: Entry, problems: list[str], fits: Callable[[int], bool], what: str, default: int = 1) -> int:
+    """A whole number that fits; `what` it has to be is said otherwise."""
+    value = entry.value
+    if isinstance(value, int) and not isinstance(value, bool) and fits(value):
+        return value
+    problems.append(entry.problem(f"takes {what}, not {shown(value)}"))
+    return default
+
+
+def truth(entry: Entry, problems: list[str]) -> bool:
+    """True or false."""
+    if not isinstance(entry.value, bool):
+        problems.append(entry.problem(f"takes true or false, not {shown(entry.value)}"))
+    return entry.value is True
+
+
+def choice(entry: Entry, problems: list[str], valid: Sequence[str], what: str) -> str:
+    """One of a few words; `what` they are called in the message."""
+    if entry.value in valid:
+        return str(entry.value)
+    near = did_you_mean(str(entry.value), valid) or f"; there are {', '.join(valid)}"
+    problems.append(entry.problem(f"there is no {what} {shown(entry.value)}{near}"))
+    return valid[0]
 
 
 def shown(value: Any) -> str:
@@ -253,55 +314,3 @@ def whole_multiple(value: float, step: float) -> bool:
     """Whether `value` is a whole number (at least 1) of steps, up to rounding."""
     steps = value / step
     return math.isfinite(steps) and round(steps) >= 1 and abs(steps - round(steps)) <= 1e-9 * steps + 1e-12
-
-
-def read_simulation(entries: dict[str, Entry], origin: str, problems: list[str]) -> dict[str, Any]:
-    """The values of `[simulation]`, checked; `order` is left as written."""
-    before = len(problems)
-    if "stop_time" not in entries:
-        problems.append(f"{origin}: simulation.stop_time is missing; say how long to run, in s: stop_time = 350.0")
-    values: dict[str, Any] = {
-        key: number(entries[key], problems, 1.0)
-        for key in ("stop_time", "step", "start_time", "record")
-        if key in entries
-    }
-    if "algorithm" in entries:
-        values["algorithm"] = algorithm = entries["algorithm"].value
-        if algorithm not in ALGORITHMS:
-            near = did_you_mean(str(algorithm), ALGORITHMS) or f"; there are {', '.join(ALGORITHMS)}"
-            problems.append(entries["algorithm"].problem(f"there is no algorithm {shown(algorithm)}{near}"))
-    if "seed" in entries:
-        values["seed"] = seed = entries["seed"].value
-        if isinstance(seed, bool) or not isinstance(seed, int) or not 0 <= seed < 2**63:
-            problems.append(entries["seed"].problem(f"takes a whole number from 0 to 2**63 - 1, not {shown(seed)}"))
-    if len(problems) == before:
-        problems += _grid(entries, values)
-    return values
-
-
-def _grid(entries: dict[str, Entry], values: dict[str, Any]) -> list[str]:
-    """What is wrong with the points in time."""
-    step, start, stop = values.get("step", 0.1), values.get("start_time", 0.0), values["stop_time"]
-    steps_of = f"steps of {step:.10g} s" + (f" ({entries['step'].origin})" if "step" in entries else "")
-    if step <= 0:
-        return [entries["step"].problem(f"the step must be greater than 0 s, not {step:g} s")]
-    if stop <= start:
-        return [entries["stop_time"].problem(f"the stop time, {stop:g} s, must be later than the start, {start:g} s")]
-    problems = []
-    if not whole_multiple(stop - start, step):
-        steps = max(1, math.floor((stop - start) / step)) if math.isfinite((stop - start) / step) else 1
-        near = " or ".join(f"{start + k * step:.10g} s" for k in (steps, steps + 1))
-        problems.append(
-            entries["stop_time"].problem(
-                f"{stop - start:.10g} s is not a whole number of {steps_of}; change the step, or stop at {near}"
-            )
-        )
-    record = values.get("record")
-    if record is not None and not whole_multiple(record, step):
-        fitting = max(1, round(record / step)) * step if 0 < record / step < 1e15 else step
-        problems.append(
-            entries["record"].problem(
-                f"{record:.10g} s is not a whole number of {steps_of}; take {fitting:.10g} s (simulation.record)"
-            )
-        )
-    return problems

@@ -14,8 +14,9 @@ from .errors import ScenarioError, did_you_mean
 from .system import Connection
 
 NAME = r"[A-Za-z_][A-Za-z0-9_]*"
-_ENDPOINT = re.compile(rf"\s*({NAME})\s*(?:\[([^\[\]]*)\])?\s*\.\s*(\S.*?)\s*", re.DOTALL)
-_INDEX = re.compile(r"\s*(?:(\d{1,9})|i\s*(?:([+-])\s*(\d{1,9}))?)\s*")
+# Blanks are taken possessively: a key of nothing but blanks would otherwise be tried in every possible division.
+_ENDPOINT = re.compile(rf"({NAME})\s*+(?:\[([^\[\]]*)\]\s*+)?\.\s*+(.+)", re.DOTALL)
+_INDEX = re.compile(r"\s*+(?:(\d{1,9})|i\s*+(?:([+-])\s*+(\d{1,9}))?)\s*+")
 _BRACKETS = re.compile(r"\[([^\[\]]*)\]")
 _ELEMENT = re.compile(r"(.*)\[\d+(?:,\d+)*\]", re.DOTALL)
 
@@ -79,6 +80,30 @@ class Endpoint:
 
 
 @dataclass(frozen=True)
+class Signal:
+    """A signal of one instance or of all of a name; `index` is None for all, and where there is no count."""
+
+    instance: str
+    index: int | None
+    variable: str
+
+    def names(self, counts: Counts) -> list[str]:
+        """The full names: `cruise[1].speed`, `cruise[2].speed`, ..."""
+        count = counts[self.instance]
+        if self.index is None and count is not None:
+            return [f"{member(self.instance, k + 1)}.{self.variable}" for k in range(count)]
+        return [f"{member(self.instance, self.index)}.{self.variable}"]
+
+    def covers(self, other: Signal) -> bool:
+        """Whether it stands for all that the other stands for: all instances for one, an array for its elements."""
+        return (
+            self.instance == other.instance
+            and self.index in (None, other.index)
+            and (other.variable == self.variable or other.variable.startswith(f"{self.variable}["))
+        )
+
+
+@dataclass(frozen=True)
 class Rule:
     """One line of `[connections]`: a target, a source, and the options of the connections it makes."""
 
@@ -103,13 +128,39 @@ def read_endpoint(text: str, counts: Counts) -> Endpoint:
     Raises:
         ScenarioError: it is something else, or there is no such instance (with the nearest one).
     """
-    match = _ENDPOINT.fullmatch(text)
+    match = _ENDPOINT.fullmatch(text.strip())
     if not match:
         near = did_you_mean(text, counts.keys() - {text}) or f"; instances are {', '.join(counts) or 'none yet'}"
         raise ScenarioError(f"'{text}' is not of the form instance.variable, as in train[i].position{near}")
     instance, index, variable = match.groups()
     read = check_instance(instance, index, counts)
     return Endpoint(text, instance, read, _elements(variable))
+
+
+def read_signal(text: str, counts: Counts) -> Signal:
+    """Read `instance.variable` where `i` means nothing: the bare name of instances that have a count means all.
+
+    Raises:
+        ScenarioError: it is something else, or there is no such instance (with the nearest one).
+    """
+    match = _ENDPOINT.fullmatch(text.strip())
+    if not match:
+        near = did_you_mean(text, counts.keys() - {text}) or f"; instances are {', '.join(counts) or 'none yet'}"
+        raise ScenarioError(f"'{text}' is not of the form instance.variable, as in train[4].speed or train.speed{near}")
+    instance, index, variable = match.groups()
+    parts = _elements(variable)
+    if any(isinstance(part, Index) for part in parts):
+        whole = f"{match.string[: match.start(3)].strip()}{_BRACKETS.sub('', variable)}"
+        raise ScenarioError(f"'{text}': i has no meaning here; write {whole} for the whole array or {whole}[1] for one")
+    name = "".join(map(str, parts))
+    read = None
+    if instance not in counts or index is not None:
+        number = Index.read(index or "")
+        if counts.get(instance) and (number is None or number.free):
+            why = "an index is a number here" if number is None else "i has no meaning here"
+            raise ScenarioError(f"'{text}': {why}; write {instance}.{name} for all or {instance}[1].{name} for one")
+        read = check_instance(instance, index, counts)
+    return Signal(instance, read.offset if read else None, name)
 
 
 def check_instance(instance: str, index: str | None, counts: Counts) -> Index | None:

@@ -1,7 +1,8 @@
 """Scenarios: TOML -> `System`. The format is described in `docs/scenarios.md`.
 
-`toml_source` reads the text, `scenario_reader` makes a draft of it, `changes` applies presets and options, and here
-the draft becomes a `System`. Everything that is wrong with a scenario is told at once, as one `ScenarioError`.
+`toml_source` reads the text, `scenario_reader` makes a draft of it (`simulation_reader` and `event_reader` know their
+sections), `changes` applies presets and options, and here the draft becomes a `System`. Everything that is wrong with a
+scenario is told at once, as one `ScenarioError`.
 """
 
 from __future__ import annotations
@@ -9,6 +10,7 @@ from __future__ import annotations
 import copy
 import os
 import tomllib
+from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -17,11 +19,13 @@ from typing import Any
 from railcosim import models
 
 from .changes import apply_preset, apply_settings, apply_step, apply_swaps
-from .draft import Draft, Entry, expand_group, read_simulation
+from .draft import Draft, Entry, expand_group
 from .errors import ScenarioError, did_you_mean
+from .event_reader import expand_events, read_events
 from .patterns import connect
 from .scenario_reader import Reader
 from .scenario_writer import dump
+from .simulation_reader import TOLERANCES, read_simulation, spread_tolerances
 from .system import Instance, System
 from .toml_source import Source, parse_value
 
@@ -174,6 +178,7 @@ class _Scenario:
             self.reader.problem(both, "default_preset")
         self.names = tuple(dict.fromkeys([*([self.default] if self.default else []), *presets]))
         self.preset: str | None = self.default
+        self.events = read_events(self.reader)
         self.metrics = self.reader.texts("metrics")
         self.requirements = self.reader.texts("require")
         self.published = self.reader.published(self.metrics, self.names)
@@ -216,6 +221,12 @@ class _Scenario:
                 instances[instance.name] = instance
                 origins |= {instance.name: instance.origin, **starts}
         connections = connect(draft.rules, draft.counts, problems)
+        events = expand_events(self.events, draft.counts, problems)
+        if "tolerances" in simulation:
+            keys = spread_tolerances(draft.simulation, draft.counts, problems)
+            written = simulation["tolerances"]
+            simulation["tolerances"] = {name: list(written[key.removeprefix(TOLERANCES)]) for name, key in keys.items()}
+            origins |= {f"simulation.tolerances.{name}": draft.simulation[key].origin for name, key in keys.items()}
         if "order" in draft.simulation:
             simulation["order"] = _order(draft.simulation["order"], draft, list(instances), problems)
         if problems:
@@ -226,6 +237,7 @@ class _Scenario:
             source=data.get("source", ""),
             description=data.get("description", ""),
             **simulation,
+            events=events,
             instances=instances,
             connections=connections,
             requirements=dict(self.requirements),
@@ -245,7 +257,7 @@ class _Scenario:
         origins: dict[str, str] = {}
         for section, texts in (("require", self.requirements), ("metrics", self.metrics)):
             origins |= {f"{section}.{name}": self.source.origin(section, name) for name in texts}
-        for section, entries in (("published", self.published), ("figures", self.figures)):
+        for section, entries in (("events", self.events), ("published", self.published), ("figures", self.figures)):
             origins |= {f"{section}[{k + 1}]": self.source.origin(section, k) for k in range(len(entries))}
         return origins
 
@@ -262,10 +274,11 @@ def _order(entry: Entry, draft: Draft, names: Sequence[str], problems: list[str]
             near = did_you_mean(name, [*names, *draft.counts]) or f"; instances are {', '.join(draft.counts)}"
             problems.append(entry.problem(f"there is no instance '{name}'{near}"))
         order += [f"{name}[{k + 1}]" for k in range(count)] if count is not None else [name]
-    twice = next((name for name in order if order.count(name) > 1), None)
+    stands = Counter(order)
+    twice = next((name for name, times in stands.items() if times > 1), None)
     if twice:
         problems.append(entry.problem(f"'{twice}' stands there twice; each instance steps once"))
-    missing = [name for name in names if name not in order]
+    missing = [name for name in names if name not in stands]
     if order and missing:
         problems.append(entry.problem(f"lacks {', '.join(missing)}; name every instance, or leave order out"))
     return order

@@ -9,8 +9,8 @@ from typing import Any
 
 from .draft import (
     MAX_COUNT,
+    OPTION_KEYS,
     RESERVED,
-    SIMULATION_KEYS,
     Draft,
     Entry,
     Group,
@@ -20,6 +20,7 @@ from .draft import (
     number,
     resolve_model,
     shown,
+    truth,
 )
 from .errors import ExpressionError, ScenarioError, did_you_mean
 from .expressions import parse
@@ -29,6 +30,7 @@ from .plots import PANEL_KEYS
 from .published import KEYS as PUBLISHED_KEYS
 from .published import check_published
 from .requirements import parse_requirement
+from .simulation_reader import SIMULATION_KEYS, TOLERANCES
 from .system import Connection
 from .toml_source import Source
 
@@ -38,13 +40,14 @@ TOP_KEYS = (
     "simulation",
     "instances",
     "connections",
+    "events",
     "presets",
     "require",
     "metrics",
     "published",
     "figures",
 )
-INSTANCE_KEYS = ("component", "fmu", "count", "build", "start")
+INSTANCE_KEYS = ("component", "fmu", "count", *OPTION_KEYS, "swapped", "build", "start")
 CONNECTION_KEYS = ("from", "delay", "scale", "offset")
 _MEMBER = re.compile(rf"({NAME})\[(\d{{1,9}})\]")
 
@@ -61,15 +64,11 @@ class Reader:
     def read(self) -> Draft:
         """The draft; what is wrong with the file stands in `problems` afterwards."""
         data = self.source.data
-        self._keys(data, TOP_KEYS)
+        self.check_keys(data, TOP_KEYS)
         for key in TEXT_KEYS:
             if key in data and (not isinstance(data[key], str) or (key == "default_preset" and not data[key])):
                 self.problem(f"takes a text, not {shown(data[key])}", key)
-        simulation = self.table(data, "simulation")
-        self._keys(simulation, SIMULATION_KEYS, "simulation")
-        self.draft.simulation = {
-            key: self.entry(value, "simulation", key) for key, value in simulation.items() if key in SIMULATION_KEYS
-        }
+        self._simulation(self.table(data, "simulation"))
         self._instances(self.table(data, "instances"))
         self._connections(self.table(data, "connections"))
         return self.draft
@@ -111,7 +110,7 @@ class Reader:
         return found
 
     def tables(self, section: str) -> list[dict[str, Any]]:
-        """The tables of `[[published]]` or `[[figures]]`."""
+        """The tables of `[[events]]`, `[[published]]` or `[[figures]]`."""
         found = self.source.data.get(section, [])
         if isinstance(found, list) and all(isinstance(entry, dict) for entry in found):
             return found
@@ -123,7 +122,7 @@ class Reader:
         found = self.tables("published")
         strange: set[Any] = set()  # a preset that is misspelt at the top would otherwise be told for every entry
         for k, entry in enumerate(found):
-            self._keys(entry, PUBLISHED_KEYS, "published", k)
+            self.check_keys(entry, PUBLISHED_KEYS, "published", k)
             known = {key: value for key, value in entry.items() if key in PUBLISHED_KEYS}
             preset = known.get("preset")
             if isinstance(preset, str) and preset not in presets:
@@ -142,6 +141,8 @@ class Reader:
         found = self.tables("figures")
         for k, figure in enumerate(found):
             self._panel(figure, (*PANEL_KEYS, "panels"), "figures", k)
+            if not is_plain(figure, tables=True):
+                self.problem("takes numbers, texts, true or false, lists and tables of these; no dates", "figures", k)
             panels = figure.get("panels", [])
             for j, panel in enumerate(panels if isinstance(panels, list) else []):
                 if isinstance(panel, dict):
@@ -149,7 +150,7 @@ class Reader:
         return found
 
     def _panel(self, panel: Mapping[str, Any], valid: Collection[str], *path: str | int) -> None:
-        self._keys(panel, valid, *path)
+        self.check_keys(panel, valid, *path)
         texts = panel.get("y", [])
         for text in texts if isinstance(texts, list) else [texts]:
             if isinstance(text, str):
@@ -164,27 +165,40 @@ class Reader:
             for problem in error.problems:
                 self.problem(problem, *path)
 
-    def _keys(self, table: Mapping[str, Any], valid: Collection[str], *path: str | int) -> None:
+    def check_keys(self, table: Mapping[str, Any], valid: Collection[str], *path: str | int) -> None:
+        """Note every key that does not belong there."""
         for key in table:
             if key not in valid:
                 near = did_you_mean(key, valid) or f"; valid here: {', '.join(valid)}"
                 self.problem(f"unknown key '{key}'{near}", *path, key)
 
-    # ---------------------------------------------------------------- instances
+    # ---------------------------------------------------------------- times, instances
+
+    def _simulation(self, table: Mapping[str, Any]) -> None:
+        self.check_keys(table, SIMULATION_KEYS, "simulation")
+        draft = self.draft.simulation
+        for key, value in table.items():
+            if key in SIMULATION_KEYS and key != "tolerances":
+                draft[key] = self.entry(value, "simulation", key)
+        for keys, value in flatten(self.table(table, "tolerances", "simulation")):
+            draft[TOLERANCES + ".".join(keys)] = self.entry(value, "simulation", "tolerances", *keys)
 
     def _instances(self, tables: Mapping[str, Any]) -> None:
         if not tables and "instances" not in self.source.data:
             self.problems.append(f"{self.source.label}: there are no instances; begin one with [instances.NAME]")
         singles: dict[str, dict[int, dict[str, Any]]] = {}
+        written: dict[str, None] = {}
         for name in tables:
             table = self.table(tables, name, "instances")
             match = _MEMBER.fullmatch(name)
+            written[match[1] if match else name] = None
             if match:
                 singles.setdefault(match[1], {})[int(match[2])] = table
             elif self._name(name, "instances", name):
                 self.draft.groups[name] = self._group(name, table)
         for name, members in singles.items():
             self._members(name, members)
+        self.draft.groups = {name: self.draft.groups[name] for name in written if name in self.draft.groups}
 
     def _name(self, name: str, *path: str | int) -> bool:
         if re.fullmatch(NAME, name) and name not in RESERVED and not keyword.iskeyword(name):
@@ -199,13 +213,15 @@ class Reader:
 
     def _group(self, name: str, table: Mapping[str, Any]) -> Group:
         path = ("instances", name)
-        self._keys(table, INSTANCE_KEYS, *path)
+        self.check_keys(table, INSTANCE_KEYS, *path)
         group = Group(name, self.source.origin(*path))
         if "component" not in table and "fmu" not in table:
             self.problem("says neither component = ... nor fmu = ...; name the model", *path)
         group.model = self._model(table, *path) or ""
         if "count" in table:
             group.count = check_count(self.entry(table["count"], *path, "count"), self.problems)
+        group.swapped = self._swapped(table, *path) or False
+        group.options = self._options_of(table, *path)
         group.build = self._build(table, *path)
         group.start = self._start(table, *path)
         return group
@@ -225,7 +241,7 @@ class Reader:
             self.draft.groups[name] = group
         for k, table in tables.items():
             path = ("instances", f"{name}[{k}]")
-            self._keys(table, [key for key in INSTANCE_KEYS if key != "count"], *path)
+            self.check_keys(table, [key for key in INSTANCE_KEYS if key != "count"], *path)
             if group.count is None or not 1 <= k <= group.count:
                 there = "no count" if group.count is None else f"a count of {group.count}"
                 self.problem(f"'{name}' has {there}, so there is no {name}[{k}]", *path)
@@ -233,8 +249,14 @@ class Reader:
             model = self._model(table, *path)
             if not group.model and not ("component" in table or "fmu" in table):
                 self.problem("says neither component = ... nor fmu = ...; name the model", *path)
-            origin = self.source.origin(*path)
-            group.members[k] = Member(origin, model, build=self._build(table, *path), start=self._start(table, *path))
+            group.members[k] = Member(
+                self.source.origin(*path),
+                model,
+                self._swapped(table, *path),
+                self._options_of(table, *path),
+                self._build(table, *path),
+                self._start(table, *path),
+            )
 
     def _model(self, table: Mapping[str, Any], *path: str) -> str | None:
         kinds = [kind for kind in ("component", "fmu") if kind in table]
@@ -247,6 +269,12 @@ class Reader:
         except ScenarioError as error:
             self.problem(str(error), *path, kinds[0])
             return None
+
+    def _swapped(self, table: Mapping[str, Any], *path: str) -> bool | None:
+        return truth(self.entry(table["swapped"], *path, "swapped"), self.problems) if "swapped" in table else None
+
+    def _options_of(self, table: Mapping[str, Any], *path: str) -> dict[str, Entry]:
+        return {key: self.entry(table[key], *path, key) for key in OPTION_KEYS if key in table}
 
     def _build(self, table: Mapping[str, Any], *path: str) -> dict[str, Any]:
         build = {}
@@ -305,7 +333,7 @@ class Reader:
         if isinstance(value, str):
             made.source = value
             return made
-        self._keys(value, CONNECTION_KEYS, *path)
+        self.check_keys(value, CONNECTION_KEYS, *path)
         if not isinstance(value.get("from"), str):
             self.problem('names no source; write { from = "instance.output", ... }', *path)
         else:

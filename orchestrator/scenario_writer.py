@@ -9,6 +9,9 @@ from typing import Any
 
 import numpy as np
 
+from .draft import OPTION_KEYS
+from .event_reader import EVENT_KEYS
+from .simulation_reader import SIMULATION_KEYS
 from .system import Connection, Instance, System
 
 
@@ -31,6 +34,10 @@ def _lines(system: System) -> Iterator[str]:
     keys = ("start_time", "stop_time", "step", "algorithm", "record", "seed")
     yield from _assignments({key: getattr(system, key) for key in keys})
     yield from _assignments({"order": system.order or None})
+    others = [key for key in SIMULATION_KEYS if key not in (*keys, "order", "tolerances")]
+    yield from _assignments({key: value for key in others if (value := getattr(system, key)) != getattr(System, key)})
+    if system.tolerances:
+        yield from ("", "[simulation.tolerances]", *_assignments(system.tolerances))
     yield from () if system.instances else ("", "[instances]")
     for instance in system.instances.values():
         yield from _instance(instance)
@@ -42,6 +49,8 @@ def _lines(system: System) -> Iterator[str]:
     ):
         if table:
             yield from ("", f"[{section}]", *_assignments(table))
+    for event in system.events:
+        yield from ("", "[[events]]", *_assignments({key: getattr(event, key) for key in EVENT_KEYS}))
     owed = [] if system.modified else [entry for entry in system.published if _applies(entry, system)]
     for section, tables in (("published", owed), ("figures", system.figures)):
         for entry in tables:
@@ -59,6 +68,8 @@ def _applies(entry: Mapping[str, Any], system: System) -> bool:
 def _instance(instance: Instance) -> Iterator[str]:
     yield from ("", f"[instances.{_key(instance.name)}]")
     yield f"{'fmu' if instance.model.lower().endswith('.fmu') else 'component'} = {_value(instance.model)}"
+    keys = (*OPTION_KEYS, "swapped")
+    yield from _assignments({key: value for key in keys if (value := getattr(instance, key)) != getattr(Instance, key)})
     yield from _assignments({"build": instance.build or None})
     yield from (f"start.{line}" for line in _assignments(instance.start))
 

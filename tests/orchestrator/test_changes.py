@@ -214,6 +214,31 @@ def test_values_are_toml_or_the_text_as_it_is(text, value):
     assert loads(EXAMPLE, settings=[f"train.x={text}"]).instances["train[1]"].start["x"] == value
 
 
+def test_how_an_instance_steps_and_runs():
+    changes = ["cruise.step=1.0", "cruise[2].step=2", "train.isolate=true", "train[1].isolate=false"]
+    system = loads(EXAMPLE, settings=[*changes, "target.step_timeout=3", "target.memory_limit=100"])
+    assert [one.step for one in system.instances.values()] == [None, None, 1.0, 2.0, None]
+    assert [one.isolate for one in system.instances.values()] == [False, True, False, False, False]
+    assert (system.instances["target"].step_timeout, system.instances["target"].memory_limit) == (3.0, 100.0)
+    assert system.origins["instances.cruise[2].step"] == "--set cruise[2].step=2"
+    assert system.modified
+    text = EXAMPLE.replace('"cruise.alpha" = 0.01', '"cruise.step" = 1.0\ncruise.isolate = true')
+    gentle = loads(text, "two.toml", preset="gentle").instances["cruise[1]"]
+    assert (gentle.step, gentle.isolate, gentle.start.keys()) == (1.0, True, {"alpha", "has_ahead", "sample_time"})
+    assert problems(EXAMPLE, settings=["cruise.step=[1, 2]", "train[2].isolate=1"]) == [
+        "--set train[2].isolate=1: takes true or false, not 1",
+        "--set cruise.step=[1, 2]: takes a number greater than 0, in s, not [1, 2]",
+    ]
+
+
+def test_a_variable_that_is_called_like_an_option_is_reached_through_start():
+    system = loads(EXAMPLE, settings=["cruise.start.step=1.0", "train[2].start.isolate=7", "target.step.size=3"])
+    assert all(one.step is None and not one.isolate for one in system.instances.values())
+    assert start(system, "step") == {"cruise[1]": 1.0, "cruise[2]": 1.0}
+    assert start(system, "isolate") == {"train[2]": 7}
+    assert start(system, "step.size") == {"target": 3}
+
+
 def test_a_profile_may_be_a_table():
     text = edited(('"target.build.points" = 1', '"target.build" = { points = 1, profile = { a = [1, 2] } }'))
     assert loads(text, preset="mixed").instances["target"].build == {"points": 1, "profile": {"a": [1, 2]}}

@@ -606,20 +606,29 @@ def test_the_compiler_has_nothing_to_say(tmp_path, flags):
     compile_kernel(tmp_path / "kernel.so", *flags)
 
 
+SANITIZERS = {
+    ("address", "undefined"): (
+        "not sanitized and not compiler and not ctrl_c and not without_the_extension and not short_in_time"
+    ),
+    ("thread",): "threads_give or several_threads",
+}
+"""Which of this file's tests run under which sanitizers."""
+
+
 @pytest.mark.long
-def test_sanitized(tmp_path):
-    """This file's tests under the address and undefined-behaviour sanitizers, the FMU by hand included."""
-    library = compile_kernel(
-        tmp_path / "kernel.so", "-g", "-O1", "-fsanitize=address,undefined", "-fno-sanitize-recover"
-    )
+@pytest.mark.parametrize("sanitizers", SANITIZERS, ids="+".join)
+def test_sanitized(tmp_path, sanitizers):
+    """This file's tests under the compiler's sanitizers, the FMU by hand included."""
+    flags = "-g", "-O1", f"-fsanitize={','.join(sanitizers)}", "-fno-sanitize-recover"
+    library = compile_kernel(tmp_path / "kernel.so", *flags)
     (tmp_path / "sanitized.py").write_text(SANITIZED)
     preload = [
         subprocess.run(
             [GCC, f"-print-file-name=lib{name}.so"], check=True, capture_output=True, text=True
         ).stdout.strip()
-        for name in ("asan", "ubsan")
+        for name in (f"{sanitizer[0] if sanitizer != 'undefined' else 'ub'}san" for sanitizer in sanitizers)
     ]
-    chosen = "not sanitized and not compiler and not ctrl_c and not without_the_extension and not short_in_time"
+    chosen = SANITIZERS[sanitizers]
     command = [sys.executable, "-m", "pytest", "-p", "sanitized", "-p", "no:cacheprovider", "-n", "0", "-k", chosen]
     environment = os.environ | {
         "KERNEL": str(library),
@@ -639,6 +648,7 @@ def test_sanitized(tmp_path):
     )
     assert done.returncode == 0, done.stdout[-3000:] + done.stderr[-3000:]
     assert "passed" in done.stdout
+    assert "WARNING: ThreadSanitizer" not in done.stderr + done.stdout
     assert "runtime error" not in done.stderr + done.stdout
 
 

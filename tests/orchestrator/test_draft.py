@@ -8,11 +8,16 @@ from hypothesis import strategies as st
 from railcosim.orchestrator.draft import (
     Entry,
     Group,
+    Member,
     build_argument,
+    choice,
     expand_group,
     number,
+    positive,
     resolve_model,
     shown,
+    truth,
+    whole,
     whole_multiple,
 )
 from railcosim.orchestrator.errors import ScenarioError
@@ -100,6 +105,73 @@ def test_what_is_not_a_number_is_shown_as_written(value, text):
     assert number(Entry(value, "x.toml:3", "a.b"), problems, 7.0) == 7.0
     assert problems == [f"x.toml:3: a.b: takes a finite number, not {text}"]
     assert shown(value) == text
+
+
+@pytest.mark.parametrize(
+    ("read", "value", "result", "message"),
+    [
+        (positive, 2, 2.0, None),
+        (positive, 0, 1.0, "takes a number greater than 0, in s, not 0"),
+        (positive, True, 1.0, "takes a number greater than 0, in s, not true"),
+        (truth, False, False, None),
+        (truth, 1, False, "takes true or false, not 1"),
+        (lambda *of: whole(*of, lambda n: n > 3, "four or more"), 4, 4, None),
+        (lambda *of: whole(*of, lambda n: n > 3, "four or more"), 3, 1, "takes four or more, not 3"),
+        (lambda *of: whole(*of, lambda n: n > 0, "one or more"), True, 1, "takes one or more, not true"),
+        (lambda *of: choice(*of, ("red", "green"), "colour"), "green", "green", None),
+        (lambda *of: choice(*of, ("red", "green"), "colour"), "gren", "red", "there is no colour 'gren'; did you mean"),
+        (
+            lambda *of: choice(*of, ("red", "green"), "colour"),
+            [1],
+            "red",
+            "there is no colour [1]; there are red, green",
+        ),
+    ],
+)
+def test_other_values(read, value, result, message):
+    problems = []
+    assert read(Entry(value, "x.toml:3", "a.b"), problems) == result
+    assert len(problems) == (message is not None)
+    assert not problems or problems[0].startswith(f"x.toml:3: a.b: {message}")
+
+
+def swapped(group):
+    return [(instance.model, instance.swapped) for instance, _ in expand_group(group, [])]
+
+
+def test_a_swap_makes_those_swapped_whose_model_it_changes():
+    group = Group("a", "x.toml:1", "A", count=3, members={2: Member(model="B")})
+    assert swapped(group) == [("A", False), ("B", False), ("A", False)]
+    group.swap("B")
+    assert swapped(group) == [("B", True), ("B", False), ("B", True)]
+    group.swap("A", 2)
+    group.swap("A", 2)  # once swapped is swapped
+    assert swapped(group) == [("B", True), ("A", True), ("B", True)]
+    group.swap("B")
+    assert swapped(group) == [("B", True)] * 3
+
+
+def test_one_may_be_swapped_where_the_others_are_not_and_the_other_way_round():
+    group = Group("a", "x.toml:1", "A", count=2, swapped=True, members={2: Member(swapped=False)})
+    assert swapped(group) == [("A", True), ("A", False)]
+    group.swap("A")
+    assert swapped(group) == [("A", True), ("A", False)]
+
+
+def test_options_of_a_group_are_meant_for_all_that_have_none_of_their_own():
+    group = Group("a", "x.toml:1", "A", count=2, options={"step": Entry(1, "x.toml:2"), "isolate": Entry(True, "")})
+    group.members[2] = Member(options={"isolate": Entry(False, "x.toml:5"), "memory_limit": Entry(64, "x.toml:6")})
+    (one, _), (two, origins) = expand_group(group, [])
+    assert (one.step, one.isolate, one.step_timeout, one.memory_limit) == (1.0, True, None, None)
+    assert (two.step, two.isolate, two.step_timeout, two.memory_limit) == (1.0, False, None, 64.0)
+    assert origins == {
+        "instances.a[2].step": "x.toml:2",
+        "instances.a[2].isolate": "x.toml:5",
+        "instances.a[2].memory_limit": "x.toml:6",
+    }
+    group.set_option("isolate", Entry(True, "--set"))
+    group.set_option("step", Entry(3, "--set"), 1)
+    assert [(i.step, i.isolate) for i, _ in expand_group(group, [])] == [(3.0, True), (1.0, True)]
 
 
 def test_a_group_without_a_count_keeps_lists_whole():

@@ -1,10 +1,12 @@
 """Index patterns of connections; every message read."""
 
+from contextlib import suppress
+
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 from railcosim.orchestrator.errors import ScenarioError
-from railcosim.orchestrator.patterns import Index, Rule, connect, expand, read_endpoint
+from railcosim.orchestrator.patterns import Index, Rule, Signal, connect, expand, read_endpoint, read_signal
 from railcosim.orchestrator.system import Connection
 
 COUNTS = {"train": 4, "cruise": 4, "consist": 2, "gust": None, "observer": None, "target": None}
@@ -104,6 +106,13 @@ def test_messages(target, source, message):
     assert str(caught.value) == message
 
 
+@pytest.mark.parametrize("text", ["gust.a{}x", "gust{}x", "train[i{}x].a"])
+def test_a_key_of_blanks_is_read_or_refused_at_once(text):
+    """Tried in every possible division, the blanks would take minutes."""
+    with suppress(ScenarioError):
+        read_endpoint(text.format(" " * 200_000), COUNTS)
+
+
 def test_what_is_written_without_i_beats_a_pattern_wherever_it_stands():
     for rules in (
         [rule("cruise[i].x", "train[i].x"), rule("cruise[2].x", "gust.a", delay=3)],
@@ -155,3 +164,65 @@ def test_conflicts(rules, message):
     problems = []
     connect([rule(*ends, line) for line, ends in enumerate(rules, 1)], COUNTS, problems)
     assert problems == [message]
+
+
+# -------------------------------------------------------------------- signals
+
+
+@pytest.mark.parametrize(
+    ("text", "signal", "names"),
+    [
+        ("gust.size", Signal("gust", None, "size"), ["gust.size"]),
+        ("consist.force", Signal("consist", None, "force"), ["consist[1].force", "consist[2].force"]),
+        (" consist [ 2 ] .force[ 1 , 2 ] ", Signal("consist", 2, "force[1,2]"), ["consist[2].force[1,2]"]),
+        ("gust.der(x[1]).y", Signal("gust", None, "der(x[1]).y"), ["gust.der(x[1]).y"]),
+    ],
+)
+def test_signals_of_one_and_of_all(text, signal, names):
+    assert read_signal(text, COUNTS) == signal
+    assert signal.names(COUNTS) == names
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        ("tran.x", "there is no instance 'tran'; did you mean 'train'?"),
+        ("tran[2].x", "there is no instance 'tran'; did you mean 'train'?"),
+        ("train[9].x", "there is no 'train[9]'; there are train[1] to train[4]"),
+        ("gust[1].x", "'gust' has no count: write gust without [1]"),
+        ("gust[i].x", "'gust' has no count: write gust without [i]"),
+        ("train[i].x", "'train[i].x': i has no meaning here; write train.x for all or train[1].x for one"),
+        ("train[i-1].x", "'train[i-1].x': i has no meaning here; write train.x for all or train[1].x for one"),
+        ("train[:].x", "'train[:].x': an index is a number here; write train.x for all or train[1].x for one"),
+        (
+            "train[2].x[i]",
+            "'train[2].x[i]': i has no meaning here; write train[2].x for the whole array or train[2].x[1] for one",
+        ),
+        (
+            "train",
+            "'train' is not of the form instance.variable, as in train[4].speed or train.speed; "
+            "instances are train, cruise, consist, gust, observer, target",
+        ),
+        ("trian", "'trian' is not of the form instance.variable, as in train[4].speed or train.speed; did you mean"),
+    ],
+)
+def test_what_is_said_about_texts_that_are_no_signal(text, message):
+    with pytest.raises(ScenarioError) as caught:
+        read_signal(text, COUNTS)
+    assert str(caught.value).startswith(message)
+
+
+@pytest.mark.parametrize(
+    ("text", "other", "covers"),
+    [
+        ("train.x", "train[2].x", True),
+        ("train[2].x", "train.x", False),
+        ("train[2].x", "train[2].x[1]", True),
+        ("train[2].x[1]", "train[2].x", False),
+        ("train.x", "train[2].xy", False),
+        ("train.x", "cruise.x", False),
+        ("gust.x", "gust.x", True),
+    ],
+)
+def test_what_a_signal_stands_for(text, other, covers):
+    assert read_signal(text, COUNTS).covers(read_signal(other, COUNTS)) is covers

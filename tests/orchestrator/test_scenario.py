@@ -62,6 +62,13 @@ def test_the_whole_of_a_scenario():
     assert system.requirements.keys() | system.metrics.keys() == {"comfort", "settling", "gap"}
     assert [entry["metric"] for entry in system.published] == ["settling", "gap[2]"]
     assert system.figures[0]["title"] == "Speed"
+    assert [(event.signal, event.action, event.at, event.every) for event in system.events] == [
+        ("cruise[1].ahead_speed", "bias", 30.0, 20.0),
+        ("cruise[2].ahead_speed", "bias", 30.0, 20.0),
+        ("target.value", "bias", 30.0, 20.0),
+        ("train[1].disturbance", "set", 60.0, None),
+    ]
+    assert system.tolerances == {"train[1].speed": [1e-3, 0.0], "train[2].speed": [0.0, 2e-3]}
 
 
 def test_origins_for_messages_of_later_checks():
@@ -76,6 +83,9 @@ def test_origins_for_messages_of_later_checks():
     assert origins["metrics.gap"] == "two.toml:47"
     assert origins["published[2]"] == "two.toml:56"
     assert origins["figures[1]"] == "two.toml:62"
+    assert (origins["events[1]"], origins["events[2]"]) == ("two.toml:66", "two.toml:74")
+    assert origins["simulation.tolerances.train[1].speed"] == "two.toml:81"
+    assert origins["simulation.tolerances.train[2].speed"] == "two.toml:82"
 
 
 def test_the_outer_axis_of_a_list_is_the_instance_also_where_an_array_is_as_long():
@@ -100,6 +110,13 @@ def test_one_instance_that_differs_and_instances_listed_singly():
     assert [system.instances[f"train[{k}]"].model for k in (1, 2)] == ["PointMassTrain", "Other"]
     assert start(system, "speed") == {"train[1]": 80.0, "train[2]": 3}
     assert not system.instances["train[2]"].swapped
+    more = text.replace("start.speed = 3", "start.speed = 3\nstep = 1.0\nisolate = false").replace(
+        "start.speed = 80.0", "start.speed = 80.0\nisolate = true\nswapped = true"
+    )
+    assert [(one.step, one.isolate, one.swapped) for one in loads(more).instances.values()][:2] == [
+        (None, True, True),
+        (1.0, False, True),
+    ]
     singly = '[simulation]\nstop_time = 1\n[instances."a[2]"]\ncomponent = "A"\nstart.x = [1, 2]\n'
     singly += '[instances."a[1]"]\ncomponent = "B"'
     system = loads(singly)
@@ -108,6 +125,7 @@ def test_one_instance_that_differs_and_instances_listed_singly():
         ("a[2]", "A", 2, 2),
     ]
     assert system.instances["a[2]"].start == {"x": [1, 2]}
+    assert list(loads(singly + '\n[instances.b]\ncomponent = "B"\n').instances) == ["a[1]", "a[2]", "b"]
 
 
 def test_order_names_instances_or_all_of_a_name():
@@ -176,6 +194,20 @@ def test_the_example_of_the_documentation_loads():
     assert loads(blocks("toml")[0], preset="gentle").instances["cruise[2]"].start["alpha"] == 0.01
 
 
+def test_the_tolerances_and_events_of_the_documentation_are_read():
+    frame = '[simulation]\nstop_time = 1\n[instances.mass]\ncomponent = "A"\n'
+    frame += "".join(f'[instances.{name}]\ncomponent = "A"\ncount = 3\n' for name in ("train", "sensor", "cruise"))
+    (tolerances,) = [block for block in blocks("toml") if "[simulation.tolerances]" in block]
+    (events,) = [block for block in blocks("toml") if "[[events]]" in block]
+    system = loads(frame + tolerances + events)
+    assert system.tolerances["mass.position"] == [1e-6, 1e-3]
+    assert [system.tolerances[f"train[{k}].speed"] for k in (1, 2, 3)] == [[1e-4, 1e-3], [0.0, 1e-4], [1e-4, 1e-3]]
+    assert [(event.signal, event.action, event.duration) for event in system.events] == [
+        ("sensor[2].speed", "bias", 30.0),
+        *((f"cruise[{k}].ahead_speed", "freeze", 5.0) for k in (1, 2, 3)),
+    ]
+
+
 def test_the_mistakes_of_the_documentation_are_told_as_it_says():
     text = blocks("toml")[0]
     for old, new in {
@@ -193,14 +225,18 @@ def test_the_mistakes_of_the_documentation_are_told_as_it_says():
 
 
 def test_the_tables_of_the_documentation_name_every_key():
-    from railcosim.orchestrator.draft import SIMULATION_KEYS
+    from railcosim.orchestrator.event_reader import EVENT_KEYS
     from railcosim.orchestrator.plots import PANEL_KEYS
     from railcosim.orchestrator.published import KEYS
     from railcosim.orchestrator.scenario_reader import CONNECTION_KEYS, INSTANCE_KEYS, TOP_KEYS
+    from railcosim.orchestrator.simulation_reader import SIMULATION_KEYS
+    from railcosim.orchestrator.system import ACCELERATIONS, ACTIONS, ALGORITHMS, LOOPS
 
     text = DOCS.read_text(encoding="utf-8")
-    for key in (*SIMULATION_KEYS, *PANEL_KEYS, *KEYS, *CONNECTION_KEYS, *INSTANCE_KEYS):
+    for key in (*SIMULATION_KEYS, *PANEL_KEYS, *KEYS, *CONNECTION_KEYS, *INSTANCE_KEYS, *EVENT_KEYS):
         assert f"`{key}`" in text, key
+    for word in (*ALGORITHMS, *LOOPS, *ACCELERATIONS, *ACTIONS):
+        assert f'`"{word}"`' in text, word
     for key in TOP_KEYS:
         assert re.search(rf"`\[*{key}[`\].]", text), key
 

@@ -96,6 +96,24 @@ MISTAKES = [
         "count = 0\nstart.p",
         "two.toml:11: instances.train.count: takes a whole number from 1 to 10000, not 0",
     ),
+    *(
+        ("start.speed = 80.0", f"{key} = {value}", f"two.toml:13: instances.train.{key}: {message}")
+        for key, value, message in (
+            ("step", "0", "takes a number greater than 0, in s, not 0"),
+            ("step", "[0.5, 1.0]", "takes a number greater than 0, in s, not [0.5, 1.0]"),
+            ("isolate", '"yes"', "takes true or false, not 'yes'"),
+            ("step_timeout", "-1.0", "takes a number greater than 0, in s, not -1.0"),
+            ("memory_limit", '"1 GB"', "takes a number greater than 0, in MiB, not '1 GB'"),
+            ("swapped", "1", "takes true or false, not 1"),
+            ("isolated", "true", "unknown key 'isolated'; did you mean 'isolate'?"),
+        )
+    ),
+    (
+        "[instances.target]",
+        '[instances."train[2]"]\nmemory_limit = 0\n[instances.target]',
+        'two.toml:21: instances."train[2]".memory_limit: takes a number greater than 0, in MiB, not 0',
+    ),
+    ("[require]", "[[event]]\nat = 1\n[require]", "two.toml:42: event: unknown key 'event'; did you mean 'events'?"),
     (
         "start.position = [17e3, 0.0]",
         "start.position = [17e3]",
@@ -285,6 +303,11 @@ MISTAKES = [
     ('y = ["train', 'z = ["train', "two.toml:64: figures[1].z: unknown key 'z'; valid here: title, y, x, label, "),
     ('"target.value"]', '"target.value +"]', "two.toml:64: figures[1].y: 'target.value +', column 1: invalid syntax"),
     ('"target.value"]', "3]", "two.toml:64: figures[1].y: takes expressions, texts, not 3"),
+    (
+        '"target.value"]',
+        '"target.value"]\nx_range = [0, 2024-01-01]',
+        "two.toml:62: figures[1]: takes numbers, texts, true or false, lists and tables of these; no dates",
+    ),
     ("[[figures]]", "[figures]", "two.toml:62: figures: is a list of tables; each begins with [[figures]]"),
 ]
 
