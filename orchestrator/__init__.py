@@ -1,21 +1,25 @@
 """The master orchestrator: `System`, `load` and `run` are what a script needs."""
 
-from .errors import FmuError, FmuFileError, RailcosimError, ScenarioError
+from .errors import CouplingError, FmuError, FmuFileError, RailcosimError, RunError, ScenarioError
 from .results import Results
-from .run import Run, run
+from .run import Run, resume, run
 from .scenario import load
-from .system import Connection, Instance, System
+from .system import Connection, Event, Instance, System
 
 __all__ = [
     "Connection",
+    "CouplingError",
+    "Event",
     "FmuError",
     "FmuFileError",
     "Instance",
     "RailcosimError",
     "Results",
     "Run",
+    "RunError",
     "ScenarioError",
     "System",
     "load",
+    "resume",
     "run",
 ]
