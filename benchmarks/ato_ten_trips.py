@@ -22,8 +22,8 @@ from pathlib import Path
 
 from railcosim.orchestrator import System, load
 from railcosim.orchestrator.archive import Workspace
+from railcosim.orchestrator.binary import forget_paths
 from railcosim.orchestrator.check import Checked, check
-from railcosim.orchestrator.fmu import forget_paths
 from railcosim.orchestrator.master import Master, Rows
 from railcosim.orchestrator.results import Recorder
 

@@ -20,7 +20,8 @@ import fmpy
 from railcosim.components import CATALOGUE
 from railcosim.fmus.build import build
 from railcosim.orchestrator.archive import Workspace
-from railcosim.orchestrator.fmu import FmuSlave, library
+from railcosim.orchestrator.binary import library
+from railcosim.orchestrator.fmu import FmuSlave
 from railcosim.orchestrator.loading import load_fmu
 
 HERE = Path(__file__).parent

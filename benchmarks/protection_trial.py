@@ -21,7 +21,8 @@ STEEPEST = 0.03
 """m/s2: more than the steepest descent of the line (2.8 N/kN) pulls with."""
 CHANGE = 0.06
 """m/s2: more than the line's resistance can change by (5.4 N/kN) while the train reacts."""
-STANDSTILL = 0.05
+STANDSTILL, EASING = 0.05, 4.0
+"""m/s: below this speed a braked train is held; 1/s: no brake is stronger than this times the speed."""
 ALPHA, BARRIER = 8.0, 0.1
 
 SINGLE = ("force limits", "wet rail", "heavy train", "slow sampling", "sensor noise", "full traction")
@@ -138,6 +139,7 @@ class Trip:
         self.limit = computed("protection.speed_limit")
         self.over = self.speed - self.limit
         self.force, self.brake = computed("protection.force"), computed("protection.service_brake").astype(bool)
+        self.demanded = computed("ato.force")
         self.acceleration = computed("train.acceleration")
         seen = computed if case.sensor else now
         source = "sensor" if case.sensor else "train"
@@ -254,6 +256,9 @@ def judge(outcome: Run, case: Draw, *, intervene: bool) -> Outcome:
             moving = trip.measured[k:] > 0.5
             if (trip.force[k:][moving] > -SERVICE * MASS * 0.999).any():
                 broken.append("a brake that was called for does not act")
+            eased = np.maximum(trip.demanded[k:], -EASING * MASS * trip.measured[k:])
+            if (trip.force[k:] > eased + 1e-9 * MASS)[trip.measured[k:] > STANDSTILL].any():
+                broken.append("the protection brakes less than the ATO would")
             if not trip.brake[k:].all():
                 broken.append("the brake was released")
             stood = np.flatnonzero(trip.speed[k:] < STANDSTILL)

@@ -24,8 +24,8 @@ from pathlib import Path
 from fmpy.fmi2 import FMU2Slave
 from railcosim.orchestrator import load
 from railcosim.orchestrator.archive import Workspace
+from railcosim.orchestrator.binary import forget_paths
 from railcosim.orchestrator.check import Checked, check
-from railcosim.orchestrator.fmu import forget_paths
 from railcosim.orchestrator.master import Master, Rows
 from railcosim.orchestrator.results import Recorder
 from railcosim.orchestrator.system import System

@@ -29,6 +29,8 @@ from .declarations import (
 )
 
 Values = dict[str, Any]
+MAX_LENGTH = 100_000
+"""Longest axis of an array: each element becomes a variable of the FMU, and a slip of the pen would fill the memory."""
 
 
 class ComponentError(ValueError):
@@ -121,7 +123,7 @@ class Component:
         cls.declarations = own | {name: found[name] for name, wanted in runtime.items() if wanted}
         _check_declarations(cls)
 
-    def __init__(self, **values: Any) -> None:
+    def __init__(self, /, **values: Any) -> None:
         cls = type(self)
         unknown = [name for name in values if name not in cls.declarations and name != "time"]
         if unknown:
@@ -144,7 +146,7 @@ class Component:
                 shape = self._shape(declaration.shape)
                 place[name] = np.zeros(shape) if shape else 0.0
         for name, value in values.items():
-            place[name] = float(value) if name == "time" else self._given(name, value)
+            place[name] = convert(_TIME, value, cls.__name__) if name == "time" else self._given(name, value)
 
     # ---------------------------------------------------------------- equations
 
@@ -223,6 +225,9 @@ class Component:
         return Slot(name, declaration, unit, shape, convert(blank, declaration.start, type(self).__name__))
 
 
+_TIME = Slot("time", Variable("s"), "s", (), 0.0)
+
+
 def convert(slot: Slot, value: Any, owner: str) -> Any:
     """Bring a value to a slot's type and shape; a scalar fills an array.
 
@@ -284,6 +289,8 @@ def _build_argument(cls: type, declaration: Size | Data, given: Any) -> Any:
     if isinstance(declaration, Size):
         if isinstance(given, bool) or not isinstance(given, int) or given < declaration.minimum:
             raise ComponentError(f"{where} takes a whole number of at least {declaration.minimum}, not {given!r}")
+        if given > MAX_LENGTH:
+            raise ComponentError(f"{where} is {given}; arrays have at most {MAX_LENGTH} elements on an axis")
         return given
     if declaration.convert is None:
         return given

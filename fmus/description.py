@@ -108,6 +108,8 @@ def write(component: Component, kind: Kind, digest: str) -> bytes:
     rates = _rates(variables) if kind == "native" else ()
     if kind == "native":
         capabilities.set("providesDirectionalDerivative", "true")
+        if any(v.causality == "input" and v.slot.type is float for v in variables):
+            capabilities.set("canInterpolateInputs", "true")
         files = etree.SubElement(capabilities, "SourceFiles")
         etree.SubElement(files, "File", name=SOURCE)
     _write_units(root, {v.slot.unit for v in variables if v.slot.type is float} | {rate.unit for rate in rates})

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping
 from typing import Any
 
 import numpy as np
@@ -44,6 +44,8 @@ def model_header(component: Component, traced: Traced, guid: str) -> str:
     layout = traced.layout
     held = _held(component)
     texts = [v for v in variables if v.slot.type is str]
+    real_inputs = [v for v in variables if v.slot.type is float and v.causality == "input"]
+    numbers = {v.reference: k for members in (texts, real_inputs) for k, v in enumerate(members)}
     scratch = max(
         layout.outputs[1] + layout.states[1],
         layout.memory[1] + layout.tape[1] + len(traced.reinitialised),
@@ -64,6 +66,7 @@ def model_header(component: Component, traced: Traced, guid: str) -> str:
         "N_INITIAL": len(traced.initial),
         "N_REINITIALISED": len(traced.reinitialised),
         "N_TEXTS": len(texts),
+        "N_REAL_INPUTS": len(real_inputs),
         "N_SCRATCH": scratch,
         "IS_SAMPLED": int(component.is_sampled),
         "HAS_HELD": int(any(held)),
@@ -75,7 +78,8 @@ def model_header(component: Component, traced: Traced, guid: str) -> str:
         f'#define MODEL_NAME "{name}"\n#define MODEL_GUID "{guid}"\n',
         *(f"#define {key} {value}\n" for key, value in constants.items()),
         "".join(f"#define MODEL_{f.upper()} {name}_{f}\n" for f in _EQUATIONS),
-        _array("const Variable model_variables", [_variable(v, component, traced, texts) for v in variables]),
+        _array("const Variable model_variables", [_variable(v, component, traced, numbers) for v in variables]),
+        _array("const int model_real_inputs", [str(v.reference) for v in real_inputs], "0"),
         _array("const char *const model_texts", [_text(v, component) for v in texts], '""'),
         _array("const Noise model_noises", _noises(component, layout.noise[0], references), "{0, 0, 0, 0, false}"),
         _array("const int model_initial_targets", [str(references[n]) for n in traced.initial], "0"),
@@ -94,15 +98,18 @@ def _held(component: Component) -> list[bool]:
     return [any(direct[s] for s in slot.scalars) for slot in component.of(Output) for _ in slot.scalars]
 
 
-def _variable(v: ScalarVariable, component: Component, traced: Traced, texts: Sequence[ScalarVariable]) -> str:
+def _variable(v: ScalarVariable, component: Component, traced: Traced, numbers: Mapping[int, int]) -> str:
+    """``numbers`` are those of texts and of real inputs among their like, by value reference."""
     declaration = v.slot.declaration
     low = "-INFINITY" if declaration.minimum is None else number(declaration.minimum)
     high = "INFINITY" if declaration.maximum is None else number(declaration.maximum)
     value = component.__dict__.get(v.slot.name, v.slot.start)
     element = value if v.element is None else np.ravel(value)[v.element]
     start = "0.0" if v.slot.type is str else number(element)
-    text = texts.index(v) if v.slot.type is str else -1
-    return f"{{{_quoted(v.name)}, {_TYPES[v.slot.type]}, {_role(v, traced)}, {start}, {low}, {high}, {text}}}"
+    among = numbers.get(v.reference, -1)
+    text, real_input = (among, -1) if v.slot.type is str else (-1, among)
+    kinds = f"{_TYPES[v.slot.type]}, {_role(v, traced)}"
+    return f"{{{_quoted(v.name)}, {kinds}, {start}, {low}, {high}, {text}, {real_input}}}"
 
 
 def _role(v: ScalarVariable, traced: Traced) -> str:

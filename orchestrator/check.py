@@ -9,7 +9,7 @@ from dataclasses import dataclass, replace
 from .archive import Workspace
 from .coupling import check_coupling, describe_coupling
 from .errors import ScenarioError, did_you_mean
-from .events import check_events
+from .event_check import check_events
 from .interface import Interface
 from .isolation import check_isolation, check_once_per_process, isolation_notes
 from .iterative import find_blocks
@@ -59,7 +59,7 @@ def check(system: System, workspace: Workspace, kind: Kind = "auto") -> Checked:
     every_step = system.record is None or abs(system.record - system.step) < 1e-9 * system.step
     every_step &= system.algorithm != "adaptive"
     system, left_out = _without_the_missing(system, interfaces, names, every_step)
-    problems += check_events(system.events, interfaces, wiring)
+    problems += check_events(system, interfaces, wiring)
     problems += check_coupling(system, interfaces, wiring)
     problems += check_requirements(system.requirements, names, every_step)
     found = check_metrics(system.metrics, names, every_step)

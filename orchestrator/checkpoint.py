@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import dataclasses
 import json
+import math
 import os
 import zipfile
 from collections.abc import Mapping
@@ -24,7 +25,6 @@ from .system import Connection, Event, Instance, System
 
 FILE = "checkpoint.zip"
 _FORMAT = 1
-_UNREADABLE = (OSError, ValueError, KeyError, TypeError, AttributeError, zipfile.BadZipFile, EOFError)
 
 
 @dataclass(frozen=True)
@@ -47,6 +47,16 @@ class Checkpoint:
     progress: Mapping[str, Any]
     states: Mapping[str, bytes]
     every: float | None
+
+    @property
+    def time(self) -> float:
+        """How far the run had got, in s."""
+        return float(self.progress["time"])
+
+    @property
+    def width(self) -> int:
+        """How many signals are recorded."""
+        return len(self.progress["values"])
 
     @classmethod
     def take(
@@ -91,10 +101,13 @@ class Checkpoint:
         }
         part = directory / f"{FILE}.part"
         try:
-            with zipfile.ZipFile(part, "w") as archive:
-                archive.writestr("checkpoint.json", json.dumps(content, default=_plain))
-                for number, name in enumerate(self.digests):
-                    archive.writestr(f"states/{number}", self.states[name])
+            with part.open("wb") as stream:
+                with zipfile.ZipFile(stream, "w") as archive:
+                    archive.writestr("checkpoint.json", json.dumps(content, default=_plain))
+                    for number, name in enumerate(self.digests):
+                        archive.writestr(f"states/{number}", self.states[name])
+                stream.flush()
+                os.fsync(stream.fileno())
             os.replace(part, directory / FILE)
         except OSError as error:
             raise RailcosimError(f"{part} cannot be written: {error.strerror or error}") from error
@@ -164,7 +177,7 @@ def read(directory: Path) -> Checkpoint:
                 raise ScenarioError(f"{path} is of another version of railcosim; run the scenario from the start")
             names = list(content["digests"])
             states = {name: archive.read(f"states/{number}") for number, name in enumerate(names)}
-        return Checkpoint(
+        point = Checkpoint(
             system=_system(content["system"]),
             kind=content["kind"],
             rows=int(content["rows"]),
@@ -173,10 +186,14 @@ def read(directory: Path) -> Checkpoint:
             states=states,
             every=content["every"],
         )
+        if point.rows < 1 or point.width < 0 or not math.isfinite(point.time):
+            raise ValueError(f"{point.rows} rows up to {point.time} s")
     except ScenarioError:
         raise
-    except _UNREADABLE as error:
-        raise ScenarioError(f"{path} cannot be read: {error}") from error
+    except Exception as error:  # whatever may be in it
+        what = f"{type(error).__name__}: {error}" if str(error) else type(error).__name__
+        raise ScenarioError(f"{path} cannot be read ({what}); run the scenario from the start") from error
+    return point
 
 
 def _system(data: dict[str, Any]) -> System:

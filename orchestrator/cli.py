@@ -7,7 +7,6 @@ import os
 import sys
 from collections.abc import Sequence
 from contextlib import suppress
-from dataclasses import replace
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -46,7 +45,8 @@ from .plots import draw
 from .published import PublishedRow
 from .reproduce import cases
 from .results import Results
-from .run import Run, execute, resume
+from .rows import BINARY, recover
+from .run import Run, at_half_the_step, execute, resume
 from .scenario import load, shipped
 from .topology import describe as describe_topology
 
@@ -131,7 +131,7 @@ def run(
     ] = 1,
     checkpoint_every: Annotated[
         float | None,
-        typer.Option(metavar="T", help="Write a checkpoint every T seconds of the run, to go on from by --resume."),
+        typer.Option(metavar="T", help="Write a checkpoint about every T s of the run, to go on from by --resume."),
     ] = None,
     resume_from: Annotated[
         Path | None,
@@ -154,9 +154,12 @@ def run(
     """
     how: Any = {"figures": not no_figures, "threads": threads, "checkpoint_every": checkpoint_every}
     if resume_from is not None:
-        given = (scenario, preset, settings, builds, swaps, step, algorithm, isolated, output)
-        if any(given) or kind is not KindName.auto:
-            raise ScenarioError("--resume takes the run as its directory has it: give no scenario, and only --stop")
+        given = (scenario, preset, settings or None, builds or None, swaps or None, step, algorithm, isolated or None)
+        if any(x is not None for x in (*given, output)) or kind is not KindName.auto or verify_step:
+            raise ScenarioError(
+                "--resume takes the run as its directory has it: give no scenario and no change but --stop; --threads, "
+                "--checkpoint-every, --no-figures and --quiet may stand with it"
+            )
         with console.progress(str(resume_from), quiet) as progress:
             outcome = resume(resume_from, stop_time=stop, progress=progress, **how)
     else:
@@ -180,10 +183,8 @@ def _at_half_the_step(outcome: Run, kind: KindName, quiet: bool) -> Run | None:
     if outcome.status != "completed":
         return None
     system = outcome.system
-    rescaled = system.rescaled_from if system.rescaled_from is not None else system.step
-    half = replace(system, step=system.step / 2.0, record=system.record or system.step, rescaled_from=rescaled)
     with console.progress(f"{system.name} at half the step", quiet, system.start_time) as progress:
-        return execute(half, kind=kind.value, progress=progress)
+        return execute(at_half_the_step(system), kind=kind.value, progress=progress)
 
 
 def _exit_code(outcome: Run, second: Run | None) -> int:
@@ -248,9 +249,14 @@ def plot(
     ] = None,
     output: Annotated[Path | None, typer.Option("--output", "-o", help="Where to draw; RESULTS by default.")] = None,
 ) -> None:
-    """Draw a run's figures again, or chosen signals."""
+    """Draw a run's figures again, or chosen signals.
+
+    Of a run that was killed, or still goes on, it writes results.csv as well.
+    """
     results = results.parent if results.is_file() else results
     loaded = Results.load(results)
+    if (results / BINARY).is_file():
+        print(recover(results))
     figures = [{"title": ", ".join(signals), "y": signals}] if signals else loaded.figures
     directory = output or results
     directory.mkdir(parents=True, exist_ok=True)

@@ -62,6 +62,7 @@ def describe(
         "build arguments": ", ".join(f"{k} = {v!r}" for k, v in vendor.get("arguments", {}).items()),
         "digest": vendor.get("digest", ""),
         "kind": f"{vendor['kind']}: {vendor['kind_note']}" if vendor else "",
+        "FMI": interface.version,
         "made with": interface.generator,
         "guid": interface.guid,
         "default step": "" if interface.default_step is None else f"{interface.default_step:g} s",
@@ -139,7 +140,7 @@ def pack(
 
 
 def validate(
-    fmu: Annotated[Path, typer.Argument(help="Any FMI 2.0 co-simulation FMU, ours or not.")],
+    fmu: Annotated[Path, typer.Argument(help="Any FMI co-simulation FMU, ours or not.")],
     timeout: Annotated[float, typer.Option(min=0.1, help="Longest time for one probe, in s.")] = TIMEOUT,
 ) -> None:
     """Check any FMU: archive, description, and probes that cannot take this program down.

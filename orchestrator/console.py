@@ -378,7 +378,7 @@ def _variables(title: str, variables: Sequence[Variable], interface: Interface) 
     table = _table(title, *columns, right=("start",), fold=("name", "description", "depends directly on"))
     places = {v.name: k for k, v in enumerate(interface.of("input"))}
     for v in variables:
-        cells = [v.name, v.type, v.unit or ""]
+        cells = [v.name, v.fmi_type or v.type, v.unit or ""]
         cells += ["" if v.start is None else _start(v.start)] if starts else []
         hint = "optional" if v.name in interface.optional_inputs else ""
         hint = "tunable" if v.causality == "parameter" and v.variability == "tunable" else hint

@@ -18,6 +18,9 @@ from .errors import ExpressionError, WindowError, did_you_mean
 from .syntax import Call, Group, Name, Node, Number, Operation, Reference, Span, read, walk
 
 CONSTANTS = {"pi": np.pi, "inf": np.inf, "nan": np.nan, "true": True, "false": False}
+MAX_INDEX = 20_000
+"""How far `i` is counted, beyond the number of names: a lone `x[999999999]` of somebody's FMU is not worth the time."""
+_INDEX = r"(\d{1,9})(?!\d)"  # Python does not convert numbers of thousands of digits
 Value: TypeAlias = NDArray[Any]
 R = TypeVar("R")
 
@@ -145,7 +148,8 @@ class Scope:
 
     def integer(self, node: Node) -> int:
         """The value of an index."""
-        value = float(evaluate(node, self))
+        with np.errstate(all="ignore"):
+            value = float(evaluate(node, self))
         if not value.is_integer():
             raise self.error(f"an index must be a whole number, not {value:g}")
         return int(value)
@@ -170,7 +174,8 @@ class Scope:
         values = [self.signal(name) for name in found]
         if not reference.stacked:
             return values[0]
-        return np.stack([np.broadcast_to(value, (max(value.size for value in values),)) for value in values])
+        length = max(value.size for value in values)
+        return np.stack([np.broadcast_to(value, (length,)) for value in values])
 
     def resolve(self, reference: Reference) -> list[str]:
         """The full names a reference stands for, in the order of their indices; empty when there are none."""
@@ -187,17 +192,17 @@ class Scope:
         full = ".".join(names)
         if not spans:
             return [full] if full in self.names else []
-        pattern = re.compile(re.escape(full).replace(":", r"(\d+)"))
+        pattern = re.compile(re.escape(full).replace(":", _INDEX))
         found = [(tuple(map(int, match.groups())), match[0]) for match in map(pattern.fullmatch, self.names) if match]
         return [n for ks, n in sorted(found) if all(a <= k <= b for k, (a, b) in zip(ks, spans, strict=True))]
 
 
 def unknown_signal(reference: Reference, names: Collection[str]) -> str:
     """What to say about a reference that stands for nothing."""
-    family = re.escape(re.sub(r"\[[^\]]*\]", "[:]", reference.text)).replace(":", r"[\d,]+")
+    family = re.escape(re.sub(r"\[[^\]]*\]", "[:]", reference.text)).replace(r":\]", r"[\d,]+\]")
     near = [name for name in names if re.fullmatch(family, name)]
     if near:
-        near.sort(key=lambda name: [int(k) for k in re.findall(r"\d+", name)])
+        near.sort(key=lambda name: [(len(k), k) for k in re.findall(r"\d+", name)])
         return f"there is no '{reference.text}'; there are '{near[0]}' to '{near[-1]}'"
     written = re.findall(r"\[[^\]]*\]", reference.text)
 
@@ -210,7 +215,7 @@ def unknown_signal(reference: Reference, names: Collection[str]) -> str:
 
 
 def call_problem(call: Call, functions: Mapping[str, Function]) -> str:
-    """What is wrong with a call: an unknown function or argument, or too many or too few of them."""
+    """What is wrong with a call: an unknown function or argument, too many or too few of them, or a list among them."""
     if call.name not in functions:
         nearest = did_you_mean(call.name, functions) or f"; there are {', '.join(sorted(functions))}"
         return f"unknown function '{call.name}'{nearest}"
@@ -218,11 +223,14 @@ def call_problem(call: Call, functions: Mapping[str, Function]) -> str:
     for word in call.keywords:
         if word not in signature.parameters:
             return f"{call.name} has no argument '{word}'{did_you_mean(word, signature.parameters)}"
+    plain = len(call.arguments) - len(call.keywords)
+    named = dict(zip(call.keywords, call.arguments[plain:], strict=True))
     try:
-        signature.bind(*call.arguments[: len(call.arguments) - len(call.keywords)], **dict.fromkeys(call.keywords))
+        given = signature.bind(*call.arguments[:plain], **named).arguments
     except TypeError as error:
         return f"{call.name}({', '.join(signature.parameters)}): {error}"
-    return ""
+    lists = [word for word, argument in given.items() if isinstance(argument, Group) and word != "outside"]
+    return f"{call.name}: {lists[0]} takes a signal or a number, not a list" if lists else ""
 
 
 def evaluate(node: Node, scope: Scope) -> Value:  # noqa: PLR0911 (one a kind of node)
@@ -307,16 +315,17 @@ class Expression:
     def count(self, names: Collection[str]) -> int:
         """The number of instances of the first array it mentions: what `count` stands for."""
         array = next((reference.array for reference in self.references if reference.array), "")
-        numbers = (re.match(re.escape(array) + r"\[(\d+)", name) for name in names)
+        numbers = (re.match(rf"{re.escape(array)}\[{_INDEX}", name) for name in names)
         return max((int(match[1]) for match in numbers if match), default=0)
 
     def indices(self, names: Collection[str]) -> tuple[int, ...]:
         """Every i >= 1 for which all references exist; () when the expression has no free index."""
         if not self.uses_index or not any(reference.uses_index for reference in self.references):
             return ()
-        largest = max((int(k) for name in names for k in re.findall(r"\[(\d+)", name)), default=0)
+        largest = max((int(k) for name in names for k in re.findall(rf"\[{_INDEX}", name)), default=0)
+        last = min(2 * largest + 1, MAX_INDEX + len(names))
         rehearsal, count = _Rehearsal(names), self.count(names)
-        scopes = ((i, self._scope(rehearsal, {"i": i, "count": count})) for i in range(1, 2 * largest + 2))
+        scopes = ((i, self._scope(rehearsal, {"i": i, "count": count})) for i in range(1, last + 1))
         return tuple(i for i, scope in scopes if all(scope.resolve(reference) for reference in self.references))
 
     def instances(self, names: Collection[str]) -> tuple[int | None, ...]:
@@ -334,11 +343,14 @@ class Expression:
         `constants` are further bare names the expression may use, such as the variable of a function plot.
         """
         known = {*CONSTANTS, *constants, "time", "count", *(["i"] if self.references else [])}
-        problems = [
-            f"'{self.text}', column {node.column}: {problem}"
-            for node in walk(self.tree)
-            if not isinstance(node, Number | Group | Operation) and (problem := self._problem(node, names, known))
-        ]
+        try:
+            problems = [
+                f"'{self.text}', column {node.column}: {problem}"
+                for node in walk(self.tree)
+                if not isinstance(node, Number | Group | Operation) and (problem := self._problem(node, names, known))
+            ]
+        except ExpressionError as error:  # an index beyond all numbers
+            return error.problems
         if problems:
             return problems
         instances = (None,) if "i" in constants else self.instances(names)

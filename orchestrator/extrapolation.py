@@ -59,8 +59,11 @@ class Extrapolator:
             values = self._exchange.inputs(course.feed, time)
             self.past[name] = [[(time, values[k])] for k in course.members]
 
-    def write(self, name: str, time: float, length: float) -> None:
-        """Set the inputs of an instance for a step from ``time`` of ``length``, both in s, with their derivatives."""
+    def write(self, name: str, time: float, length: float, *, ended: bool = False) -> None:
+        """Set the inputs of an instance for a step from ``time`` of ``length``, both in s, with their derivatives.
+
+        ``ended``: all of them are given values of the end of the step.
+        """
         course = self._courses.get(name)
         if course is None:
             self._exchange.write(name, time)
@@ -72,7 +75,7 @@ class Extrapolator:
             if feed is course.feed:
                 for n, k in enumerate(course.members):
                     course_of_input = self._continue(
-                        self.past[name][n], time + length * course.ahead[n], values[k], time
+                        self.past[name][n], time + length * (ended or course.ahead[n]), values[k], time
                     )
                     values[k] = course_of_input[0]
                     orders += range(1, self._order + 1)
@@ -86,6 +89,12 @@ class Extrapolator:
         """Value and derivatives at ``time`` of the polynomial through the last points and the new one."""
         past[:] = [*[point for point in past if point[0] < at][-self._order :], (at, value)]
         return polynomial(past[-self._order - 1 :], time, self._order)
+
+    def restart(self) -> None:
+        """Forget the past, after something has jumped: a polynomial through a jump would overshoot."""
+        for past in self.past.values():
+            for points in past:
+                points.clear()
 
     def save(self) -> Any:
         """What it remembers."""

@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+from functools import cached_property
 from typing import Any, Literal
 
 Type = Literal["Real", "Integer", "Boolean", "String", "Enumeration"]
@@ -24,6 +26,9 @@ class Variable:
     """One scalar variable of an FMU.
 
     ``dependencies`` holds, for an output, the variables it depends on directly; None where the FMU does not say.
+    ``derivative`` names the state that it is the rate of. ``choices`` are the items of an enumeration, name and value.
+    ``relative``: a difference, to which the offset of its unit does not apply. ``fmi_type`` is its type in FMI 3.0
+    (``"Float32"``), empty in other versions. ``negated``: what the FMU keeps is its negative (FMI 1.0).
     """
 
     name: str
@@ -36,8 +41,14 @@ class Variable:
     unit: str | None = None
     minimum: float | None = None
     maximum: float | None = None
+    nominal: float | None = None
+    choices: tuple[tuple[str, int], ...] = ()
+    relative: bool = False
     description: str = ""
     dependencies: frozenset[str] | None = None
+    derivative: str | None = None
+    fmi_type: str = ""
+    negated: bool = False
 
     @property
     def settable(self) -> bool:
@@ -45,6 +56,15 @@ class Variable:
         if self.variability == "constant":
             return False
         return self.causality in ("input", "parameter") or self.initial in ("exact", "approx")
+
+    @property
+    def whole_range(self) -> tuple[int, int] | None:
+        """The least and the largest value that the FMU can hold in a whole number; None for other types."""
+        if self.type not in ("Integer", "Enumeration"):
+            return None
+        named = re.fullmatch(r"(U?)Int(\d+)", self.fmi_type)
+        bits = int(named[2]) if named else 64 if self.fmi_type else 32
+        return (0, 2**bits - 1) if named and named[1] else (-(2 ** (bits - 1)), 2 ** (bits - 1) - 1)
 
 
 @dataclass(frozen=True)
@@ -56,7 +76,8 @@ class Interface:
         arrays: names of scalars by the bare array name (``"force"`` -> ``"force[1]"``, ...).
         vendor: our own annotation: component, arguments, digest, optional inputs, recommended step, note; empty for
             an FMU of another maker.
-        version: of the FMI standard.
+        version: of the FMI standard, ``"1.0"``, ``"2.0"`` or ``"3.0"``.
+        left_out: what variables are that the FMU has and we do not take, by name: ``"an array"``, ``"binary"``.
         warnings: what is wrong with the file though it can be used.
     """
 
@@ -79,12 +100,18 @@ class Interface:
     single_instance: bool = False
     needs_tool: bool = False
     vendor: Mapping[str, Any] = field(default_factory=dict)
+    left_out: Mapping[str, str] = field(default_factory=dict)
     warnings: tuple[str, ...] = ()
 
-    @property
+    @cached_property
     def optional_inputs(self) -> frozenset[str]:
         """Inputs that may stay unconnected without a word."""
         return frozenset(self.vendor.get("optional_inputs", ()))
+
+    @cached_property
+    def inputs(self) -> frozenset[str]:
+        """The names of all inputs."""
+        return frozenset(v.name for v in self.of("input"))
 
     def of(self, *causalities: str) -> tuple[Variable, ...]:
         """The variables of the given causalities, in order."""
@@ -92,4 +119,18 @@ class Interface:
 
     def scalars(self, name: str) -> tuple[str, ...] | None:
         """The scalar names behind a name: itself, an array's elements, or None where there is no such name."""
-        return (name,) if name in self.variables else self.arrays.get(name)
+        if name in self.variables:
+            return (name,)
+        spaced = self._spaced.get(name)
+        return self.arrays.get(name) if spaced is None else (spaced,)
+
+    @cached_property
+    def _spaced(self) -> Mapping[str, str]:
+        """Names with spaces between brackets, by what they are without: so a scenario writes them."""
+        names = (name for name in self.variables if " " in name and "[" in name)
+        return {re.sub(r"\[[^\[\]]*\]", lambda match: match[0].replace(" ", ""), name): name for name in names}
+
+    def why_left_out(self, name: str) -> str:
+        """A clause to append to an error about a name that is no variable: the FMU may have it all the same."""
+        what = self.left_out.get(name)
+        return f": in the FMU it is {what}, and only single numbers, booleans and texts are supported" if what else ""

@@ -8,8 +8,9 @@ from typing import Literal
 
 from ..fmus.build import Plain, build, plain
 from .archive import Workspace
+from .binary import library
 from .errors import FmuFileError, ScenarioError
-from .fmu import FmuSlave, library
+from .instances import SLAVES
 from .interface import Interface
 from .plain import PlainSlave
 from .reader import read
@@ -50,7 +51,7 @@ class Model:
         """
         if self.plain is not None:
             return PlainSlave(name, self.interface, self.plain.instantiate())
-        return FmuSlave(name, self.interface, self.folder)
+        return SLAVES[self.interface.version](name, self.interface, self.folder)
 
 
 def load_models(system: System, workspace: Workspace, kind: Kind = "auto") -> dict[str, Model]:
@@ -83,8 +84,11 @@ def _load(instance: Instance, workspace: Workspace, kind: Kind) -> Model:
                 f"{instance.model} is built already; it takes no build arguments {sorted(instance.build)}"
             )
         model = load_fmu(Path(instance.model), workspace, "fmu")
-        library(model.folder, model.interface, instance.model)  # said now, not when the run has begun
-        return model
+        found = library(model.folder, model.interface, instance.model)  # said now, not when the run has begun
+        if found.stem == model.interface.identifier:
+            return model
+        what = f"is not named after its model identifier {model.interface.identifier!r}"
+        return replace(model, note=f"{instance.model}: its library {found.name} {what}")
     if kind == "plain":
         component = plain(instance.model, instance.build)
         folder = workspace.write_description(component.description)

@@ -11,7 +11,6 @@ from dataclasses import dataclass, field
 from typing import Any, Literal
 
 import numpy as np
-from lxml import etree
 from numpy.typing import NDArray
 from scipy.linalg import expm
 
@@ -199,25 +198,21 @@ def make_block(slave: Slave, model: Model) -> Block:
             f"{slave.name}: {interface.model} gives no directional derivatives: finite differences over a step {listed}"
         )
         return Block(slave, "differences", rates, (), note=note)
+    as_what = " as FMI 2.0 or 3.0" if interface.version == "1.0" else ""
     raise ScenarioError(
         f"{slave.name}: {interface.model} can be linearized in no way: it gives no directional derivatives and does "
-        "not save its state; export it with providesDirectionalDerivative or canGetAndSetFMUstate, or --swap another "
-        "model in its place"
+        f"not save its state; export it{as_what} with providesDirectionalDerivative or canGetAndSetFMUstate, or --swap "
+        "another model in its place"
     )
 
 
 def _derivatives(model: Model) -> tuple[dict[str, str], bool]:
     """Names of continuous states with those of their rates, and whether the FMU gives directional derivatives."""
-    root = etree.parse(str(model.folder / "modelDescription.xml"), etree.XMLParser(resolve_entities=False)).getroot()
-    variables = root.findall("ModelVariables/ScalarVariable")
-    rates = {}
-    for variable in variables:
-        real = variable.find("Real")
-        state = None if real is None else real.get("derivative")
-        if state is not None and 0 < int(state) <= len(variables):
-            rates[variables[int(state) - 1].get("name")] = variable.get("name")
-    offers = root.find("CoSimulation").get("providesDirectionalDerivative") in ("true", "1")
-    return rates, offers and model.plain is None
+    rates: dict[str, str] = {}
+    for variable in model.interface.variables.values():
+        if variable.derivative is not None:
+            rates.setdefault(variable.derivative, variable.name)
+    return rates, model.interface.directional_derivatives and model.plain is None
 
 
 def _directional(slave: Slave, unknowns: Sequence[str], knowns: Sequence[str]) -> Array:

@@ -16,8 +16,8 @@ from numpy.typing import NDArray
 
 from . import adaptive, iterative
 from .compiled import CompiledLoop, can_run
-from .errors import CouplingError
-from .events import Schedule
+from .errors import CouplingError, FmuError
+from .events import LATE, Schedule
 from .exchange import Exchange, types_of
 from .extrapolation import Extrapolator
 from .loops import LoopSolver, find_loops
@@ -190,11 +190,12 @@ class Master:
             self.exchange.read_finite(slave, start_time)
         if self.settings.algebraic_loops == "solve":
             self.loops = self._make_loop_solver(unsettled)
+        if self.settings.events:
+            self._schedule = Schedule(self.settings.events, self.exchange, start_time, self.settings.rates)
+            if self._schedule.apply(start_time, 0):
+                self._jump()
         if self._extrapolator is not None:
             self._extrapolator.begin(start_time)
-        if self.settings.events:
-            self._schedule = Schedule(self.settings.events, self.exchange, start_time)
-            self._schedule.apply(start_time)
         self.exchange.remember()
         self._compiled = CompiledLoop(self) if can_run(self) else None
 
@@ -256,7 +257,8 @@ class Master:
             return observe
 
         def see(steps: int, rows: Rows) -> bool:
-            if steps == stop and schedule.apply(self.time, step):
+            if steps == stop and schedule.apply(self.time, steps, LATE * step):
+                self._jump()
                 if self.exchange.depth:
                     self.exchange.history[-1] = list(self.values)
                 if len(rows) and rows[-1][0] == self.time:
@@ -264,6 +266,13 @@ class Master:
             return observe(steps, rows)
 
         return see
+
+    def _jump(self) -> None:
+        """After events: what is continued begins anew, and what depends on itself is solved with the new values."""
+        if self._extrapolator is not None:
+            self._extrapolator.restart()
+        if self.loops is not None:
+            self._solve_loops(self.time)
 
     def _run_in_python(
         self, start_time: float, step: float, points: tuple[int, int, int], every: int, observe: Observer
@@ -285,15 +294,25 @@ class Master:
         return True
 
     def terminate(self) -> None:
-        """End the run properly: every model may write what it keeps."""
-        for slave in self.slaves.values():
-            slave.terminate()
+        """End the run properly: every model may write what it keeps, also where another fails to.
 
-    def _write(self, name: str, time: float, length: float) -> None:
+        Raises:
+            FmuError: the first failure.
+        """
+        first: FmuError | None = None
+        for slave in self.slaves.values():
+            try:
+                slave.terminate()
+            except FmuError as error:
+                first = first or error
+        if first is not None:
+            raise first
+
+    def _write(self, name: str, time: float, length: float, *, ended: bool = False) -> None:
         if self._extrapolator is None:
             self.exchange.write(name, time)
         else:
-            self._extrapolator.write(name, time, length)
+            self._extrapolator.write(name, time, length, ended=ended)
 
     def _gauss_seidel(self, k: int, time: float, step: float) -> None:
         exchange, rates = self.exchange, self.settings.rates
@@ -349,11 +368,11 @@ class Master:
             if every:  # the next point at which a row is due
                 done = math.floor((self.time - start_time) / (every * step) + _ROUNDING)
                 row = min(last, start_time + (done + 1) * every * step)
-            due = math.inf if self._schedule is None else self._schedule.next_time()
-            self.time = stepper.advance(self.time, min(row, due))
+            due, late = math.inf if self._schedule is None else self._schedule.next_time(), _ROUNDING * step
+            self.time = stepper.advance(self.time, due if due < row - late else row)
             self.steps += 1
-            if self._schedule is not None:
-                self._schedule.apply(self.time, _ROUNDING * step)
+            if self._schedule is not None and self._schedule.apply(self.time, self.steps, late):
+                self._jump()
             if not observe(self.steps, [[self.time, *self.values]] if not every or self.time == row else ()):
                 return False
         return True
@@ -381,10 +400,10 @@ class Master:
             restore=memory.restore if memory else lambda saved: None,
         )
 
-    def _sweep(self, time: float, length: float) -> None:
-        """A Gauss-Seidel sweep that may be taken back."""
+    def _sweep(self, time: float, length: float, ended: bool) -> None:
+        """A Gauss-Seidel sweep that may be taken back; ``ended``: the values are those of the step's end."""
         for slave in self.sequence:
-            self._write(slave.name, time, length)
+            self._write(slave.name, time, length, ended=ended)
             slave.step(time, length, final=False)
             self.exchange.read_finite(slave, time + length)
         if self.loops is not None:

@@ -111,6 +111,8 @@ def _refused(system: System, checked: Checked, platforms: Sequence[str]) -> list
                 f"{name}: {model.interface.model} is a Python FMU, which a host without Python cannot load; only "
                 "native FMUs are packed"
             )
+        if model.interface.version != "2.0":
+            problems.append(f"{name}: {model.interface.model} is FMI {model.interface.version}; only FMI 2.0 is packed")
         binaries = model.folder / "binaries"
         if system.instances[name].model.endswith(".fmu"):  # the others are built for what is asked
             problems += [

@@ -123,7 +123,8 @@ def _headway_capacity(
     def capacity(seen: Window) -> float:
         if np.isinf(seen.kept).any():
             return 0.0
-        return 3600.0 / float(seen.mean().max())
+        longest = float(seen.mean().max())
+        return 3600.0 / longest if longest else np.inf
 
     return window_of(signals, headway, after, until, outside).reduce(capacity)
 

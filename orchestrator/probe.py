@@ -178,7 +178,7 @@ def reset(spec: dict[str, Any]) -> str:
         first = it.initialize().run()
         it.call("reset")
         second = it.initialize().run()
-        _compare(first, second, "after fmi2Reset")
+        compare(first, second, "after fmi2Reset")
     return "a run after fmi2Reset repeats the first, bit for bit"
 
 
@@ -195,7 +195,7 @@ def second_instance(spec: dict[str, Any]) -> str:
         for _ in range(STEPS):
             rows += a.run(1)
             b.run(1)
-        _compare(expected, rows, "beside a second instance")
+        compare(expected, rows, "beside a second instance")
     return "two instances stepped in turn give what one gives alone"
 
 
@@ -209,7 +209,7 @@ def state(spec: dict[str, Any]) -> str:
         expected = it.run(STEPS // 2)
         it.call("setFMUState", saved)
         it.time = time
-        _compare(expected, it.run(STEPS // 2), "after fmi2SetFMUstate")
+        compare(expected, it.run(STEPS // 2), "after fmi2SetFMUstate")
         if spec["can_serialize"]:
             data = it.call("serializeFMUState", saved)
         it.call("freeFMUState", saved)
@@ -221,7 +221,7 @@ def state(spec: dict[str, Any]) -> str:
         it.call("setFMUState", restored)
         it.call("freeFMUState", restored)
         it.time = time
-        _compare(expected, it.run(STEPS // 2), "from a serialized state")
+        compare(expected, it.run(STEPS // 2), "from a serialized state")
     return "a run from a restored or serialized state repeats the first"
 
 
@@ -249,7 +249,8 @@ def order(spec: dict[str, Any]) -> str:
     return f"{len(wrong)} wrong calls got an error"
 
 
-def _compare(expected: list[list[Any]], found: list[list[Any]], where: str) -> None:
+def compare(expected: list[list[Any]], found: list[list[Any]], where: str) -> None:
+    """Refuse rows of outputs that are not as expected."""
     for k, (a, b) in enumerate(zip(expected, found, strict=True)):
         if a != b:
             raise RefusedError(f"other outputs {where}: at step {k + 1}, {a!r} became {b!r}")
@@ -266,11 +267,11 @@ PROBES: dict[str, Callable[[dict[str, Any]], str]] = {
 }
 
 
-def main(path: str) -> None:
+def main(path: str, probes: dict[str, Callable[[dict[str, Any]], str]] = PROBES) -> None:
     """Run the probe that the file asks for, and write its verdict."""
     spec = json.loads(Path(path).read_text(encoding="utf-8"))
     try:
-        detail = PROBES[spec["probe"]](spec)
+        detail = probes[spec["probe"]](spec)
         verdict = "skipped" if detail.startswith("skipped: ") else "pass"
     except DoubtfulError as error:
         verdict, detail = "warning", str(error)

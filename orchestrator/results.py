@@ -95,9 +95,18 @@ class Recorder:
         names: of the signals.
         kinds: their FMI types; whole numbers are written as such, texts quoted where needed.
         directory: where to write; None keeps everything in memory.
+        past: rows to begin with, of a run that is resumed. there: how many rows of that run are on the disk; they stay
+            until there are as many new ones.
     """
 
-    def __init__(self, names: Sequence[str], kinds: Sequence[str], directory: Path | None) -> None:
+    def __init__(
+        self,
+        names: Sequence[str],
+        kinds: Sequence[str],
+        directory: Path | None,
+        past: NDArray[Any] | None = None,
+        there: int = 0,
+    ) -> None:
         self.names = list(names)
         whole = [k + 1 for k, kind in enumerate(kinds) if kind not in ("Real", "String")]
         self._texts = [k + 1 for k, kind in enumerate(kinds) if kind == "String"]
@@ -106,7 +115,10 @@ class Recorder:
         self._rows: list[Sequence[Any]] = []
         self._written = 0
         self._flushed = clock.monotonic()
-        self._writer = None if directory is None else Writer(directory, ["time", *names], whole, self._texts)
+        self._writer = None if directory is None else Writer(directory, ["time", *names], whole, self._texts, there)
+        if past is not None:
+            self.extend(past)
+            self.flush()
 
     def extend(self, rows: Sequence[Sequence[Any]] | NDArray[np.float64]) -> None:
         """Append rows of time and values; an array is kept, not copied."""
@@ -119,13 +131,20 @@ class Recorder:
         if self._writer is not None and clock.monotonic() - self._flushed > _FLUSH_SECONDS:
             self.flush()
 
-    def flush(self) -> None:
-        """Bring everything recorded so far to the disk."""
+    @property
+    def count(self) -> int:
+        """How many rows there are."""
+        return sum(map(len, self._blocks)) + len(self._rows)
+
+    def flush(self, *, sync: bool = False) -> None:
+        """Bring everything recorded so far to the disk, and wait until it is there where ``sync`` asks for that."""
         self._seal()
         if self._writer is not None:
             self._writer.append(self._blocks[self._written :])
             self._written = len(self._blocks)
             self._flushed = clock.monotonic()
+            if sync:
+                self._writer.sync()
 
     def close(self) -> None:
         """Complete the file; the rows stay in memory."""

@@ -3,23 +3,28 @@
 ``results.csv`` is for people and other programs. Its numbers are the shortest that read back to the same bits, and
 finding those takes longer than many a step. While a run goes its rows are therefore appended to ``results.bin``: one
 line of JSON with the ``columns`` and the places of those that hold ``whole`` numbers, then each row as 64-bit
-little-endian floats. That file is removed when ``results.csv`` is complete: where it is still there, the run was
-killed, and `recover` makes the text of it.
+little-endian floats. That file is removed when ``results.csv`` is complete: where it is still there, the run goes on
+or was killed, and `recover` makes the text of what there is.
+
+A run that is resumed writes beside what is there already, under a name that ends in ``.new``, and puts it in its place
+as soon as it has as many rows: if it is killed before, nothing is lost.
 """
 
 from __future__ import annotations
 
 import csv
+import io
 import json
 import os
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Iterator, Sequence
+from contextlib import suppress
 from pathlib import Path
-from typing import Any, TextIO
+from typing import IO, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-CSV, BINARY = "results.csv", "results.bin"
+CSV, BINARY, _NEW = "results.csv", "results.bin", ".new"
 _FLOAT = np.dtype("<f8")
 
 
@@ -31,39 +36,67 @@ class Writer:
         columns: the names, time first.
         whole: columns of whole numbers, by place; they are written as such.
         texts: columns of texts.
+        there: how many rows there are of the same run, if it is resumed; they go when there are as many new ones.
     """
 
-    def __init__(self, directory: Path, columns: Sequence[str], whole: Sequence[int], texts: Sequence[int]) -> None:
+    def __init__(
+        self, directory: Path, columns: Sequence[str], whole: Sequence[int], texts: Sequence[int], there: int = 0
+    ) -> None:
         self._directory = directory
         self._columns, self._whole, self._texts = columns, whole, texts
+        self._left = there
+        self._file: IO[Any]
         for name in (CSV, BINARY):
-            (directory / name).unlink(missing_ok=True)
+            if not there:
+                (directory / name).unlink(missing_ok=True)
+            (directory / f"{name}{_NEW}").unlink(missing_ok=True)
+        self._path = directory / f"{CSV if texts else BINARY}{_NEW if there else ''}"
+        self._open("w")
         if texts:
-            self._text = (directory / CSV).open("w", newline="", encoding="utf-8")
-            write_csv(self._text, columns, whole, ())
-            self._text.flush()
+            write_csv(self._file, columns, whole, ())
         else:
-            self._binary = (directory / BINARY).open("wb")
-            self._binary.write(json.dumps({"columns": list(columns), "whole": list(whole)}).encode() + b"\n")
-            self._binary.flush()
+            self._file.write(json.dumps({"columns": list(columns), "whole": list(whole)}).encode() + b"\n")
+        self._file.flush()
+
+    def _open(self, mode: str) -> None:
+        if self._texts:
+            self._file = self._path.open(mode, newline="", encoding="utf-8")
+        else:
+            self._file = self._path.open(f"{mode}b")
 
     def append(self, blocks: Iterable[NDArray[Any]]) -> None:
         """Bring rows to the disk."""
-        if self._texts:
-            _write_rows(self._text, self._whole, blocks)
-            self._text.flush()
-        else:
-            for block in blocks:
-                self._binary.write(np.ascontiguousarray(block, _FLOAT).data)
-            self._binary.flush()
+        for block in blocks:
+            if self._texts:
+                _write_rows(self._file, self._whole, [block])
+            else:
+                self._file.write(np.ascontiguousarray(block, _FLOAT).data)
+            self._left -= len(block)
+        self._file.flush()
+        if self._left <= 0 and self._path.suffix == _NEW:
+            self._file.close()
+            self._take_place()
+            self._open("a")
+
+    def sync(self) -> None:
+        """See to it that what was written outlives the machine's power."""
+        os.fsync(self._file.fileno())
+
+    def _take_place(self) -> None:
+        """Put the new file, which is closed, in the place of what is there."""
+        self._path = self._path.replace(self._path.with_suffix(""))
+        if not self._texts:
+            (self._directory / CSV).unlink(missing_ok=True)
 
     def close(self, blocks: Iterable[NDArray[Any]]) -> None:
         """End the file; ``blocks`` are all rows once more."""
-        if self._texts:
-            self._text.close()
-        else:
-            self._binary.close()
-            _finish(self._directory, self._columns, self._whole, blocks)
+        self._file.close()
+        if not self._texts:
+            _write_text(self._directory, self._columns, self._whole, blocks)
+            for path in {self._path, self._directory / BINARY}:
+                path.unlink(missing_ok=True)
+        elif self._path.suffix == _NEW:
+            self._take_place()
 
 
 def read_rows(directory: Path, texts: Iterable[str]) -> dict[str, NDArray[Any]]:
@@ -76,10 +109,18 @@ def read_rows(directory: Path, texts: Iterable[str]) -> dict[str, NDArray[Any]]:
         columns, _, table = _read_binary(directory / BINARY)
         return dict(zip(columns, np.ascontiguousarray(table.T), strict=True))
     with (directory / CSV).open(newline="", encoding="utf-8") as stream:
-        header, *rows = list(csv.reader(line for line in stream if line.endswith("\n"))) or [[]]
+        header, *rows = list(_lines(stream)) or [[]]
     rows = [row for row in rows if len(row) == len(header)]
     kinds: dict[str, Any] = dict.fromkeys(texts, object)
     return {name: _column([row[k] for row in rows], kinds.get(name, np.float64)) for k, name in enumerate(header)}
+
+
+def _lines(stream: IO[str]) -> Iterator[list[str]]:
+    """The lines that were written to their end. Texts may hold ends of lines of any kind."""
+    text = stream.read()
+    whole = io.StringIO(text[: text.rfind("\n") + 1], newline="")
+    with suppress(csv.Error):  # in the middle of a text
+        yield from csv.reader(whole, strict=True)
 
 
 def _column(words: list[str], kind: Any) -> NDArray[Any]:
@@ -87,13 +128,13 @@ def _column(words: list[str], kind: Any) -> NDArray[Any]:
 
 
 def recover(directory: Path) -> Path:
-    """Make ``results.csv`` of what a run that was killed has left.
+    """Make ``results.csv`` of what a run that was killed has left, or has written so far.
 
     Raises:
         OSError, ValueError, KeyError, TypeError: there is nothing that can be read.
     """
     columns, whole, table = _read_binary(directory / BINARY)
-    return _finish(directory, columns, whole, [table])
+    return _write_text(directory, columns, whole, [table])
 
 
 def _read_binary(path: Path) -> tuple[list[str], list[int], NDArray[np.float64]]:
@@ -106,24 +147,23 @@ def _read_binary(path: Path) -> tuple[list[str], list[int], NDArray[np.float64]]
     return columns, header["whole"], numbers[: len(numbers) // len(columns) * len(columns)].reshape(-1, len(columns))
 
 
-def _finish(directory: Path, columns: Sequence[str], whole: Sequence[int], blocks: Iterable[NDArray[Any]]) -> Path:
-    """From ``results.bin`` to ``results.csv``: at every moment one of the two is complete."""
+def _write_text(directory: Path, columns: Sequence[str], whole: Sequence[int], blocks: Iterable[NDArray[Any]]) -> Path:
+    """Write ``results.csv``, which is there as a whole or not at all."""
     path = directory / CSV
     part = path.with_name(CSV + ".part")
     with part.open("w", newline="", encoding="utf-8") as stream:
         write_csv(stream, columns, whole, blocks)
     os.replace(part, path)
-    (directory / BINARY).unlink()
     return path
 
 
-def write_csv(stream: TextIO, columns: Sequence[str], whole: Sequence[int], blocks: Iterable[NDArray[Any]]) -> None:
+def write_csv(stream: IO[str], columns: Sequence[str], whole: Sequence[int], blocks: Iterable[NDArray[Any]]) -> None:
     """Header and rows as text."""
     csv.writer(stream, lineterminator="\n").writerow(columns)
     _write_rows(stream, whole, blocks)
 
 
-def _write_rows(stream: TextIO, whole: Sequence[int], blocks: Iterable[NDArray[Any]]) -> None:
+def _write_rows(stream: IO[str], whole: Sequence[int], blocks: Iterable[NDArray[Any]]) -> None:
     for block in blocks:
         for row in block:
             cells = row.tolist()

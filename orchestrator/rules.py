@@ -10,7 +10,7 @@ from lxml import etree
 
 from .interface import Interface
 
-_STATE_CAPABILITIES = ("canGetAndSetFMUstate", "canSerializeFMUstate", "providesDirectionalDerivative")
+_CAPABILITIES = ("canGetAndSetFMUstate", "canSerializeFMUstate", "providesDirectionalDerivative")
 
 
 def broken_rules(folder: Path, interface: Interface) -> list[str]:
@@ -23,7 +23,7 @@ def broken_rules(folder: Path, interface: Interface) -> list[str]:
     root = etree.parse(str(folder / "modelDescription.xml")).getroot()
     broken = [*_variables(root, interface), *_units(interface), *_archive(root, folder)]
     if interface.vendor.get("kind") == "native":
-        broken += _native(root, folder)
+        broken += _native(root, interface, folder)
     return broken
 
 
@@ -61,9 +61,10 @@ def _archive(root: Any, folder: Path) -> Iterator[str]:
         yield "documentation/index.html is missing"
 
 
-def _native(root: Any, folder: Path) -> Iterator[str]:
+def _native(root: Any, interface: Interface, folder: Path) -> Iterator[str]:
     simulation = root.find("CoSimulation")
-    for capability in _STATE_CAPABILITIES:
+    moves = any(v.type == "Real" for v in interface.of("input"))
+    for capability in (*_CAPABILITIES, *(("canInterpolateInputs",) if moves else ())):
         if simulation.get(capability) != "true":
             yield f"{capability} is not declared"
     files = [f.get("name") for f in simulation.iterfind("SourceFiles/File")]

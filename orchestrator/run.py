@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import time as clock
 from collections.abc import Collection
 from dataclasses import dataclass, field, replace
@@ -137,6 +138,7 @@ def execute(
 ) -> Run:
     """As `run`, but a model that fails ends the run with ``status = "failed"`` instead of raising."""
     directory = Path(output) if output is not None else None
+    _check_distance(checkpoint_every)
     if checkpoint_every is not None and directory is None:
         raise ScenarioError("checkpoints are files: name an output directory for them")
     return _execute(system, Job(kind, directory, threads, checkpoint_every, None, progress), figures)
@@ -165,15 +167,21 @@ def resume(
         ScenarioError: there is no checkpoint that fits.
     """
     directory = Path(directory)
+    _check_distance(checkpoint_every)
     point = checkpoint.read(directory)
     system = _override(point.system, stop_time, None, None)
-    if system.stop_time <= point.progress["time"]:
+    if not system.stop_time > point.time:
         raise ScenarioError(
-            f"{directory}: its checkpoint is at t = {point.progress['time']:g} s; it cannot go on to an earlier stop "
-            f"time, {system.stop_time:g} s"
+            f"{directory}: its checkpoint is at t = {point.time:g} s; it cannot go on to an earlier stop time, "
+            f"{system.stop_time:g} s"
         )
     every = checkpoint_every if checkpoint_every is not None else point.every
     return _execute(system, Job(point.kind, directory, threads, every, point, progress), figures)
+
+
+def _check_distance(checkpoint_every: float | None) -> None:
+    if checkpoint_every is not None and not 0.0 < checkpoint_every < math.inf:
+        raise ScenarioError(f"checkpoints: their distance must be a positive number of s, not {checkpoint_every!r}")
 
 
 def _execute(system: System, job: Job, figures: bool) -> Run:
@@ -219,6 +227,11 @@ def evaluate(outcome: Run) -> None:
     )
 
 
+def at_half_the_step(system: System) -> System:
+    """The same at half the step, recorded at the same points; longer steps of instances' own stay."""
+    return _override(replace(system, record=system.record or system.step), None, 0.5 * system.step, None)
+
+
 def _override(system: System, stop_time: float | None, step: float | None, algorithm: Algorithm | None) -> System:
     changes: dict[str, Any] = {}
     if stop_time is not None and stop_time != system.stop_time:
@@ -234,10 +247,12 @@ def _override(system: System, stop_time: float | None, step: float | None, algor
 
 
 def _rescaled(instance: Instance, before: float, step: float) -> Instance:
-    """A sample time that was given as the old step follows the new one."""
-    if instance.start.get("sample_time") != before:
-        return instance
-    return replace(instance, start={**instance.start, "sample_time": step})
+    """A step and a sample time that were given as the old step follow the new one."""
+    if instance.step == before:
+        instance = replace(instance, step=step)
+    if instance.start.get("sample_time") == before:
+        instance = replace(instance, start={**instance.start, "sample_time": step})
+    return instance
 
 
 def _open_directory(directory: Path, checked: Checked, job: Job) -> None:

@@ -57,7 +57,7 @@ class Session:
     Args:
         checked: the system, found fit to run.
         job: how to run it.
-        past: rows that were recorded before the checkpoint to begin at.
+        past: rows that were recorded before, if the run goes on.
 
     Attributes:
         status: how it ended; error: why it failed or ended early.
@@ -120,13 +120,13 @@ class Session:
         sequence = checked.order.sequence
         master = Master(self._slaves, sequence, wiring.links, wiring.starts, system.algorithm, settings=settings)
         master.initialize(system.start_time, system.stop_time)
-        self._recorder = Recorder(master.signals, master.kinds, self.job.directory)
         if self.job.begin is None or self._past is None:
+            self._recorder = Recorder(master.signals, master.kinds, self.job.directory)
             self._recorder.extend([[system.start_time, *master.values]])
         else:
             self.job.begin.restore(master)
-            self._recorder.extend(self._past)
-            self._recorder.flush()
+            past, there = self._past[: self.job.begin.rows], len(self._past)
+            self._recorder = Recorder(master.signals, master.kinds, self.job.directory, past, there)
         return master
 
     def _step(self, master: Master) -> bool:
@@ -179,7 +179,7 @@ class Session:
         job, recorder = self.job, self._recorder
         assert job.directory is not None
         assert recorder is not None
-        recorder.flush()
+        recorder.flush(sync=True)
         point = Checkpoint.take(
             self.system, self.checked.models, master, kind=job.kind, rows=recorder.count, every=job.checkpoint_every
         )
@@ -211,21 +211,23 @@ class Session:
 
 
 def rows_before(job: Job) -> NDArray[Any] | None:
-    """What had been recorded when the checkpoint was written that a run begins at.
+    """What a run that goes on has recorded, beyond its checkpoint too.
 
     Raises:
         ScenarioError: the results are not those of the checkpoint.
     """
     if job.begin is None or job.directory is None:
         return None
-    before = Results.load(job.directory)
-    if len(before) < job.begin.rows:
+    before, rows = Results.load(job.directory), job.begin.rows
+    if len(before) < rows:
         raise ScenarioError(
-            f"{job.directory} cannot be resumed: its results have {len(before)} rows, fewer than the {job.begin.rows} "
-            "of its checkpoint"
+            f"{job.directory} cannot be resumed: its results have {len(before)} rows, fewer than the {rows} of its "
+            "checkpoint"
         )
+    if len(before.names()) != job.begin.width or not before.time[rows - 1] <= job.begin.time:
+        raise ScenarioError(f"{job.directory} cannot be resumed: its results and its checkpoint are of different runs")
     columns = [before.time, *(before[name] for name in before.names())]
-    return np.array(columns, dtype=np.result_type(*columns)).T[: job.begin.rows]
+    return np.array(columns, dtype=np.result_type(*columns)).T
 
 
 @contextmanager

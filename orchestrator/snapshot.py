@@ -15,8 +15,8 @@ from typing import Any, Protocol
 import numpy as np
 
 from .errors import FmuError
-from .fmu import FmuSlave
 from .interface import Interface
+from .loaded import STATE_HEAD
 from .plain import PlainSlave
 from .slave import Slave
 
@@ -47,10 +47,9 @@ def take(slave: Slave, states: Sequence[str]) -> Snapshot:
     """
     if isinstance(slave, PlainSlave):
         return PlainSnapshot(slave, states)
-    assert isinstance(slave, FmuSlave)
     if not slave.interface.can_save_state:
         raise FmuError("it cannot save its state", instance=slave.name, time=slave.time)
-    kinds: dict[str, Callable[[FmuSlave, Sequence[str]], Snapshot]] = {
+    kinds: dict[str, Callable[[Slave, Sequence[str]], Snapshot]] = {
         "native": NativeSnapshot,
         "python": PythonSnapshot,
     }
@@ -65,7 +64,7 @@ def state_names(slave: Slave) -> list[str]:
     """
     interface = slave.interface
     kept = [v.name for v in interface.variables.values() if v.type == "Real" and v.causality in ("local", "output")]
-    if isinstance(slave, FmuSlave) and interface.vendor.get("kind") == "native":
+    if not isinstance(slave, PlainSlave) and interface.vendor.get("kind") == "native":
         return [name for name in kept if interface.variables[name].variability == "discrete"]
     saved = slave.simulation.save() if isinstance(slave, PlainSlave) else _read_json(slave)
     return [name for name in kept if name.partition("[")[0] in saved["values"]]
@@ -81,7 +80,7 @@ def _read_json(slave: Slave) -> dict[str, Any]:
 
 def _content(serialized: bytes) -> dict[str, Any]:
     """What stands in a Python FMU's saved state."""
-    content: dict[str, Any] = json.loads(serialized[FmuSlave.STATE_HEAD :].rstrip(b"\0"))
+    content: dict[str, Any] = json.loads(serialized[STATE_HEAD:].rstrip(b"\0"))
     return content
 
 
@@ -132,7 +131,7 @@ class PlainSnapshot:
 class _FmuSnapshot:
     """What snapshots of FMUs share: the state that the FMU saves."""
 
-    def __init__(self, slave: FmuSlave, states: Sequence[str]) -> None:
+    def __init__(self, slave: Slave, states: Sequence[str]) -> None:
         self._slave = slave
         self._state = slave.save()
 
@@ -151,7 +150,7 @@ class _FmuSnapshot:
 class PythonSnapshot(_FmuSnapshot):
     """Of a Python FMU of ours: JSON."""
 
-    def __init__(self, slave: FmuSlave, states: Sequence[str]) -> None:
+    def __init__(self, slave: Slave, states: Sequence[str]) -> None:
         super().__init__(slave, states)
         self._serialized = slave.serialize(self._state)
         self._saved = _content(self._serialized)
@@ -161,7 +160,7 @@ class PythonSnapshot(_FmuSnapshot):
         """Bring the instance back to it, with other values for some states."""
         if changes:
             content = json.dumps(_changed(self._saved, self._slave.interface, changes)).encode()
-            self._restore_bytes(self._serialized[: FmuSlave.STATE_HEAD] + content)
+            self._restore_bytes(self._serialized[:STATE_HEAD] + content)
         else:
             self._slave.restore(self._state)
 
@@ -169,7 +168,7 @@ class PythonSnapshot(_FmuSnapshot):
 class NativeSnapshot(_FmuSnapshot):
     """Of a native FMU of ours: a flat block, in which a double stands for every variable, by value reference."""
 
-    def __init__(self, slave: FmuSlave, states: Sequence[str]) -> None:
+    def __init__(self, slave: Slave, states: Sequence[str]) -> None:
         known = _numbers(slave)  # read first: it brings the outputs in the block up to date
         super().__init__(slave, states)
         self._block = slave.serialize(self._state)
@@ -196,7 +195,7 @@ class NativeSnapshot(_FmuSnapshot):
             self._trusted = True
 
 
-def _numbers(slave: FmuSlave) -> dict[int, float]:
+def _numbers(slave: Slave) -> dict[int, float]:
     """The values of all numbers by value reference."""
     found: dict[int, float] = {}
     for kind in ("Real", "Integer", "Boolean"):
@@ -219,7 +218,7 @@ def _place_of_values(block: bytes, known: Mapping[int, float]) -> int | None:
 class ForeignSnapshot(_FmuSnapshot):
     """Of another maker's FMU: a handle; states are set like inputs, where the FMU lets us."""
 
-    def __init__(self, slave: FmuSlave, states: Sequence[str]) -> None:
+    def __init__(self, slave: Slave, states: Sequence[str]) -> None:
         super().__init__(slave, states)
         self._channel = slave.channel("Real", states)
         self.values = dict(zip(states, self._channel.get(), strict=True))

@@ -154,11 +154,8 @@ class _Reader:
                 return Operation(self.operator(node, kind), (self.read(left, deeper), self.read(right, deeper)))
             case ast.BoolOp(op=kind, values=values):
                 return Operation(self.operator(node, kind), tuple(self.read(value, deeper) for value in values))
-            case ast.Compare(left=left, ops=kinds, comparators=others):
-                ends = [self.read(end, deeper) for end in (left, *others)]
-                signs = [self.operator(node, kind) for kind in kinds]
-                links = [Operation(sign, (a, b)) for sign, a, b in zip(signs, ends, ends[1:], strict=False)]
-                return links[0] if len(links) == 1 else Operation("and", tuple(links))
+            case ast.Compare():
+                return self.comparison(node, deeper)
             case ast.IfExp(test=test, body=body, orelse=otherwise):
                 return Operation("if", tuple(self.read(part, deeper) for part in (test, body, otherwise)))
             case ast.Call():
@@ -168,6 +165,16 @@ class _Reader:
             case ast.List() | ast.Tuple():
                 raise self.error(node, "a list is only understood as an argument, as in outside = [210, 240]")
         raise self.error(node, "write numbers, signals, + - * / **, comparisons, and/or/not, if/else and functions")
+
+    def comparison(self, node: ast.Compare, depth: int) -> Node:
+        """One comparison, or a chain as `and`: that evaluates what is inside twice, so no chain may stand there."""
+        inner = [part for end in node.comparators[:-1] for part in ast.walk(end)]
+        if any(isinstance(part, ast.Compare) and len(part.ops) > 1 for part in inner):
+            raise self.error(node, "a chain of comparisons stands inside another; part them with 'and'")
+        ends = [self.read(end, depth) for end in (node.left, *node.comparators)]
+        signs = [self.operator(node, kind) for kind in node.ops]
+        links = [Operation(sign, (a, b)) for sign, a, b in zip(signs, ends, ends[1:], strict=False)]
+        return links[0] if len(links) == 1 else Operation("and", tuple(links))
 
     def call(self, node: ast.Call, depth: int) -> Node:
         if not isinstance(node.func, ast.Name):
@@ -180,6 +187,8 @@ class _Reader:
         keywords = tuple(keyword.arg for keyword in node.keywords if keyword.arg is not None)
         if len(keywords) < len(node.keywords) or any(isinstance(argument, ast.Starred) for argument in node.args):
             raise self.error(node, "* and ** arguments are not understood; write the arguments out")
+        if len(set(keywords)) < len(keywords):
+            raise self.error(node, "an argument stands twice; keep one")
         arguments = [*node.args, *(keyword.value for keyword in node.keywords)]
         return Call(node.func.id, tuple(self.argument(x, depth) for x in arguments), keywords, self.column(node))
 

@@ -10,6 +10,7 @@ from typing import Any
 
 from .errors import ScenarioError
 
+MAX_DEPTH = 100
 Path_ = tuple[str | int, ...]  # where a value stands: ("instances", "train", "count"), ("published", 0, "value")
 
 _TOKEN = re.compile(
@@ -72,13 +73,16 @@ class Source:
 
     def _parse(self) -> dict[str, Any]:
         try:
-            return tomllib.loads(self.text)
+            data = tomllib.loads(self.text)
         except tomllib.TOMLDecodeError as error:
             raise ScenarioError(self._explain(str(error))) from None
         except RecursionError:
             raise ScenarioError(f"{self.label}: nested too deeply; no scenario needs that") from None
         except ValueError as error:  # an integer of more digits than Python converts
             raise ScenarioError(f"{self.label}: {error}") from None
+        if _is_deeper(data, MAX_DEPTH):
+            raise ScenarioError(f"{self.label}: nested more than {MAX_DEPTH} levels deep; no scenario needs that")
+        return data
 
     def _explain(self, message: str) -> str:
         """A syntax error as `file:line: column n: what`, with the remedy for the mistake that is made most."""
@@ -93,6 +97,12 @@ class Source:
         if _UNQUOTED_INDEX.match(line):
             remedy = '; a key with [ ] stands in quotes: "train[1].speed" = ...'
         return f"{self.label}:{number}: column {found[2]}: {message[: found.start()]}{remedy}"
+
+
+def _is_deeper(value: Any, levels: int) -> bool:
+    """Whether tables and lists stand in each other more levels deep. Keys such as a.a.a... nest without brackets."""
+    inner = value.values() if isinstance(value, dict) else value if isinstance(value, list) else ()
+    return levels < 0 or any(_is_deeper(item, levels - 1) for item in inner)
 
 
 def _huge_integers(value: Any, path: Path_) -> Iterator[Path_]:
@@ -110,7 +120,9 @@ def parse_value(text: str) -> Any:
         parsed = tomllib.loads(f"value = {text}")
     except (ValueError, RecursionError):
         return text
-    return parsed["value"] if list(parsed) == ["value"] else text
+    if list(parsed) != ["value"] or _is_deeper(parsed, MAX_DEPTH) or any(_huge_integers(parsed, ())):
+        return text
+    return parsed["value"]
 
 
 def _locate(text: str) -> dict[Path_, int]:

@@ -22,11 +22,12 @@ from rich.table import Table
 from rich.text import Text
 
 from .archive import Workspace
+from .binary import library, names_of_platform
 from .errors import FmuFileError
-from .fmu import library
 from .interface import Interface, Variable
 from .loading import load_fmu
 from .rules import broken_rules
+from .translate import is_pedantry
 
 Verdict = Literal["pass", "warning", "fail", "skipped"]
 PROBES = {
@@ -42,7 +43,13 @@ PROBES = {
 TIMEOUT = 60.0
 _DEFAULT_STEP = 0.1
 _LISTED = 20
-_SCHEMA = Path(fmpy.__file__).parent / "schema" / "fmi2" / "fmi2ModelDescription.xsd"
+_SCHEMAS = {
+    "1.0": "fmi1/fmiModelDescription.xsd",
+    "2.0": "fmi2/fmi2ModelDescription.xsd",
+    "3.0": "fmi3/fmi3ModelDescription.xsd",
+}
+_FMI_2_ONLY = ("reset", "order")
+"""Probes of bare calls, which other versions call otherwise."""
 
 
 @dataclass(frozen=True)
@@ -82,7 +89,7 @@ def validate(path: Path, *, timeout: float = TIMEOUT) -> Report:
         model = load_fmu(path, workspace)
         interface, folder = model.interface, model.folder
         findings = [Finding("archive", "pass", "unpacks, and nothing in it points outside")]
-        findings += _described(path, folder)
+        findings += _described(path, folder, interface.version)
         if interface.vendor:
             broken = broken_rules(folder, interface)
             findings.append(_listed("rules of railcosim", broken, "all kept"))
@@ -93,15 +100,16 @@ def validate(path: Path, *, timeout: float = TIMEOUT) -> Report:
 # -------------------------------------------------------------------- what stands in the file
 
 
-def _described(path: Path, folder: Path) -> list[Finding]:
-    schema = etree.XMLSchema(file=str(_SCHEMA))
+def _described(path: Path, folder: Path, version: str) -> list[Finding]:
+    schema = etree.XMLSchema(file=str(Path(fmpy.__file__).parent / "schema" / _SCHEMAS[version]))
     parsed = etree.parse(str(folder / "modelDescription.xml"))
     schema.validate(parsed)
     against = [f"line {entry.line}: {entry.message}" for entry in schema.error_log]
-    findings = [_listed("schema", against, "modelDescription.xml keeps the schema of FMI 2.0")]
+    findings = [_listed("schema", against, f"modelDescription.xml keeps the schema of FMI {version}")]
     if against:
         return [*findings, Finding("description", "skipped", "FMPy looks no further than the schema")]
-    return [*findings, _listed("description", validate_fmu(str(path)), "FMPy's validator finds nothing")]
+    problems = [problem for problem in validate_fmu(str(path)) if not is_pedantry(version, problem)]
+    return [*findings, _listed("description", problems, "FMPy's validator finds nothing")]
 
 
 def _listed(check: str, problems: Sequence[str], fine: str) -> Finding:
@@ -115,16 +123,21 @@ def _listed(check: str, problems: Sequence[str], fine: str) -> Finding:
 def _probed(interface: Interface, folder: Path, path: Path, timeout: float) -> list[Finding]:
     binaries = folder / "binaries"
     platforms = sorted(p.name for p in binaries.iterdir() if p.is_dir()) if binaries.is_dir() else []
-    if fmpy.platform not in platforms:
+    here = names_of_platform(interface.version)
+    if not set(here) & set(platforms):
         brings = f"it brings {', '.join(platforms)}" if platforms else "it brings none"
-        return [Finding("binary", "skipped" if platforms else "fail", f"none for {fmpy.platform}; {brings}")]
+        return [Finding("binary", "skipped" if platforms else "fail", f"none for {here[0]}; {brings}")]
     try:
         found = library(folder, interface, str(path))
     except FmuFileError as error:
         return [Finding("binary", "fail", str(error))]
-    named = found.stem == interface.identifier
-    problem = f"{found.name} is not named after the model identifier {interface.identifier!r}: most importers need that"
-    findings = [Finding("binary", "pass" if named else "fail", f"for {', '.join(platforms)}" if named else problem)]
+    problems = []
+    if found.stem != interface.identifier:
+        problems.append(f"{found.name} is not named after the model identifier {interface.identifier!r}")
+    if found.parent.name != here[0]:
+        problems.append(f"{found.name} stands in binaries/{found.parent.name}, not in binaries/{here[0]}")
+    problems = [f"{problem}: most importers need that" for problem in problems]
+    findings = [_listed("binary", problems, f"for {', '.join(platforms)}")]
     spec = _spec(interface, folder, found)
     with ThreadPoolExecutor(os.cpu_count() or 1) as pool:
         answers = pool.map(lambda probe: _probe(probe, spec, folder.parent, timeout), PROBES)
@@ -134,11 +147,11 @@ def _probed(interface: Interface, folder: Path, path: Path, timeout: float) -> l
 
 def _spec(interface: Interface, folder: Path, found: Path) -> dict[str, Any]:
     """What a probe has to know."""
-    simulation: Any = etree.parse(str(folder / "modelDescription.xml")).getroot().find("CoSimulation")
     outputs: dict[str, list[tuple[str, int]]] = {}
     for variable in interface.of("output"):
         outputs.setdefault(variable.type, []).append((variable.name, variable.reference))
     return {
+        "version": interface.version,
         "folder": str(folder),
         "library": str(found),
         "guid": interface.guid,
@@ -147,7 +160,7 @@ def _spec(interface: Interface, folder: Path, found: Path) -> dict[str, Any]:
         "talks": "pythonfmu" in interface.generator.lower() or interface.vendor.get("kind") == "python",
         "single": interface.single_instance,
         "can_save": interface.can_save_state,
-        "can_serialize": simulation.get("canSerializeFMUstate") == "true",
+        "can_serialize": interface.can_serialize_state,
         "start_time": 0.0,
         "step": interface.default_step or interface.vendor.get("recommended_step") or _DEFAULT_STEP,
         "outputs": outputs,
@@ -165,7 +178,13 @@ def _probe(probe: str, spec: dict[str, Any], folder: Path, timeout: float) -> tu
     trying = place / "trying.txt"
     more = {"probe": probe, "answer": str(answer), "trying": str(trying)}
     (place / "spec.json").write_text(json.dumps(spec | more), encoding="utf-8")
-    command = [sys.executable, "-P", str(Path(__file__).with_name("probe.py")), str(place / "spec.json")]
+    if spec["version"] == "2.0":
+        script = [str(Path(__file__).with_name("probe.py"))]
+    elif probe in _FMI_2_ONLY:
+        return "skipped", "tried with FMI 2.0 only"
+    else:
+        script = ["-m", f"{__package__}.probe_slave"]
+    command = [sys.executable, "-P", *script, str(place / "spec.json")]
     with (place / "output.txt").open("wb") as output:
         process = subprocess.Popen(
             command, cwd=place, stdin=subprocess.DEVNULL, stdout=output, stderr=output, start_new_session=True

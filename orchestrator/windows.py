@@ -59,8 +59,8 @@ def scalar(value: Any, what: str) -> float:
     Raises:
         ExpressionError: it does, or it is a list or NaN.
     """
-    numbers = np.asarray(value, dtype=np.float64).ravel()
-    if isinstance(value, list) or numbers.size == 0 or not np.all(numbers == numbers[0]):
+    numbers = np.empty(0) if isinstance(value, list) else np.asarray(value, dtype=np.float64).ravel()
+    if numbers.size == 0 or not np.all(numbers == numbers[0]):
         raise ExpressionError(f"{what} must be one number, not a list or a signal that varies")
     return float(numbers[0])
 
@@ -111,8 +111,6 @@ def window_of(signals: Signals, x: Any, after: Any = None, until: Any = None, ou
     start = None if after is None else scalar(after, "after")
     end = None if until is None else scalar(until, "until")
     excluded = [] if outside is None else time_windows(outside)
-    if isinstance(x, list):
-        raise ExpressionError("a reducer works on a signal, not on a list")
     time = signals.time
     last = float(time[-1]) if time.size else -np.inf
     if end is not None and end > last + 1e-6 * signals.step:

@@ -4,26 +4,23 @@ from __future__ import annotations
 
 import hashlib
 import math
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
+from itertools import chain
 from typing import Any
 
 import numpy as np
 
+from .conversion import fit
 from .errors import ExpressionError, did_you_mean
 from .expressions import evaluate_constant
-from .interface import Interface, Type, Unit, Variable
+from .interface import Interface, Variable
 from .system import Connection, Instance, System, split
 
-_NUMERIC = ("Real", "Integer", "Enumeration")
-_COMPATIBLE: dict[Type, tuple[Type, ...]] = {
-    "Real": ("Real", "Integer"),
-    "Integer": ("Integer", "Enumeration"),
-    "Enumeration": ("Enumeration", "Integer"),
-    "Boolean": ("Boolean",),
-    "String": ("String",),
-}
-"""For an input's type, the output types it may follow without losing anything."""
+_MOST_COMPARED = 50_000
+"""How many names wrong ones are compared with to find the nearest: with thousands of both that would take minutes."""
+_LISTED = 4
+"""How many inputs of an instance are named that nothing feeds."""
 
 
 @dataclass(frozen=True)
@@ -52,12 +49,24 @@ class Wiring:
     Attributes:
         starts: start values by instance and scalar variable. links: scalar connections.
         problems, notes: sentences; with a problem the system cannot run.
+        told: what a note has said of some connection, and need not of others. compared: names that wrong ones were
+            compared with.
     """
 
     starts: dict[str, dict[str, Any]] = field(default_factory=dict)
     links: list[Link] = field(default_factory=list)
     problems: list[str] = field(default_factory=list)
     notes: list[str] = field(default_factory=list)
+    told: set[str] = field(default_factory=set, repr=False)
+    compared: int = field(default=0, repr=False)
+
+    def near(self, name: str, valid: Iterable[str]) -> str:
+        """The nearest right name, as a clause; not for ever."""
+        if self.compared > _MOST_COMPARED:
+            return ""
+        names = list(valid)
+        self.compared += len(names)
+        return did_you_mean(name, names)
 
 
 def wire(system: System, interfaces: Mapping[str, Interface]) -> Wiring:
@@ -84,8 +93,9 @@ def _starts(system: System, instance: Instance, interface: Interface, wiring: Wi
         if scalars is None and instance.swapped:
             dropped.append(name)
         elif scalars is None:
-            valid = [v.name for v in interface.variables.values() if v.settable] + list(interface.arrays)
-            wiring.problems.append(f"{where}: {interface.model} has no such variable{did_you_mean(name, valid)}")
+            valid = (v.name for v in interface.variables.values() if v.settable)
+            hint = interface.why_left_out(name) or wiring.near(name, chain(valid, interface.arrays))
+            wiring.problems.append(f"{where}: {interface.model} has no such variable{hint}")
         else:
             try:
                 values.update(_elements(instance, interface, name, scalars, given))
@@ -105,9 +115,11 @@ def _elements(
     Raises:
         ValueError: what is wrong with it.
     """
-    fixed = [s for s in scalars if not interface.variables[s].settable]
-    if fixed:
-        raise ValueError(f"it is computed (causality {interface.variables[fixed[0]].causality}) and cannot be set")
+    fixed = next((interface.variables[s] for s in scalars if not interface.variables[s].settable), None)
+    if fixed is not None and fixed.variability == "constant":
+        raise ValueError("it is a constant of the model and cannot be set")
+    if fixed is not None:
+        raise ValueError(f"it is computed (causality {fixed.causality}) and cannot be set")
     elements = _flatten(given)
     if isinstance(given, list | tuple | np.ndarray):
         if name in interface.variables:
@@ -132,6 +144,9 @@ def _typed(given: Any, variable: Variable, instance: Instance) -> Any:
         if not isinstance(given, str):
             raise ValueError(f"takes text, not {given!r}")
         return given
+    choices = dict(variable.choices)
+    if isinstance(given, str) and given in choices:
+        return choices[given]
     if isinstance(given, str):
         constants = (
             {"count": instance.count} if instance.index is None else {"i": instance.index, "count": instance.count}
@@ -144,14 +159,29 @@ def _typed(given: Any, variable: Variable, instance: Instance) -> Any:
         return int(given)
     if is_truth or not isinstance(given, float | int | np.floating | np.integer):
         raise ValueError(f"takes a number, not {given!r}")
-    return _bounded(given, variable)
+    return bounded(given, variable)
 
 
-def _bounded(given: Any, variable: Variable) -> float | int:
-    if not abs(given) < math.inf:
+def bounded(given: Any, variable: Variable) -> float | int:
+    """A number that a variable can take, as its type.
+
+    Raises:
+        ValueError: what is wrong with it.
+    """
+    try:
+        finite = math.isfinite(given)
+    except OverflowError:  # a whole number beyond all others
+        finite = False
+    if not finite:
         raise ValueError(f"takes a finite number, not {given!r}")
     if variable.type != "Real" and given != int(given):
         raise ValueError(f"takes a whole number, not {given!r}")
+    if variable.choices and given not in dict(variable.choices).values():
+        valid = ", ".join(f"{name} ({value})" for name, value in variable.choices)
+        raise ValueError(f"takes one of {valid}, not {given!r}")
+    whole = variable.whole_range
+    if whole is not None and not whole[0] <= given <= whole[1]:
+        raise ValueError(f"takes a whole number from {whole[0]} to {whole[1]}, not {given!r}")
     low, high = variable.minimum, variable.maximum
     if low is not None and given < low:
         raise ValueError(f"{given} is below the limit {low:g} {variable.unit or ''}".rstrip())
@@ -184,7 +214,7 @@ def _links(connection: Connection, interfaces: Mapping[str, Interface], wiring: 
     where = f"{_place(connection.origin)}{connection.target!r} = {connection.source!r}"
     ends = []
     for reference, direction in ((connection.source, "output"), (connection.target, "input")):
-        problem, scalars = _end(reference, direction, interfaces)
+        problem, scalars = _end(reference, direction, interfaces, wiring)
         if problem:
             wiring.problems.append(f"{where}: {problem}")
         ends.append(scalars)
@@ -202,17 +232,20 @@ def _links(connection: Connection, interfaces: Mapping[str, Interface], wiring: 
     for source, target in zip(sources, targets, strict=True):
         a = interfaces[source_instance].variables[source]
         b = interfaces[target_instance].variables[target]
-        problem, scale, offset = _conversion(a, interfaces[source_instance], b, interfaces[target_instance], connection)
-        if problem:
-            wiring.problems.append(f"{where}: {problem}")
+        conversion = fit(a, interfaces[source_instance], b, interfaces[target_instance], connection)
+        if conversion.problem:
+            wiring.problems.append(f"{where}: {conversion.problem}")
             return []
+        if conversion.note and conversion.note not in wiring.told:
+            wiring.told.add(conversion.note)
+            wiring.notes.append(f"{where}: {conversion.note}")
         direct = is_direct(interfaces[source_instance], a)
         links.append(
             Link(
                 (source_instance, source),
                 (target_instance, target),
-                scale,
-                offset,
+                conversion.scale,
+                conversion.offset,
                 connection.delay,
                 direct,
                 connection,
@@ -221,24 +254,32 @@ def _links(connection: Connection, interfaces: Mapping[str, Interface], wiring: 
     return links
 
 
-def _end(reference: str, direction: str, interfaces: Mapping[str, Interface]) -> tuple[str, tuple[str, ...]]:
+def _end(
+    reference: str, direction: str, interfaces: Mapping[str, Interface], wiring: Wiring
+) -> tuple[str, tuple[str, ...]]:
     instance, name = split(reference)
     if instance not in interfaces:
-        return f"there is no instance {instance!r}{did_you_mean(instance, interfaces)}", ()
+        return f"there is no instance {instance!r}{wiring.near(instance, interfaces)}", ()
     interface = interfaces[instance]
     allowed = ("input",) if direction == "input" else ("output", "local", "parameter", "calculatedParameter")
     scalars = interface.scalars(name)
     if scalars is None:
-        valid = [v.name for v in interface.of("input" if direction == "input" else "output")]
-        listed = valid if len(valid) <= 12 else [*valid[:12], "..."]
-        hint = (
-            did_you_mean(name, [*valid, *interface.arrays]) or f"; its {direction}s are {', '.join(listed) or 'none'}"
-        )
+        hint = interface.why_left_out(name) or _hint(interface, name, direction, wiring)
         return f"{interface.model} ({instance}) has no variable {name!r}{hint}", ()
     wrong = [s for s in scalars if interface.variables[s].causality not in allowed]
     if wrong:
         return f"{instance}.{wrong[0]} is not an {direction} but {interface.variables[wrong[0]].causality}", ()
     return "", scalars
+
+
+def _hint(interface: Interface, name: str, direction: str, wiring: Wiring) -> str:
+    """The nearest input or output, or a list of them; nothing any more where thousands of names are wrong."""
+    if wiring.compared > _MOST_COMPARED:
+        return ""
+    valid = [v.name for v in interface.of("input" if direction == "input" else "output")]
+    listed = valid if len(valid) <= 12 else [*valid[:12], "..."]
+    near = wiring.near(name, [*valid, *interface.arrays])
+    return near or f"; its {direction}s are {', '.join(listed) or 'none'}"
 
 
 def is_direct(interface: Interface, output: Variable) -> bool:
@@ -251,71 +292,71 @@ def is_direct(interface: Interface, output: Variable) -> bool:
         return False
     if output.dependencies is None:
         return bool(interface.vendor)
-    inputs = {v.name for v in interface.of("input")}
-    return bool(output.dependencies & inputs)
-
-
-def _conversion(
-    a: Variable, of_a: Interface, b: Variable, of_b: Interface, connection: Connection
-) -> tuple[str, float, float]:
-    """Problem, scale and offset of output ``a`` feeding input ``b``."""
-    if a.type not in _COMPATIBLE[b.type]:
-        return f"a {a.type} output cannot feed a {b.type} input", 1.0, 0.0
-    if b.type != "Real":
-        if (connection.scale, connection.offset) != (1.0, 0.0):
-            return f"scale and offset apply to Real inputs, not to {b.type}", 1.0, 0.0
-        return "", 1.0, 0.0
-    scale, offset = 1.0, 0.0
-    if a.unit is not None and b.unit is not None and a.unit != b.unit:
-        ua, ub = of_a.units.get(a.unit), of_b.units.get(b.unit)
-        if ua is None or ub is None or ua.exponents is None or ub.exponents is None:
-            unknown = a.unit if ua is None or ua.exponents is None else b.unit
-            return (
-                f"unit {a.unit!r} cannot be converted to {b.unit!r}: {unknown!r} is not defined in SI units",
-                1.0,
-                0.0,
-            )
-        if ua.exponents != ub.exponents:
-            return f"unit {a.unit!r} does not convert to {b.unit!r}", 1.0, 0.0
-        scale, offset = convert(ua, ub)
-    return "", connection.scale * scale, connection.scale * offset + connection.offset
-
-
-def convert(a: Unit, b: Unit) -> tuple[float, float]:
-    """Scale and offset that turn a value in unit ``a`` into unit ``b``; both of the same dimension."""
-    return a.factor / b.factor, (a.offset - b.offset) / b.factor
+    return not output.dependencies.isdisjoint(interface.inputs)
 
 
 # -------------------------------------------------------------------- what else can be known
 
 
 def _check_inputs(system: System, interfaces: Mapping[str, Interface], wiring: Wiring) -> None:
-    fed: dict[tuple[str, str], Connection] = {}
-    for link in wiring.links:
-        if link.target in fed:
-            first = fed[link.target]
-            wiring.problems.append(
-                f"{_place(link.connection.origin)}{'.'.join(link.target)} is fed twice: by {first.source!r} and by "
-                f"{link.connection.source!r}"
-            )
-        fed[link.target] = link.connection
+    fed = _fed(interfaces, wiring)
     # Of an input that something is meant to feed, nothing more is said than what is wrong with its connection.
     broken = {c.target for c in system.connections} if wiring.problems else set()
     for instance, interface in interfaces.items():
         given = wiring.starts[instance]
-        for variable in interface.of("input"):
-            key = (instance, variable.name)
-            if key in fed or variable.name in given or variable.name in interface.optional_inputs:
-                continue
-            if not broken.isdisjoint((".".join(key), f"{instance}.{variable.name.rpartition('[')[0]}")):
-                continue
-            if interface.vendor:
-                wiring.problems.append(
-                    f"{_place(system.instances[instance].origin)}{instance}.{variable.name} is a required input and "
-                    "nothing feeds it: connect it, or give it a start value to hold it constant"
-                )
-            else:
-                wiring.notes.append(f"{instance}.{variable.name} is not connected; it keeps {variable.start!r}")
+        open_inputs = [
+            variable
+            for variable in interface.of("input")
+            if _slot(instance, variable) not in fed
+            and variable.name not in given
+            and variable.name not in interface.optional_inputs
+            and broken.isdisjoint((f"{instance}.{variable.name}", f"{instance}.{variable.name.rpartition('[')[0]}"))
+        ]
+        if interface.vendor:
+            wiring.problems += [
+                f"{_place(system.instances[instance].origin)}{instance}.{variable.name} is a required input and "
+                "nothing feeds it: connect it, or give it a start value to hold it constant"
+                for variable in open_inputs
+            ]
+        else:
+            wiring.notes += _kept(instance, open_inputs)
+
+
+def _slot(instance: str, variable: Variable) -> tuple[str, str, int]:
+    """What a variable stands for in its FMU: those that share it are one (FMI 2.0, 2.2.7)."""
+    kind = "Integer" if variable.type == "Enumeration" else variable.type
+    return instance, variable.fmi_type or kind, variable.reference
+
+
+def _fed(interfaces: Mapping[str, Interface], wiring: Wiring) -> set[tuple[str, str, int]]:
+    """Inputs that a connection feeds."""
+    fed: dict[tuple[str, str, int], Link] = {}
+    for link in wiring.links:
+        slot = _slot(link.target[0], interfaces[link.target[0]].variables[link.target[1]])
+        first = fed.setdefault(slot, link)
+        if first is link:
+            continue
+        sources = f"by {first.connection.source!r} and by {link.connection.source!r}"
+        target = ".".join(link.target)
+        if first.target == link.target:
+            wiring.problems.append(f"{_place(link.connection.origin)}{target} is fed twice: {sources}")
+        elif first.source != link.source:
+            wiring.problems.append(
+                f"{_place(link.connection.origin)}{target} is another name of {'.'.join(first.target)}, and they are "
+                f"fed {sources}: connect one of them"
+            )
+    return set(fed)
+
+
+def _kept(instance: str, inputs: Sequence[Variable]) -> list[str]:
+    """What an FMU of another maker does with inputs that nothing feeds."""
+    if len(inputs) > _LISTED:
+        names = ", ".join(v.name for v in inputs[:_LISTED])
+        return [f"{instance}: {len(inputs)} inputs are not connected ({names}, ...); they keep their start values"]
+    return [
+        f"{instance}.{v.name} is not connected; it keeps {'its start value' if v.start is None else repr(v.start)}"
+        for v in inputs
+    ]
 
 
 def _check_sampling(system: System, interfaces: Mapping[str, Interface], wiring: Wiring) -> None:
@@ -326,11 +367,19 @@ def _check_sampling(system: System, interfaces: Mapping[str, Interface], wiring:
         if sample is None and interface.vendor.get("sampled"):
             sample = interface.variables["sample_time"].start
         if interface.vendor and sample:
-            count = round(system.step / sample)
-            if count < 1 or abs(count * sample - system.step) > 1e-6 * sample:
+            own_step = system.instances[name].step or system.step
+            count = round(own_step / sample)
+            if count < 1 or abs(count * sample - own_step) > 1e-6 * sample:
                 wiring.problems.append(
-                    f"{place}{name}: the communication step {system.step:g} s is not a whole multiple of its "
+                    f"{place}{name}: the communication step {own_step:g} s is not a whole multiple of its "
                     f"sample_time {sample:g} s: set step or {name}.sample_time"
+                )
+        own, step = interface.default_step, system.instances[name].step or system.step
+        if own and not interface.variable_step and not interface.vendor and interface.model not in told:
+            told.add(interface.model)
+            if round(step / own) < 1 or abs(round(step / own) * own - step) > 1e-6 * own:
+                wiring.notes.append(
+                    f"{interface.model} cannot vary its step and is made for {own:g} s; it is stepped at {step:g} s"
                 )
         longest = interface.vendor.get("recommended_step")
         if longest and system.step > longest * (1 + 1e-9) and interface.model not in told:

@@ -6,7 +6,7 @@ from typing import Any
 
 from ..component import Component, Values
 from ..declarations import Data, Input, Memory, Output, Parameter
-from ..maths import logical_and, logical_not, logical_or, where
+from ..maths import logical_and, logical_not, logical_or, maximum, where
 from ..trains.multiple_unit import WAITING
 from .braking import STANDSTILL, brake, hold
 from .speed_limit import LIMITS, LIMITS_BY_PLACE, read_limits
@@ -18,7 +18,9 @@ class Protection(Component):
     Above the limit less ``warning_margin`` it warns, above the limit it applies the service brake, above the limit
     plus ``emergency_margin`` the emergency brake. A brake is never released while the train moves: it is held to the
     standstill and there until the next wait (``trip_time`` negative), or, if ``release_at_standstill`` says so, the
-    service brake is released at the standstill. Without ``intervene`` it watches only.
+    service brake is released at the standstill. While the train moves, the brake that
+    acts is never weaker than the controller's own: it decelerates by the larger of the two, and eases into the
+    standstill over the last 0.3 m/s or so. Without ``intervene`` it watches only.
     """
 
     note = "Margins and decelerations other than the emergency brake's 1.2 m/s2 are chosen."
@@ -27,10 +29,10 @@ class Protection(Component):
         r"overspeed $o = v - v_\mathrm{lim}$, with $v_\mathrm{lim}$ at the trip time, or at the position where by_place"
         r" is set",
         r"warning: $o > -m_\mathrm{w}$; service_brake: from $o > 0$ on; emergency_brake: from $o > m_\mathrm{e}$ on",
-        r"force $= -M a_\mathrm{b}$ while a brake acts, until the train stands, then what holds it; else"
-        r" demanded_force",
-        r"with warning_margin $m_\mathrm{w}$, emergency_margin $m_\mathrm{e}$, mass $M$ and the deceleration"
-        r" $a_\mathrm{b}$ of the stronger brake that acts.",
+        r"force $= -M \min(\max(a_\mathrm{b}, -F_\mathrm{d} / M), k v)$ while a brake acts, until the train stands,"
+        r" then what holds it; else $F_\mathrm{d}$",
+        r"with warning_margin $m_\mathrm{w}$, emergency_margin $m_\mathrm{e}$, mass $M$, demanded_force $F_\mathrm{d}$,"
+        r" the deceleration $a_\mathrm{b}$ of the stronger brake that acts and $k = 4$ per second, which eases it off.",
     )
 
     limits = Data(LIMITS, convert=read_limits, description="speed limit over trip time, pairs of begin (s) and m/s")
@@ -67,6 +69,9 @@ class Protection(Component):
         overspeed = self._overspeed()
         service, emergency = self._brakes(overspeed)
         deceleration = where(emergency, self.emergency_deceleration, self.service_deceleration)
+        # Never less than the controller brakes, or to intervene could mean to brake less; a stand is the brake's alone.
+        demanded = where(self.speed > STANDSTILL, -self.demanded_force / self.mass, 0.0)
+        deceleration = maximum(deceleration, demanded)
         stop = brake(self.mass, deceleration, self.position, self.speed, self.hold_position)
         acts = logical_and(self.intervene, logical_or(service, emergency))
         return {

@@ -247,19 +247,6 @@ fmi2Status fmi2CancelStep(fmi2Component c)
     return s == NULL ? fmi2Error : fail(s, "fmi2CancelStep: steps are not asynchronous");
 }
 
-fmi2Status fmi2SetRealInputDerivatives(fmi2Component c, const fmi2ValueReference vr[], size_t nvr,
-                                       const fmi2Integer order[], const fmi2Real value[])
-{
-    Instance *s = enter(c, SETTABLE, "fmi2SetRealInputDerivatives");
-    (void)vr;
-    (void)order;
-    (void)value;
-    if (s == NULL) {
-        return fmi2Error;
-    }
-    return nvr == 0 ? fmi2OK : fail(s, "fmi2SetRealInputDerivatives: inputs are not interpolated");
-}
-
 fmi2Status fmi2GetRealOutputDerivatives(fmi2Component c, const fmi2ValueReference vr[], size_t nvr,
                                         const fmi2Integer order[], fmi2Real value[])
 {

@@ -25,7 +25,8 @@ typedef struct {
     double start;
     double minimum;
     double maximum;
-    int text; /* number of a string variable, -1 for the others */
+    int text;  /* number of a string variable, -1 for the others */
+    int input; /* number of a real input, -1 for the others */
 } Variable;
 
 typedef struct {
@@ -38,11 +39,23 @@ typedef struct {
 
 enum { MAX_TEXT = 1024, MAX_MESSAGE = 1024 };
 
+/* The highest derivative of an input that is taken: a polynomial of this degree is what Runge-Kutta integrates exactly. */
+enum { MAX_ORDER = 3 };
+
 /* One method's equations: `clock` is the time and the length of the sample. */
 typedef void Equations(const double *clock, const double *values, double *result);
 
 /* Length of an array that may be empty: C has no arrays of length zero. */
 #define AT_LEAST_ONE(n) ((n) > 0 ? (n) : 1)
+
+/* For a function of which there is to be one copy for each constant argument: compilers rarely do it unasked. */
+#if defined(__GNUC__)
+#define ALWAYS_INLINE static inline __attribute__((always_inline))
+#elif defined(_MSC_VER)
+#define ALWAYS_INLINE static __forceinline
+#else
+#define ALWAYS_INLINE static inline
+#endif
 
 #include "model.h"
 
@@ -81,6 +94,9 @@ typedef struct {
     bool prepared; /* what follows from start values is up to date */
     double values[N_VALUES];
     double step; /* length of the present sample, for the equations of update */
+    bool moving; /* an input has derivatives, given for the coming step */
+    double input_derivatives[AT_LEAST_ONE(N_REAL_INPUTS)][MAX_ORDER]; /* over time, from the first */
+    double input_starts[AT_LEAST_ONE(N_REAL_INPUTS)];                 /* of the step under way */
     double held[AT_LEAST_ONE(N_OUTPUTS)];
     double scratch[AT_LEAST_ONE(N_SCRATCH)];
     double direction[N_VALUES]; /* of a directional derivative */

@@ -3,7 +3,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-enum { STATE_VERSION = 2 };
+enum { STATE_VERSION = 3 };
 
 /* What tells a block from any other; small enough to be copied to the stack and looked at. */
 typedef struct {
@@ -24,11 +24,13 @@ typedef struct {
     bool has_stop_time;
     bool fresh;
     bool prepared;
+    bool moving;
     bool tape_has_trip;
     int tape_trip;
     int tape_first;
     int tape_last;
     double values[N_VALUES];
+    double input_derivatives[AT_LEAST_ONE(N_REAL_INPUTS)][MAX_ORDER];
     char texts[AT_LEAST_ONE(N_TEXTS)][MAX_TEXT];
 } State;
 
@@ -64,11 +66,13 @@ static void save_state(const Instance *s, State *state)
     state->has_stop_time = s->has_stop_time;
     state->fresh = s->fresh;
     state->prepared = s->prepared;
+    state->moving = s->moving;
     state->tape_has_trip = s->tape.has_trip;
     state->tape_trip = s->tape.trip;
     state->tape_first = s->tape.first;
     state->tape_last = s->tape.last;
     memcpy(state->values, s->values, sizeof state->values);
+    memcpy(state->input_derivatives, s->input_derivatives, sizeof state->input_derivatives);
     memcpy(state->texts, s->texts, sizeof state->texts);
     if (s->tape.rows > 0) {
         memcpy(state + 1, s->tape.committed, tape_bytes(s->tape.rows));
@@ -81,6 +85,7 @@ static fmi2Status restore_state(Instance *s, const State *state)
         return fail(s, "the saved state belongs to another model");
     }
     memcpy(s->values, state->values, sizeof s->values);
+    memcpy(s->input_derivatives, state->input_derivatives, sizeof s->input_derivatives);
     memcpy(s->texts, state->texts, sizeof s->texts);
 #if N_TAPE > 0
     if (state->head.tape_rows == 0) {
@@ -100,6 +105,7 @@ static fmi2Status restore_state(Instance *s, const State *state)
     s->has_stop_time = state->has_stop_time;
     s->fresh = state->fresh;
     s->prepared = state->prepared;
+    s->moving = state->moving;
     s->tape.has_trip = state->tape_has_trip;
     s->tape.trip = state->tape_trip;
     s->tape.first = state->tape_first;

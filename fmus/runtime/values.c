@@ -182,6 +182,42 @@ fmi2Status fmi2SetReal(fmi2Component c, const fmi2ValueReference vr[], size_t nv
     return status;
 }
 
+/* Whether a derivative of this order may be given for a variable. */
+static fmi2Status check_derivative(Instance *s, fmi2ValueReference reference, fmi2Integer order, double value)
+{
+    static const char call[] = "fmi2SetRealInputDerivatives";
+    if (is_rate(reference, TYPE_REAL)) {
+        return fail(s, "%s: a rate is no input", call);
+    }
+    const Variable *variable = find(s, reference, TYPE_REAL, call);
+    if (variable == NULL) {
+        return fmi2Error;
+    }
+    if (variable->role != ROLE_INPUT) {
+        return fail(s, "%s: %s is no input", call, variable->name);
+    }
+    if (order < 1 || order > MAX_ORDER) {
+        return fail(s, "%s: %s takes derivatives of the orders 1 to %d, not %d", call, variable->name, MAX_ORDER, order);
+    }
+    return isfinite(value) ? fmi2OK : fail(s, "%s: %s takes a finite derivative, not %g", call, variable->name, value);
+}
+
+/* For the coming step; in which order values and derivatives are set does not matter. */
+fmi2Status fmi2SetRealInputDerivatives(fmi2Component c, const fmi2ValueReference vr[], size_t nvr,
+                                       const fmi2Integer order[], const fmi2Real value[])
+{
+    Instance *s = enter(c, SETTABLE, "fmi2SetRealInputDerivatives");
+    fmi2Status status = begin_set(s, vr, nvr, order == NULL ? NULL : value, "fmi2SetRealInputDerivatives");
+    for (size_t k = 0; k < nvr && status == fmi2OK; k++) {
+        status = check_derivative(s, vr[k], order[k], value[k]);
+    }
+    for (size_t k = 0; k < nvr && status == fmi2OK; k++) {
+        s->input_derivatives[model_variables[vr[k]].input][order[k] - 1] = value[k];
+        s->moving = s->moving || value[k] != 0.0;
+    }
+    return status;
+}
+
 fmi2Status fmi2SetInteger(fmi2Component c, const fmi2ValueReference vr[], size_t nvr, const fmi2Integer value[])
 {
     Instance *s = enter(c, SETTABLE, "fmi2SetInteger");

@@ -168,11 +168,20 @@ def test_an_unknown_name_without_a_near_one_lists_all(samples):
         ({"masses": 1}, "Chain: build argument 'masses' takes a whole number of at least 2, not 1"),
         ({"masses": 2.0}, "Chain: build argument 'masses' takes a whole number of at least 2, not 2.0"),
         ({"masses": True}, "Chain: build argument 'masses' takes a whole number of at least 2, not True"),
+        (
+            {"masses": 10**9},
+            "Chain: build argument 'masses' is 1000000000; arrays have at most 100000 elements on an axis",
+        ),
+        ({"time": [1.0]}, "Chain.time takes a float, not [1.0]"),
         ({"momentum": 1.0}, "Chain.momentum is computed and cannot be set"),
     ],
 )
 def test_a_wrong_value_names_the_place(samples, values, expected):
     assert message(lambda: samples.Chain(**values)) == expected
+
+
+def test_a_value_may_be_called_as_python_calls_the_object(samples):
+    assert message(lambda: samples.Chain(self=1)).startswith("Chain has no 'self'; it has force, mass")
 
 
 @pytest.mark.parametrize(

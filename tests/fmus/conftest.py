@@ -3,6 +3,7 @@
 import ast
 import ctypes
 import functools
+import importlib.util
 import os
 import zipfile
 from pathlib import Path
@@ -13,7 +14,8 @@ from fmpy.fmi2 import FMU2Slave, defaultCallbacks, fmi2CallbackFunctions, fmi2Ca
 from fmpy.logging import addLoggerProxy
 from lxml import etree
 from railcosim.components import CATALOGUE
-from railcosim.fmus.build import build, resolve
+from railcosim.components.component import Component
+from railcosim.fmus.build import build, build_component, resolve
 
 SAMPLES = Path(__file__).parents[1] / "components" / "samples.py"
 
@@ -211,6 +213,28 @@ def instantiate(unpack, built):
     yield make
     for instance in instances:
         instance.free()
+
+
+@pytest.fixture
+def load(unpack):
+    """Instances of a component's native FMU behind the bare functions of the standard; freed at the end of the test."""
+    spec = importlib.util.spec_from_file_location("bare", Path(__file__).with_name("bare.py"))
+    driver = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(driver)
+    made = []
+
+    def make(reference, arguments=None, **options):
+        if isinstance(reference, Component):
+            path = build_component(reference, "native")
+        else:
+            path = build(reference, arguments, kind="native")
+        made.append(driver.Fmu(unpack(path), **options))
+        return made[-1]
+
+    yield make
+    for fmu in made:
+        if fmu.instance is not None:
+            fmu.free()
 
 
 @pytest.fixture(scope="session")

@@ -62,7 +62,8 @@ def test_the_archive_is_whole(tmp_path):
         "documentation/index.html",
         f"binaries/{toolchain.PLATFORMS[toolchain.here()].folder}/PointMassTrain{toolchain.PLATFORMS[toolchain.here()].suffix}",
         *(f"sources/{name}" for name in ("all.c", "model.h", "equations.c", "instance.h", "fmi2.c", "simulation.c")),
-        *(f"sources/{name}" for name in ("values.c", "derivatives.c", "state.c", "tape.c", "noise.c", "log.c")),
+        *(f"sources/{name}" for name in ("values.c", "inputs.c", "derivatives.c", "state.c")),
+        *(f"sources/{name}" for name in ("tape.c", "noise.c", "log.c")),
     } <= files
     assert not any("fmi2Functions" in name for name in files)
 
@@ -70,7 +71,8 @@ def test_the_archive_is_whole(tmp_path):
 def test_the_description_says_what_a_native_fmu_can(tmp_path):
     root = etree.parse(unzip(build("PointMassTrain", kind="native"), tmp_path) / "modelDescription.xml").getroot()
     slave = root.find("CoSimulation")
-    for capability in ("canGetAndSetFMUstate", "canSerializeFMUstate", "providesDirectionalDerivative"):
+    state = ("canGetAndSetFMUstate", "canSerializeFMUstate")
+    for capability in (*state, "providesDirectionalDerivative", "canInterpolateInputs"):
         assert slave.get(capability) == "true"
     assert slave.get("needsExecutionTool") == "false"
     assert [file.get("name") for file in slave.find("SourceFiles")] == ["all.c"]
@@ -203,7 +205,9 @@ def test_what_the_compiler_said_is_told(monkeypatch, tmp_path):
             getattr(cached, "cache_clear", lambda: None)()
 
 
-@pytest.mark.parametrize("name", ["Tape", "tape", "Log", "state", "equations", "all", "Noise", "instance", "library"])
+@pytest.mark.parametrize(
+    "name", ["Tape", "tape", "Log", "state", "inputs", "equations", "all", "Noise", "instance", "library"]
+)
 def test_a_component_may_bear_the_name_of_a_file_of_the_runtime(write_component, unpack, name):
     text = component("return {'y': 2.0 * self.u}").replace("class C(", f"class {name}(")
     path = write_component(text).removesuffix(":C") + f":{name}"

@@ -18,12 +18,10 @@ from pathlib import Path
 import fmpy
 import numpy as np
 import pytest
-from fmpy.fmi2 import fmi2CallbackFunctions, fmi2CallbackLoggerTYPE
 from railcosim.components import ComfortCruise, PointMassTrain
-from railcosim.components.component import Component
 from railcosim.components.declarations import Parameter
 from railcosim.components.tape import TapeDeck, smooth
-from railcosim.fmus.build import build, build_component, resolve
+from railcosim.fmus.build import build, resolve
 
 SAMPLES = Path(__file__).parent / "native_samples.py"
 MIXED, FUNCTIONS = f"{SAMPLES}:Mixed", f"{SAMPLES}:Functions"
@@ -51,155 +49,6 @@ class C(Component):
     def update(self):
         return {"m": self.m}
 """
-
-
-class Fmu:
-    """One instance behind the C functions themselves; every call gives the status."""
-
-    def __init__(self, folder, name="it", logging=False, logger=True):
-        self.description = describe(folder)
-        (path,) = (folder / "binaries").glob("*/*.so")
-        self.library = ctypes.CDLL(str(path))
-        self.references = {v.name: v.valueReference for v in self.description.modelVariables}
-        self.types = {v.name: v.type for v in self.description.modelVariables}
-        self.messages = []
-        self.callbacks = fmi2CallbackFunctions()
-        self._logger = fmi2CallbackLoggerTYPE(self._log)  # kept: C holds no reference
-        if logger:
-            self.callbacks.logger = self._logger
-        self.instance = self.instantiate(name, logging=logging)
-        self.time = 0.0
-
-    def _log(self, environment, instance, status, category, message):
-        self.messages.append((instance.decode(), status, category.decode(), message.decode()))
-
-    @property
-    def said(self):
-        """The last message."""
-        return self.messages[-1][3] if self.messages else ""
-
-    def instantiate(self, name="it", kind=1, guid=None, logging=False, callbacks=True):
-        create = self.library.fmi2Instantiate
-        create.restype = c_void_p
-        create.argtypes = [c_char_p, c_int, c_char_p, c_char_p, c_void_p, c_int, c_int]
-        guid = self.description.guid if guid is None else guid
-        place = ctypes.cast(byref(self.callbacks), c_void_p) if callbacks else NULL
-        return create(name if name is NULL else name.encode(), kind, guid.encode(), b"", place, 0, logging)
-
-    def __getattr__(self, name):
-        """``fmu.DoStep(...)`` is fmi2DoStep of this instance."""
-        function = getattr(self.library, f"fmi2{name}")
-
-        def call(*arguments):
-            return function(c_void_p(self.instance), *arguments)
-
-        return call
-
-    def free(self):
-        self.library.fmi2FreeInstance(c_void_p(self.instance))
-        self.instance = None
-
-    # ------------------------------------------------------------ life cycle
-
-    def enter(self, start=0.0, stop=None):
-        self.time = start
-        assert self.SetupExperiment(0, c_double(0), c_double(start), int(stop is not None), c_double(stop or 0)) == OK
-        assert self.EnterInitializationMode() == OK
-        return self
-
-    def initialize(self, start=0.0, stop=None, **starts):
-        self.enter(start, stop)
-        for name, value in starts.items():
-            assert self.set(name, value) == OK, self.said
-        assert self.ExitInitializationMode() == OK, self.said
-        return self
-
-    def step(self, length=STEP, at=None):
-        at = self.time if at is None else at
-        status = self.DoStep(c_double(at), c_double(length), 1)
-        if status == OK:
-            self.time = at + length
-        return status
-
-    # ------------------------------------------------------------ values
-
-    def set(self, name, value):
-        kind = self.types[name]
-        cell = {"Real": c_double, "Integer": c_int, "Boolean": c_int, "String": c_char_p}[kind]
-        value = value.encode() if isinstance(value, str) else value
-        return getattr(self, f"Set{kind}")((c_uint * 1)(self.references[name]), c_size_t(1), (cell * 1)(value))
-
-    def get(self, name):
-        kind = self.types[name]
-        cell = ({"Real": c_double, "Integer": c_int, "Boolean": c_int, "String": c_char_p}[kind] * 1)()
-        status = getattr(self, f"Get{kind}")((c_uint * 1)(self.references[name]), c_size_t(1), cell)
-        assert status == OK, self.said
-        return cell[0]
-
-    def everything(self):
-        return {name: self.get(name) for name in self.references}
-
-    def status_of_get(self, name):
-        return self.GetReal((c_uint * 1)(self.references[name]), c_size_t(1), (c_double * 1)())
-
-    def directional(self, unknowns, knowns, direction):
-        result = (c_double * len(unknowns))()
-        status = self.GetDirectionalDerivative(
-            (c_uint * len(unknowns))(*(self.references[n] for n in unknowns)),
-            c_size_t(len(unknowns)),
-            (c_uint * len(knowns))(*(self.references[n] for n in knowns)),
-            c_size_t(len(knowns)),
-            (c_double * len(knowns))(*direction),
-            result,
-        )
-        return list(result) if status == OK else status
-
-    def last_successful_time(self):
-        value = c_double(math.nan)
-        assert self.GetRealStatus(2, byref(value)) == OK
-        return value.value
-
-    # ------------------------------------------------------------ states
-
-    def save(self):
-        state = c_void_p()
-        assert self.GetFMUstate(byref(state)) == OK
-        return state
-
-    def to_bytes(self, state):
-        size = c_size_t()
-        assert self.SerializedFMUstateSize(state, byref(size)) == OK
-        content = (ctypes.c_char * size.value)()
-        assert self.SerializeFMUstate(state, content, size) == OK
-        return bytes(content)
-
-    def from_bytes(self, content):
-        state = c_void_p()
-        status = self.DeSerializeFMUstate(content, c_size_t(len(content)), byref(state))
-        return state if status == OK else status
-
-
-def describe(folder):
-    return fmpy.read_model_description(folder, validate=False)
-
-
-@pytest.fixture
-def load(unpack):
-    """Instances of a component's native FMU; freed at the end."""
-    made = []
-
-    def make(reference, arguments=None, **options):
-        if isinstance(reference, Component):
-            path = build_component(reference, "native")
-        else:
-            path = build(reference, arguments, kind="native")
-        made.append(Fmu(unpack(path), **options))
-        return made[-1]
-
-    yield make
-    for fmu in made:
-        if fmu.instance is not None:
-            fmu.free()
 
 
 @pytest.fixture
@@ -277,6 +126,11 @@ CALLS = {
     "SetRealInputDerivatives": (lambda f: f.SetRealInputDerivatives(NULL, c_size_t(0), NULL, NULL), PHASES[:3], OK),
     "SetRealInputDerivatives of one": (
         lambda f: f.SetRealInputDerivatives(*reference(f, "u"), one(c_int, 1), one(REALS)),
+        PHASES[:3],
+        OK,
+    ),
+    "SetRealInputDerivatives of an output": (
+        lambda f: f.SetRealInputDerivatives(*reference(f, "y"), one(c_int, 1), one(REALS)),
         (),
         OK,
     ),
@@ -770,13 +624,18 @@ def test_bytes_that_are_no_state_are_refused(load):
         fmu.FreeFMUstate(byref(one_of))
 
 
-CONTINUE = """
+IN_ANOTHER_PROCESS = """
 import importlib.util, sys
-spec = importlib.util.spec_from_file_location("runtime_tests", sys.argv[1])
-tests = importlib.util.module_from_spec(spec)
-sys.modules["runtime_tests"] = tests
-spec.loader.exec_module(tests)
-fmu = tests.Fmu(tests.Path(sys.argv[2]))
+from pathlib import Path
+def module(name):
+    spec = importlib.util.spec_from_file_location(name, Path(sys.argv[1]).with_name(f"{name}.py"))
+    sys.modules[name] = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(sys.modules[name])
+    return sys.modules[name]
+bare, tests = module("bare"), module("test_runtime")
+"""
+CONTINUE = f"""{IN_ANOTHER_PROCESS}
+fmu = bare.Fmu(Path(sys.argv[2]))
 state = fmu.from_bytes(open(sys.argv[3], "rb").read())
 assert fmu.SetFMUstate(state) == 0
 fmu.time = 10 * tests.STEP
@@ -1042,19 +901,14 @@ def test_a_tape_that_cannot_be_is_refused(load):
         assert said in fmu.said
 
 
-LOCALE = """
-import ctypes, ctypes.util, importlib.util, locale, sys
+LOCALE = f"""{IN_ANOTHER_PROCESS}
+import locale
 locale.setlocale(locale.LC_ALL, sys.argv[4])
 assert locale.localeconv()["decimal_point"] != "."
-spec = importlib.util.spec_from_file_location("runtime_tests", sys.argv[1])
-tests = importlib.util.module_from_spec(spec)
-sys.modules["runtime_tests"] = tests
-spec.loader.exec_module(tests)
-locale.setlocale(locale.LC_ALL, sys.argv[4])
-fmu = tests.Fmu(tests.Path(sys.argv[2])).initialize(sample_time=0.1, tape_duration=1.0, tape_file=sys.argv[3])
+fmu = bare.Fmu(Path(sys.argv[2])).initialize(sample_time=0.1, tape_duration=1.0, tape_file=sys.argv[3])
 tests.ride(fmu, 1, tests.ERRORS)
 assert fmu.Terminate() == 0
-again = tests.Fmu(tests.Path(sys.argv[2])).initialize(sample_time=0.1, tape_duration=1.0, tape_file=sys.argv[3])
+again = bare.Fmu(Path(sys.argv[2])).initialize(sample_time=0.1, tape_duration=1.0, tape_file=sys.argv[3])
 again.set("trip_time", 0.2)
 assert again.get("command") == 0.5 * tests.ERRORS[2]
 """

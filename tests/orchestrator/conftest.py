@@ -1,6 +1,11 @@
 """What the tests of the orchestrator share: a cache of their own, components of a user's, FMUs of another maker's."""
 
+import contextlib
 import hashlib
+import os
+import shutil
+import signal
+import subprocess
 import zipfile
 from pathlib import Path
 from xml.sax.saxutils import quoteattr
@@ -9,6 +14,7 @@ import fmpy
 import pytest
 import pythonfmu
 from railcosim.orchestrator.archive import Workspace
+from railcosim.orchestrator.loading import load_fmu
 
 _WRAPPER = next(
     (Path(pythonfmu.__file__).parent / "resources" / "binaries" / fmpy.platform).glob("*pythonfmu-export.*")
@@ -178,3 +184,119 @@ def foreign(tmp_path):
 def xml():
     """The writers of hand-made descriptions and archives, by name."""
     return {"variable": variable, "description": description, "write_archive": write_archive}
+
+
+HERE = Path(__file__).parent
+GCC = shutil.which("gcc")
+
+
+@pytest.fixture(scope="session")
+def compile_c(tmp_path_factory):
+    """A C file beside the tests as the content of a shared library."""
+    made = {}
+
+    def build(name):
+        if GCC is None:
+            pytest.skip("FMUs by hand need gcc")
+        if name not in made:
+            target = tmp_path_factory.mktemp("c") / f"{name}{fmpy.sharedLibraryExtension}"
+            subprocess.run([GCC, "-shared", "-fPIC", "-O1", HERE / name, "-o", target, "-lm"], check=True)
+            made[name] = target.read_bytes()
+        return made[name]
+
+    return build
+
+
+@pytest.fixture
+def by_hand(compile_c, tmp_path):
+    """The FMU of fmi1.c or fmi3.c, with parts of its description replaced, and another library's name."""
+    facts = {1: ("First", fmpy.platform), 3: ("Third", fmpy.platform_tuple)}
+
+    def pack(version, *changes, library=None, name=None):
+        identifier, platform = facts[version]
+        text = (HERE / f"fmi{version}.xml").read_text(encoding="utf-8")
+        for old, new in changes:
+            assert old in text
+            text = text.replace(old, new)
+        files = {
+            "modelDescription.xml": text,
+            f"binaries/{platform}/{library or identifier}{fmpy.sharedLibraryExtension}": compile_c(f"fmi{version}.c"),
+        }
+        return write_archive(tmp_path / (name or f"{identifier.lower()}.fmu"), files)
+
+    return pack
+
+
+@pytest.fixture
+def alone(workspace):
+    """An instance of an FMU file, not yet initialized; given back at the end."""
+    made = []
+
+    def make(path, name="it"):
+        made.append(load_fmu(Path(path), workspace).instantiate(name))
+        return made[-1]
+
+    yield make
+    for one in made:
+        one.free()
+
+
+@pytest.fixture
+def hostile(compile_c, tmp_path):
+    """The FMU of hostile.c; ``deed`` is what it does before it can be told."""
+    v, discrete = variable, {"variability": "discrete"}
+    shown = [
+        v("u", "input", start=0.0),
+        v("v", "input", start=0.0),
+        v("x", "output", dependencies=[]),
+        v("y", "output", dependencies=["v"]),
+        v("calls", "output", dependencies=[]),
+        v("pid", "output", dependencies=[]),
+        v("m", "input", "Integer", 0, **discrete),
+        v("n", "output", "Integer", dependencies=["m"], **discrete),
+        v("on", "input", "Boolean", False, **discrete),
+        v("off", "output", "Boolean", dependencies=["on"], **discrete),
+        v("deed", "parameter", "String", "", variability="fixed"),
+        v("word", "input", "String", "", **discrete),
+        v("said", "output", "String", dependencies=["word"], **discrete),
+    ]
+    abilities = "canGetAndSetFMUstate canSerializeFMUstate providesDirectionalDerivative canInterpolateInputs "
+    abilities += "canHandleVariableCommunicationStepSize"
+
+    def pack(deed="", *, simulation="", name="hostile.fmu"):
+        able = " ".join(f'{ability}="true"' for ability in f"{abilities} {simulation}".split())
+        files = {
+            "modelDescription.xml": description(shown, identifier="Hostile", simulation=able),
+            f"binaries/{fmpy.platform}/Hostile{fmpy.sharedLibraryExtension}": compile_c("hostile.c"),
+            "resources/deed.txt": deed,
+        }
+        return str(write_archive(tmp_path / name, files))
+
+    return pack
+
+
+@pytest.fixture
+def in_time():
+    """A test that hangs fails instead."""
+
+    def late(*_):
+        raise TimeoutError("the test hangs")
+
+    before = signal.signal(signal.SIGALRM, late)
+    signal.alarm(90)
+    yield
+    signal.alarm(0)
+    signal.signal(signal.SIGALRM, before)
+
+
+@pytest.fixture
+def nothing_left():
+    """A test that leaves processes of isolated instances behind fails."""
+    yield
+    left = []
+    for place in Path("/proc").glob("[0-9]*/cmdline"):
+        with contextlib.suppress(OSError):
+            parent = int((place.parent / "stat").read_text().rpartition(")")[2].split()[1])
+            if parent == os.getpid() and ".host" in place.read_text():
+                left.append(place.parent.name)
+    assert not left

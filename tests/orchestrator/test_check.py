@@ -110,7 +110,10 @@ def test_an_fmu_that_can_be_instantiated_only_once(problems, foreign, xml):
     system = System()
     system.add("a", path)
     system.add("b", path)
-    assert problems(system) == ["a, b: this FMU can be instantiated only once per process"]
+    said = "a, b: this FMU can be instantiated only once per process; give all but one of them a process of its own by "
+    assert problems(system) == [f"{said}isolate = true"]
+    system.instances["b"].isolate = True
+    assert problems(system) == []
 
 
 def test_notes(examine, foreign, xml):

@@ -247,6 +247,8 @@ def test_check_is_silent_on_what_is_right():
         ("train[i / 2].speed", "an index is a whole number, i, count or a sum of these"),
         ("train[::2].speed", "a slice has no step; write train[2:] or train[1:3], both ends included"),
         ("train[1][2].speed", "a signal is written like train[i].speed"),
+        ("maximum(1, 2, b = 3, b = 4)", "an argument stands twice; keep one"),
+        ("0 < (0 < 1 < 2) < 3", "a chain of comparisons stands inside another; part them with 'and'"),
         ("x" * 1001, "longer than 1000 characters; split the expression"),
         ("-" * 900 + "1", "nested"),
         ("+1" * (MAX_DEPTH + 5), f"nested more than {MAX_DEPTH} levels deep; split the expression"),
@@ -282,9 +284,31 @@ def test_evaluation_errors_say_which_expression():
         value("train[:].speed - consist[1].force[:]")
 
 
-def test_functions_may_not_be_arrays_of_anything():
-    with pytest.raises(ExpressionError, match="differ in their number of rows"):
-        value("abs([1, [2, 3]])")
+@pytest.mark.parametrize("text", ["abs([1, [2, 3]])", "abs([1, 2])", "minimum(1, [])", "clip(1, high = [2], low = 0)"])
+def test_lists_are_not_calculated_with(text):
+    with pytest.raises(ExpressionError, match="takes a signal or a number, not a list"):
+        value(text)
+
+
+def test_a_lone_huge_index_is_not_counted_to():
+    names = ["foreign.x[999999999]", "foreign.y[1]", "foreign.y[2]"]
+    assert parse("foreign.x[i] + foreign.y[i]").instances(names) == ()
+    assert parse("foreign.y[i]").instances(names) == (1, 2)
+    assert len(parse("foreign.y[:i]").instances(names)) < 10**5
+
+
+def test_an_index_of_thousands_of_digits_is_no_index():
+    names = [f"foreign.x[{'1' * 5000}]", "foreign.x[2]"]
+    assert parse("foreign.x[i]").instances(names) == (2,)
+    assert parse("foreign.x[:]").resolve(names) == [["foreign.x[2]"]]
+    assert parse("count").evaluate(RUN) == 0
+    assert parse("foreign.x[count]").resolve(names) == [["foreign.x[2]"]]
+    assert "there are 'foreign.x[2]' to" in parse("foreign.x[3]").check(names)[0]
+
+
+def test_an_index_that_overflows_warns_nobody(recwarn):
+    assert "an index must be a whole number, not inf" in parse("train[1e308 * 10].speed").check(NAMES)[0]
+    assert not recwarn.list
 
 
 def test_constants():

@@ -245,7 +245,7 @@ def test_windows_forgive_rounding_of_the_time_grid():
         ("max(s.x, outside = 3)", "outside takes a window [from, to] or a list of them"),
         ("max(s.x, outside = [3])", "outside takes a window [from, to] or a list of them"),
         ("max(s.x, outside = [4, 3])", "outside = [4, 3] ends before it starts; swap the two"),
-        ("max([1, 2])", "a reducer works on a signal, not on a list"),
+        ("max([1, 2])", "max: x takes a signal or a number, not a list"),
         ("settling_time(s.x, s.y)", "the band of settling_time must be one number"),
         ("max(s.x, after = s.x)", "after must be one number, not a list or a signal that varies"),
         ("mean_jerk(s.x, 0)", "the window of mean_jerk must be longer than 0 s"),

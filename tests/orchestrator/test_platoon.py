@@ -94,6 +94,7 @@ def test_headway_capacity():
     columns = {"gap_1_d": 2000.0 + 0.0 * T, "gap_2_d": 1000.0 + 0.0 * T, "train_1_speed": 20.0 + 0.0 * T}
     assert value("headway_capacity(gap[:].d, train[1].speed)", **columns) == pytest.approx(36.0)
     assert value("headway_capacity(gap[:].d, 0 * train[1].speed)", **columns) == 0.0
+    assert value("headway_capacity(0, train[1].speed)", **columns) == math.inf
 
 
 def test_the_units_that_are_shown():

@@ -106,6 +106,8 @@ def test_an_origin_is_file_and_line_or_the_file_alone():
         ),
         ("a = " + "9" * 5000, "x.toml: Exceeds the limit (4300 digits) for integer string conversion"),
         ("a = " + "[" * 5000, "x.toml: nested too deeply; no scenario needs that"),
+        ("a" + ".a" * 2000 + " = 1", "x.toml: nested more than 100 levels deep; no scenario needs that"),
+        ("[a" + ".a" * 2000 + "]", "x.toml: nested more than 100 levels deep; no scenario needs that"),
     ],
 )
 def test_what_is_said_about_text_that_is_not_toml(text, message):
@@ -146,6 +148,11 @@ def test_files_that_cannot_be_read(tmp_path):
 )
 def test_a_value_is_toml_or_the_text_itself(text, value):
     assert parse_value(text) == value
+
+
+@pytest.mark.parametrize("text", ["9" * 400, f"[0x{'f' * 5000}]", "[" * 200 + "]" * 200])
+def test_a_value_that_no_file_could_hold_is_a_text(text):
+    assert parse_value(text) == text
 
 
 KEYS = st.one_of(

@@ -242,6 +242,7 @@ def test_our_own_rules_bind_our_own_fmus(tmp_path):
             if entry == "modelDescription.xml":
                 for good, bad in (
                     (b' canSerializeFMUstate="true"', b""),
+                    (b' canInterpolateInputs="true"', b""),
                     (b' dependencies=""', b""),
                     (b' description="speed"', b""),
                     (b'<BaseUnit kg="1" m="1" s="-2"/>', b""),
@@ -253,6 +254,7 @@ def test_our_own_rules_bind_our_own_fmus(tmp_path):
     found = detail(validate(path), "rules of railcosim")
     for part in (
         "canSerializeFMUstate is not declared",
+        "canInterpolateInputs is not declared",
         "the output speed lists no dependencies",
         "speed has no description",
         "the unit 'N' is not defined by base units",

@@ -2,10 +2,9 @@
 
 import numpy as np
 import pytest
-from railcosim.orchestrator.interface import Unit
 from railcosim.orchestrator.loading import load_models
 from railcosim.orchestrator.system import System
-from railcosim.orchestrator.wiring import convert, instance_seed, is_direct, wire
+from railcosim.orchestrator.wiring import instance_seed, is_direct, wire
 
 BODY = """
 class Source(Base):
@@ -162,27 +161,26 @@ def test_scale_and_offset_apply_after_the_conversion(connected):
     assert link.scale * 20.0 + link.offset == pytest.approx(2.0 * 293.15 + 1.0)
 
 
-def test_convert_both_ways():
-    kelvin, celsius = Unit("K", (0,) * 8), Unit("degC", (0,) * 8, 1.0, 273.15)
-    fahrenheit = Unit("degF", (0,) * 8, 5.0 / 9.0, 273.15 - 32.0 * 5.0 / 9.0)
-    for a, b, x, y in [(celsius, fahrenheit, 100.0, 212.0), (fahrenheit, kelvin, -40.0, 233.15)]:
-        scale, offset = convert(a, b)
-        assert scale * x + offset == pytest.approx(y)
-        scale, offset = convert(b, a)
-        assert scale * y + offset == pytest.approx(x)
-
-
 def test_another_dimension_is_refused(connected):
     assert connected("a.seconds", "b.metres").problems == ["'b.metres' = 'a.seconds': unit 's' does not convert to 'm'"]
 
 
-def test_a_unit_that_nobody_defined_is_refused(resolve, foreign, xml, mine):
+def test_a_unit_that_nobody_defined_passes_values_as_they_are_and_is_told(resolve, foreign, xml, mine):
+    """Many tools write units without defining them: the scenario shall run, and say what it takes for granted."""
+    path = foreign([xml["variable"]("y", "output", unit="furlong"), xml["variable"]("z", "output", unit="furlong")])
     system = System()
-    system.add("a", foreign([xml["variable"]("y", "output", unit="furlong")]))
+    system.add("a", path)
     system.add("b", mine("Sink"))
     system.connect("a.y", "b.metres")
-    assert resolve(system).problems == [
-        "'b.metres' = 'a.y': unit 'furlong' cannot be converted to 'm': 'furlong' is not defined in SI units"
+    system.connect("a.z", "b.speed")
+    system.connect("a.z", "b.kelvin", scale=2.0)  # whoever gives a scale knows
+    wiring = resolve(system)
+    assert wiring.problems == [p for p in wiring.problems if "required input" in p]
+    assert [(link.scale, link.offset) for link in wiring.links] == [(1.0, 0.0), (1.0, 0.0), (2.0, 0.0)]
+    note = "'furlong' is not defined in SI units by Foreign: what is in 'furlong' is taken for"
+    assert [text for text in wiring.notes if note in text] == [
+        f"'b.{target}' = 'a.{source}': {note} '{unit}' as it is; where they differ, give the connection a scale"
+        for source, target, unit in (("y", "metres", "m"), ("z", "speed", "m/s"))
     ]
 
 
@@ -351,6 +349,7 @@ def test_start_values(started, given, expected):
         ({"gain": {"a": 1}}, "s.gain: takes a number, not {'a': 1}"),
         ({"gain": float("nan")}, "s.gain: takes a finite number, not nan"),
         ({"gain": float("inf")}, "s.gain: takes a finite number, not inf"),
+        ({"gain": 10**400}, f"s.gain: takes a finite number, not {10**400}"),
         ({"gain": -1.0}, "s.gain: -1.0 is below the limit 0 1/s"),
         ({"gain": 2.5}, "s.gain: 2.5 is above the limit 2 1/s"),
         ({"gears": 0}, "s.gears: 0 is below the limit 1"),
@@ -383,7 +382,7 @@ def test_a_constant_of_another_maker_cannot_be_set(resolve, foreign, xml):
     system = System()
     v = xml["variable"]("g", "local", start=9.81, variability="constant", initial="exact")
     system.add("a", foreign([v, xml["variable"]("y", "output")]), g=3.0)
-    assert resolve(system).problems == ["a.g: it is computed (causality local) and cannot be set"]
+    assert resolve(system).problems == ["a.g: it is a constant of the model and cannot be set"]
 
 
 def test_a_swap_drops_what_the_new_model_lacks(started):

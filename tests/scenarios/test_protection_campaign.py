@@ -26,6 +26,7 @@ def keeps_its_promises(campaign, number):
     assert not with_it.broken, case
     assert not without.broken, case
     assert with_it.peak <= with_it.bound
+    assert with_it.peak <= without.peak + 1e-9
     return case, with_it, without
 
 
@@ -37,6 +38,17 @@ def test_a_smoke(campaign, number):
     if case.faults == ("full traction",):
         assert with_it.peak < 0.1
         assert without.peak > 10.0
+
+
+def test_the_protection_does_not_weaken_a_controller_that_brakes_harder(campaign):
+    """The controller brakes with 1.2 m/s2, the service brake with 0.9; both called for at the same sample.
+
+    While the brake replaced the controller's force this run reached 0.711 m/s above the limit, without it 0.478.
+    """
+    _, with_it, without = keeps_its_promises(campaign, 261)
+    assert with_it.braked_at is not None
+    assert with_it.peak == pytest.approx(without.peak, abs=1e-6)
+    assert with_it.peak == pytest.approx(0.478, abs=1e-3)
 
 
 @pytest.mark.long
@@ -65,16 +77,18 @@ def test_the_judge_sees_a_brake_that_does_not_act(campaign):
     ("signal", "text"),
     [
         ("protection.service_brake", "no brake command within one sample"),
+        ("ato.force", "brakes less than the ATO would"),
         ("ato.barrier_reached", "flag and status"),
         ("monitor.largest_overspeed", "the requirement does not say"),
     ],
 )
 def test_the_judge_sees_a_signal_that_stays_silent(campaign, signal, text):
-    """A brake command one sample late, a barrier's flag that does not rise, a monitor that sees nothing."""
+    """A brake command one sample late, a barrier's flag that does not rise, a monitor that sees nothing, and so on."""
     case = campaign.draw(5, 1)
     outcome = campaign.run(campaign.system(case, intervene=True))
     values = outcome.results[signal]
-    values[values.argmax() if signal == "protection.service_brake" else slice(None)] = 0.0
+    where = values.argmax() if signal == "protection.service_brake" else slice(None)
+    values[where] = -400e3 if signal == "ato.force" else 0.0  # braking harder than the protection did
     evaluate(outcome)  # 0 m/s above the limit is not a violation
     broken = campaign.judge(outcome, case, intervene=True).broken
     assert broken

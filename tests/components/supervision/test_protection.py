@@ -75,11 +75,12 @@ def test_a_brake_is_held_to_the_standstill_and_until_the_next_wait():
     assert not watch.get("service_brake")
 
 
-def test_the_service_brake_may_be_released_at_standstill():
+@pytest.mark.parametrize("approach", [0.0, -300e3])
+def test_the_service_brake_may_be_released_at_standstill(approach):
     watch = Watch(release_at_standstill=True)
     watch.speed = 19.7
     while watch.speed > 0.05:
-        watch.sample()
+        watch.sample(demanded=approach)
         assert watch.get("service_brake")
     watch.sample(demanded=1e5)
     watch.sample(demanded=1e5)
@@ -99,6 +100,51 @@ def test_the_hold_is_steady_at_every_usual_sample(step):
     rates = [watch.sample(demanded=400e3) for _ in range(round(40.0 / step))]
     assert np.abs(rates[-100:]).max() < 1e-6
     assert min(rates) > -0.91
+
+
+@pytest.mark.parametrize(
+    ("speed", "demanded", "rate"),
+    [
+        (19.61, -1.3, -1.3),  # the service brake would be weaker
+        (19.61, -0.5, -0.9),
+        (20.2, -1.3, -1.3),
+        (20.2, -1.0, -1.2),  # between the two brakes
+        (10.0, -1.3, -1.3),  # no longer too fast: the brake that was called for still acts
+        (0.35, -1.3, -1.3),
+        (0.3, -1.3, -1.2),  # any brake eases into the standstill
+        (0.1, -1.3, -0.4),
+        (-0.5, -1.3, 0.9),  # rolling back: no reason to push
+        (-0.5, 1.3, 0.9),
+    ],
+)
+def test_a_controller_that_brakes_harder_keeps_its_force(speed, demanded, rate):
+    values = {"trip_time": 5.0, "speed": speed, "service_latched": True}
+    assert Protection(demanded_force=demanded * MASS, **values).outputs()["force"] == pytest.approx(rate * MASS)
+    watching = Protection(demanded_force=demanded * MASS, intervene=False, **values).outputs()
+    assert watching["force"] == demanded * MASS
+
+
+@pytest.mark.parametrize("speed", [-0.05, 0.0, 0.04, 0.05])
+@pytest.mark.parametrize("demanded", [-400e3, 0.0, 400e3])
+def test_what_holds_a_standing_train_is_the_brake_alone(speed, demanded):
+    values = {"trip_time": 50.0, "speed": speed, "position": 3.2, "hold_position": 3.1, "service_latched": True}
+    out = Protection(demanded_force=demanded, **values).outputs()
+    assert out["force"] == brake(MASS, 0.9, 3.2, speed, 3.1)
+
+
+@pytest.mark.parametrize("step", [0.01, 0.05, 0.1])
+def test_a_controller_that_never_stops_braking_is_held_all_the_same(step):
+    """2.06 m/s2 to the standstill, less than the samples' own 0.05 m/s back, and then no motion."""
+    watch = Watch(step=step)
+    watch.speed = 19.7
+    rates, speeds = [], []
+    for _ in range(round(25.0 / step)):
+        rates.append(watch.sample(demanded=-400e3))
+        speeds.append(watch.speed)
+    assert min(rates) == pytest.approx(-400e3 / MASS)
+    assert np.argmax(np.array(speeds) < 1.0) * step == pytest.approx(18.7 / (400e3 / MASS), abs=2.0 * step)
+    assert min(speeds) > -0.05
+    assert np.abs(rates[-round(5.0 / step) :]).max() < 1e-6
 
 
 def test_while_waiting_nothing_is_called_for():

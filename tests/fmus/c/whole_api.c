@@ -59,6 +59,22 @@ static int set_inputs(fmi2Component c, int k)
     return 0;
 }
 
+/* Of every order in turn, of some inputs in some steps. */
+static int set_derivatives(fmi2Component c, int k)
+{
+    for (unsigned n = 0; n < N_VARIABLES; n++) {
+        const Variable *variable = &model_variables[n];
+        int order = 1 + (k + (int)n) % MAX_ORDER;
+        double real = n == TRIP_TIME ? (order == 1 ? 1.0 : 0.0) : 0.25 * (double)(k % 3);
+        if (variable->role == ROLE_INPUT && variable->type == TYPE_REAL && k % 4 != 0) {
+            CHECK(fmi2SetRealInputDerivatives(c, &n, 1, &order, &real) == fmi2OK);
+        } else if (variable->role != ROLE_INPUT || variable->type != TYPE_REAL) {
+            CHECK(fmi2SetRealInputDerivatives(c, &n, 1, &order, &real) == fmi2Error);
+        }
+    }
+    return 0;
+}
+
 static int get_everything(fmi2Component c, double *sum)
 {
     for (unsigned n = 0; n < N_VARIABLES + N_STATES; n++) {
@@ -101,7 +117,7 @@ static int start(fmi2Component c, const char *tape_file)
 static int steps(fmi2Component c, int from, int to, double *sum)
 {
     for (int k = from; k < to; k++) {
-        CHECK(set_inputs(c, k) == 0);
+        CHECK(set_inputs(c, k) == 0 && set_derivatives(c, k) == 0);
         CHECK(fmi2DoStep(c, (double)k * STEP, STEP, fmi2True) == fmi2OK);
         CHECK(get_everything(c, sum) == 0);
     }
@@ -120,6 +136,8 @@ static int abuse(fmi2Component c)
         CHECK(fmi2GetBoolean(c, far + k, 1, &whole) == fmi2Error && fmi2SetBoolean(c, far + k, 1, &whole) == fmi2Error);
         CHECK(fmi2GetString(c, far + k, 1, &text) == fmi2Error && fmi2SetString(c, far + k, 1, &text) == fmi2Error);
         CHECK(fmi2GetDirectionalDerivative(c, far + k, 1, NULL, 0, NULL, &real) == fmi2Error);
+        whole = 1;
+        CHECK(fmi2SetRealInputDerivatives(c, far + k, 1, &whole, &real) == fmi2Error);
     }
     CHECK(fmi2GetReal(c, NULL, 1, NULL) == fmi2Error && fmi2GetReal(c, NULL, 0, NULL) == fmi2OK);
     CHECK(fmi2DoStep(c, 0.0, -1.0, fmi2True) == fmi2Error && fmi2DoStep(c, 77.0, STEP, fmi2True) == fmi2Error);
@@ -132,6 +150,7 @@ static int abuse(fmi2Component c)
     CHECK(fmi2GetBooleanStatus(c, fmi2Terminated, &whole) == fmi2OK);
     CHECK(fmi2GetStringStatus(c, fmi2PendingStatus, &text) == fmi2Discard);
     CHECK(fmi2SetRealInputDerivatives(c, NULL, 0, NULL, NULL) == fmi2OK);
+    CHECK(fmi2SetRealInputDerivatives(c, far, 1, NULL, &real) == fmi2Error);
     CHECK(fmi2GetRealOutputDerivatives(c, NULL, 0, NULL, NULL) == fmi2OK);
     CHECK(fmi2SetDebugLogging(c, fmi2True, 1, &category) == fmi2OK);
     return 0;

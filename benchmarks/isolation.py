@@ -1,0 +1,126 @@
+"""What a process of its own costs an instance: N light FMUs in a ring, isolated and not, through the same Python loop.
+
+    python benchmarks/isolation.py
+
+Microseconds per FMU step, wall time and CPU time of all processes together, and the ratio to the ring without
+isolation; both are driven from this process and step in turn, so that a busy machine slows both alike; medians. Then
+FMUs that are heavy (many Runge-Kutta steps inside), which isolation lets compute at the same time with ``jacobi``. That
+both compute the same is checked. The last column is the wall time in which the processes start and are initialized.
+CPU time of other processes is told by Linux.
+"""
+
+from __future__ import annotations
+
+import argparse
+import statistics
+import tempfile
+import time
+from collections.abc import Sequence
+from dataclasses import replace
+from pathlib import Path
+
+from railcosim.fmus.build import build
+from railcosim.orchestrator import compiled
+from railcosim.orchestrator.archive import Workspace
+from railcosim.orchestrator.check import check
+from railcosim.orchestrator.isolated import IsolatedSlave
+from railcosim.orchestrator.isolation import instantiate
+from railcosim.orchestrator.master import Master, Rows
+from railcosim.orchestrator.results import Recorder
+from railcosim.orchestrator.system import Algorithm, System
+from ring import HERE, light
+
+STEP, STOP = 1e-3, 1e6
+
+
+class Candidate:
+    """A ring with all of its instances isolated, or none."""
+
+    def __init__(
+        self, path: Path, count: int, algorithm: Algorithm, workspace: Workspace, isolated: bool, **start: float
+    ):
+        system = System(stop_time=STOP, step=STEP, algorithm=algorithm)
+        for k in range(count):
+            system.add(f"lag{k}", str(path), x=(k + 1) / count, **start)
+            system.connect(f"lag{k - 1 if k else count - 1}.x", f"lag{k}.u")
+        begin = time.perf_counter()
+        checked = check(system, workspace)
+        instances = {name: replace(x, isolate=isolated) for name, x in system.instances.items()}
+        self.slaves = {name: instantiate(model, instances[name]) for name, model in checked.models.items()}
+        wiring = checked.wiring
+        self.master = Master(self.slaves, checked.order.sequence, wiring.links, wiring.starts, algorithm)
+        self.master.initialize(0.0, STOP)
+        self.setup = time.perf_counter() - begin
+        self.done = 0
+
+    def run(self, steps: int) -> tuple[float, float]:
+        """Seconds of wall time and of CPU time."""
+        recorder = Recorder(self.master.signals, self.master.kinds, None)
+
+        def observe(_: int, rows: Rows) -> bool:
+            recorder.extend(rows)
+            return True
+
+        wall, cpu = time.perf_counter(), self._cpu()
+        self.master.run(self.done * STEP, STEP, steps, 1, observe)
+        self.done += steps
+        return time.perf_counter() - wall, self._cpu() - cpu
+
+    def _cpu(self) -> float:
+        processes = [slave.pid for slave in self.slaves.values() if isinstance(slave, IsolatedSlave)]
+        return time.process_time() + sum(map(cpu_of, processes))
+
+    def close(self) -> None:
+        for slave in self.slaves.values():
+            slave.free()
+
+
+def cpu_of(process: int) -> float:
+    """CPU time of another process so far in s; 0 where the system does not tell."""
+    file = Path(f"/proc/{process}/schedstat")
+    return int(file.read_text().split()[0]) * 1e-9 if file.exists() else 0.0
+
+
+def compare(path: Path, count: int, algorithm: Algorithm, steps: int, repetitions: int, **start: float) -> str:
+    """One row of the table."""
+    with Workspace() as workspace:
+        both = [Candidate(path, count, algorithm, workspace, isolated, **start) for isolated in (False, True)]
+        costs: list[list[Sequence[float]]] = [[], []]
+        try:
+            for _ in range(repetitions):
+                for candidate, found in zip(both, costs, strict=True):
+                    found.append(candidate.run(steps))
+            assert both[0].master.values == both[1].master.values, "not the same values"
+        finally:
+            for candidate in both:
+                candidate.close()
+    cells = [f"{count}", algorithm]
+    for which in (0, 1):
+        here, apart = ([seconds[which] / steps / count * 1e6 for seconds in found] for found in costs)
+        ratio = statistics.median(b / a for a, b in zip(here, apart, strict=True))
+        cells += [f"{statistics.median(here):.3g}", f"{statistics.median(apart):.3g}", f"{ratio:.2g}"]
+    return f"| {' | '.join(cells)} | {both[1].setup:.2f} |"
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--steps", type=int, default=10_000, help="communication steps of a repetition")
+    parser.add_argument("--repetitions", type=int, default=5)
+    options = parser.parse_args()
+    compiled.kernel = None  # it does not take isolated instances: both go through the loop in Python
+    own = build(f"{HERE / 'lag.py'}:Lag", {}, kind="native")
+    print("| N | algorithm | wall, here | isolated | ratio | CPU, here | isolated | ratio | set-up s |")
+    print("| --- | --- | --- | --- | --- | --- | --- | --- | --- |")
+    with tempfile.TemporaryDirectory() as folder:
+        least = light(own, Path(folder))
+        for count in (1, 2, 8):
+            for algorithm in ("gauss-seidel", "jacobi"):
+                print(compare(least, count, algorithm, options.steps, options.repetitions), flush=True)
+    print("\nHeavy FMUs:\n")
+    for count in (2, 8):
+        steps = max(1, options.steps // 50)
+        print(compare(own, count, "jacobi", steps, options.repetitions, max_step=STEP / 30_000), flush=True)
+
+
+if __name__ == "__main__":
+    main()

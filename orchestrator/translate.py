@@ -1,0 +1,184 @@
+"""Model descriptions of FMI 1.0 and 3.0 in the terms of 2.0, in which everything behind `reader` thinks.
+
+What 2.0 has no words for is kept beside: of which type a variable is in 3.0, which variable of 1.0 is the negative of
+another, and which variables of 3.0 are left out because nothing here can hold their values.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, field
+from typing import Any
+
+from fmpy.model_description import Unknown
+
+VERSIONS = {"1.0": re.compile(r"1\.0"), "2.0": re.compile(r"2\.0(\..*)?"), "3.0": re.compile(r"3\.\d+(\.\d+)?")}
+"""The versions of FMI that are read, each with how files spell it."""
+_TYPES_3 = {
+    **dict.fromkeys(("Float32", "Float64"), "Real"),
+    **{f"{sign}Int{bits}": "Integer" for sign in ("", "U") for bits in (8, 16, 32, 64)},
+}
+_TRUE = ("true", "1")
+_CAPABILITIES_1 = (
+    "canHandleVariableCommunicationStepSize",
+    "canInterpolateInputs",
+    "canBeInstantiatedOnlyOncePerProcess",
+)
+_NAMED = 10
+"""How many variables a warning names."""
+
+
+@dataclass(frozen=True)
+class Beside:
+    """What the terms of FMI 2.0 do not say.
+
+    Attributes:
+        fmi_types: types of FMI 3.0 by variable. negated: variables of FMI 1.0 that are another's negative.
+        left_out: what variables are that are not taken, by name.
+    """
+
+    fmi_types: Mapping[str, str] = field(default_factory=dict)
+    negated: frozenset[str] = frozenset()
+    left_out: Mapping[str, str] = field(default_factory=dict)
+
+    def warnings(self, name: str) -> Iterator[str]:
+        """What a user should know who gives the file that name."""
+        if self.left_out:
+            listed = [f"{variable} ({what})" for variable, what in list(self.left_out.items())[:_NAMED]]
+            more = len(self.left_out) - len(listed)
+            listed += [f"and {more} more"] if more else []
+            yield f"{name}: variables of kinds that are not supported are left out: {', '.join(listed)}"
+
+
+def standard(root: Any) -> str:
+    """The version of FMI, one of `VERSIONS`; otherwise what the file says, or a question mark."""
+    written = str(root.get("fmiVersion", "")).strip()
+    return next((version for version, spelled in VERSIONS.items() if spelled.fullmatch(written)), written or "?")
+
+
+def is_for_co_simulation(root: Any, version: str) -> bool:
+    """Whether it is an FMU for co-simulation, or for that, too."""
+    return root.find("Implementation" if version == "1.0" else "CoSimulation") is not None
+
+
+def other_kind(root: Any, version: str) -> str:
+    """What an FMU that is not for co-simulation is."""
+    if version == "1.0" or root.find("ModelExchange") is not None:
+        return "a model-exchange FMU"
+    return "an FMU for scheduled execution" if root.find("ScheduledExecution") is not None else ""
+
+
+def is_pedantry(version: str, problem: str) -> bool:
+    """Whether FMPy complains of a default: FMI 1.0 makes every type continuous of which a file says nothing."""
+    return version == "1.0" and problem.rstrip().endswith('and must have variability != "continuous".')
+
+
+def translate(description: Any, root: Any, version: str) -> Beside:
+    """Put what FMPy has read into the terms of FMI 2.0, in place.
+
+    Args:
+        description: FMPy's.
+        root: the root element of the file.
+        version: from `standard`.
+
+    Raises:
+        ValueError: a number in the file is none.
+    """
+    if version == "1.0":
+        return _from_1(description, root)
+    if version == "3.0":
+        return _from_3(description, root)
+    return Beside()
+
+
+# -------------------------------------------------------------------- FMI 1.0
+
+
+def _from_1(description: Any, root: Any) -> Beside:
+    simulation = description.coSimulation
+    capabilities = root.find("Implementation/*/Capabilities")
+    for name in _CAPABILITIES_1:
+        setattr(simulation, name, capabilities is not None and capabilities.get(name) in _TRUE)
+    simulation.needsExecutionTool = root.find("Implementation/CoSimulation_Tool") is not None
+    variables = {v.name: v for v in description.modelVariables}
+    negated = set()
+    for element in root.iterfind("ModelVariables/ScalarVariable[@name]"):
+        v = variables[element.get("name")]
+        _roles_1(v, element)
+        if element.get("alias") == "negatedAlias" and v.type != "String":
+            negated.add(v.name)
+        if v.causality == "output":
+            description.outputs.append(Unknown(variable=v, dependencies=_dependencies_1(element, variables)))
+    return Beside(negated=frozenset(negated))
+
+
+def _roles_1(v: Any, element: Any) -> None:
+    """Causality, variability and initial.
+
+    A parameter without a start value depends on others; any other variable with one may be set before initialization.
+    """
+    causality = element.get("causality", "internal")
+    has_start = v.start is not None
+    if element.get("variability") == "parameter":
+        v.causality = "parameter" if has_start else "output" if causality == "output" else "calculatedParameter"
+        v.variability = "fixed"
+    else:
+        v.causality = causality if causality in ("input", "output") else "local"
+        if v.variability == "continuous" and v.type != "Real":
+            v.variability = "discrete"
+    is_guess = any(child.get("fixed") in ("false", "0") for child in element)
+    v.initial = ("approx" if is_guess else "exact") if has_start else "calculated"
+    if v.causality == "input":
+        v.initial = None
+
+
+def _dependencies_1(element: Any, variables: Mapping[str, Any]) -> list[Any] | None:
+    direct = element.find("DirectDependency")
+    if direct is None:
+        return None
+    names = [(name.text or "").strip() for name in direct.iterfind("Name")]
+    return [variables[name] for name in names if name in variables]
+
+
+# -------------------------------------------------------------------- FMI 3.0
+
+
+def _from_3(description: Any, root: Any) -> Beside:
+    element = root.find("CoSimulation")
+    description.coSimulation.providesDirectionalDerivative = element.get("providesDirectionalDerivatives") in _TRUE
+    description.coSimulation.canInterpolateInputs = False  # the standard has no call for that
+    written = {each.get("name"): each for each in root.find("ModelVariables") if isinstance(each.tag, str)}
+    fmi_types, left_out = {}, {}
+    for v in description.modelVariables:
+        reason = _not_taken(v)
+        if reason:
+            left_out[v.name] = reason
+            continue
+        fmi_types[v.name] = v.type
+        own = written.get(v.name)
+        if own is not None:
+            v.min, v.max = own.get("min"), own.get("max")  # FMPy forgets those of unsigned numbers
+        v.type = _TYPES_3.get(v.type, v.type)
+        if v.causality == "structuralParameter":
+            v.initial = None  # can be set in configuration mode only, which is for arrays
+        if v.alias is not None:
+            _show_as_alias(v)
+    description.modelVariables = [v for v in description.modelVariables if v.name not in left_out]
+    return Beside(fmi_types=fmi_types, left_out=left_out)
+
+
+def _not_taken(v: Any) -> str:
+    if v.type == "Clock":
+        return "a clock"
+    if v.dimensions:
+        return "an array"
+    if v.type == "Binary":
+        return "binary"
+    return "clocked" if v.clocks else ""
+
+
+def _show_as_alias(v: Any) -> None:
+    """Another name can be read and set as the first can, but is no input or output once more."""
+    v.causality = "local"
+    v.description = f"{v.description or ''} (another name of {v.alias.name})".strip()

@@ -1,0 +1,238 @@
+/* An FMI 3.0 FMU by hand, with the functions of co-simulation and no others: der(x) = u - x, solved exactly over a step, and
+   an input and an output of every type, which gives what the input was a step ago. From t = 5 s on its parameter `mode`
+   rules: 1 to 5 and 9: the step gives that status (9: -1); 6: a step takes 0.05 s at most, and is discarded there; 7: a step
+   of more than 0.05 s is refused; 8: the simulation shall end after half a step; 11: half of a step of more than 0.05 s is
+   taken, and that is told as an early return; 12: y is not a number; 20 + s: the status of getting reals. At any time 40:
+   initialization fails. Value references are ten times the place of a type below plus 0 for its input and 1 for its output;
+   Float64: 0 time, 1 u, 2 x, 3 y = x + gain * u, 4 gain, 5 der(x); Int32: 62 mode; Int64: 82 gear, 83 shown. */
+
+#include <math.h>
+#include <stdbool.h>
+#include <stdint.h>
+#include <stdlib.h>
+#include <string.h>
+
+typedef void (*Logger)(void *environment, int status, const char *category, const char *text);
+typedef struct {
+    double f64[10], time;
+    float f32[2];
+    int8_t i8[2];
+    uint8_t u8[2];
+    int16_t i16[2];
+    uint16_t u16[2];
+    int32_t i32[3];
+    uint32_t u32[2];
+    int64_t i64[4];
+    uint64_t u64[2];
+    bool truth[2], ready;
+    char text[2][100];
+} Values;
+typedef struct {
+    Values now;
+    Logger logger;
+    void *environment;
+    bool logging;
+} Third;
+
+static int tell(Third *s, int status, const char *text)
+{
+    if (status) {
+        s->logger(s->environment, status, "third", text);
+    }
+    return status;
+}
+
+static int mode(const Third *s)
+{
+    return s->now.time >= 5.0 ? s->now.i32[2] : 0;
+}
+
+void *fmi3InstantiateCoSimulation(const char *name, const char *token, const char *resources, bool visible, bool logging,
+                                  bool events, bool early, const unsigned *intermediate, size_t count,
+                                  void *environment, Logger logger, void *update)
+{
+    if (strcmp(token, "{3}") || events || early || count || update) {
+        logger(environment, 3, "third", "another token, or what was not offered, 100 %");
+        return NULL;
+    }
+    Third *s = calloc(1, sizeof *s);
+    s->logger = logger;
+    s->environment = environment;
+    s->now.f64[2] = s->now.f64[4] = 1.0;
+    s->now.i64[2] = s->now.i64[3] = 1;
+    s->now.i8[0] = -128;
+    s->now.u8[0] = 7;
+    if (resources) {
+        strncpy(s->now.text[1], resources, 99);
+    }
+    return s;
+}
+
+void fmi3FreeInstance(void *c)
+{
+    free(c);
+}
+
+int fmi3EnterInitializationMode(void *c, bool has_tolerance, double tolerance, double start, bool has_stop, double stop)
+{
+    Third *s = c;
+    s->now.time = start;
+    return tell(s, s->now.ready || !has_stop || stop <= start || s->now.i32[2] == 40 ? 3 : 0, "no initialization");
+}
+
+int fmi3ExitInitializationMode(void *c)
+{
+    ((Third *)c)->now.ready = true;
+    return 0;
+}
+
+int fmi3Terminate(void *c)
+{
+    return tell(c, ((Third *)c)->now.ready ? 0 : 3, "termination");
+}
+
+static int update(Third *s)
+{
+    double *v = s->now.f64;
+    v[0] = s->now.time;
+    v[3] = mode(s) == 12 ? NAN : v[2] + v[4] * v[1];
+    v[5] = v[1] - v[2];
+    return tell(s, mode(s) >= 20 ? mode(s) - 20 : 0, "reading");
+}
+
+#define EXCHANGE(name, type, kept)                                                                                     \
+    int fmi3Set##name(void *c, const unsigned *vr, size_t count, const type *values, size_t size)                      \
+    {                                                                                                                  \
+        for (size_t k = 0; k < count; k++) {                                                                           \
+            ((Third *)c)->now.kept[vr[k] % 10] = values[k];                                                            \
+        }                                                                                                              \
+        return count == size ? 0 : 3;                                                                                  \
+    }                                                                                                                  \
+    int fmi3Get##name(void *c, const unsigned *vr, size_t count, type *values, size_t size)                            \
+    {                                                                                                                  \
+        int status = sizeof(type) == sizeof(double) && vr[0] < 10 ? update(c) : 0;                                     \
+        for (size_t k = 0; k < count; k++) {                                                                           \
+            values[k] = ((Third *)c)->now.kept[vr[k] % 10];                                                            \
+        }                                                                                                              \
+        return count == size ? status : 3;                                                                             \
+    }
+EXCHANGE(Float64, double, f64)
+EXCHANGE(Float32, float, f32)
+EXCHANGE(Int8, int8_t, i8)
+EXCHANGE(UInt8, uint8_t, u8)
+EXCHANGE(Int16, int16_t, i16)
+EXCHANGE(UInt16, uint16_t, u16)
+EXCHANGE(Int32, int32_t, i32)
+EXCHANGE(UInt32, uint32_t, u32)
+EXCHANGE(Int64, int64_t, i64)
+EXCHANGE(UInt64, uint64_t, u64)
+EXCHANGE(Boolean, bool, truth)
+
+int fmi3SetString(void *c, const unsigned *vr, size_t count, const char *const *values, size_t size)
+{
+    for (size_t k = 0; k < count; k++) {
+        strncpy(((Third *)c)->now.text[vr[k] % 10], values[k], 99);
+    }
+    return 0;
+}
+
+int fmi3GetString(void *c, const unsigned *vr, size_t count, const char **values, size_t size)
+{
+    for (size_t k = 0; k < count; k++) {
+        values[k] = ((Third *)c)->now.text[vr[k] % 10];
+    }
+    return 0;
+}
+
+int fmi3DoStep(void *c, double time, double step, bool final, bool *event, bool *ends, bool *early, double *reached)
+{
+    Third *s = c;
+    Values *v = &s->now;
+    int how = mode(s), status = how >= 1 && how <= 5 ? how : how == 9 ? -1 : 0;
+    if (!v->ready || fabs(time - v->time) > 1e-9) {
+        return tell(s, 3, "a step that was not expected");
+    }
+    *event = true; /* of no meaning without an event mode */
+    *ends = how == 8;
+    *early = how == 11 && step > 0.05;
+    *reached = v->time;
+    if (how == 7 && step > 0.05) {
+        return tell(s, 2, "too long");
+    }
+    if (how == 6 && step > 0.05) {
+        step = 0.05;
+        status = 2;
+    }
+    step *= *ends || *early ? 0.5 : 1.0;
+    v->f64[2] = v->f64[1] + (v->f64[2] - v->f64[1]) * exp(-step);
+    v->f32[1] = v->f32[0];
+    v->i8[1] = v->i8[0];
+    v->u8[1] = v->u8[0];
+    v->i16[1] = v->i16[0];
+    v->u16[1] = v->u16[0];
+    v->i32[1] = v->i32[0];
+    v->u32[1] = v->u32[0];
+    v->i64[1] = v->i64[0];
+    v->i64[3] = v->i64[2];
+    v->u64[1] = v->u64[0];
+    v->truth[1] = !v->truth[0];
+    strcpy(v->text[1], v->text[0]);
+    v->time = *reached = time + step;
+    return tell(s, status, "as it was told, 100 %");
+}
+
+int fmi3GetFMUState(void *c, void **state)
+{
+    *state = *state ? *state : malloc(sizeof(Values));
+    memcpy(*state, &((Third *)c)->now, sizeof(Values));
+    return 0;
+}
+
+int fmi3SetFMUState(void *c, void *state)
+{
+    memcpy(&((Third *)c)->now, state, sizeof(Values));
+    return 0;
+}
+
+int fmi3FreeFMUState(void *c, void **state)
+{
+    free(*state);
+    *state = NULL;
+    return 0;
+}
+
+int fmi3SerializedFMUStateSize(void *c, void *state, size_t *size)
+{
+    *size = sizeof(Values);
+    return 0;
+}
+
+int fmi3SerializeFMUState(void *c, void *state, uint8_t *bytes, size_t size)
+{
+    memcpy(bytes, state, size);
+    return 0;
+}
+
+int fmi3DeserializeFMUState(void *c, const uint8_t *bytes, size_t size, void **state)
+{
+    if (size != sizeof(Values)) {
+        return tell(c, 3, "another size");
+    }
+    *state = malloc(size);
+    memcpy(*state, bytes, size);
+    return 0;
+}
+
+int fmi3GetDirectionalDerivative(void *c, const unsigned *unknowns, size_t n, const unsigned *knowns, size_t m,
+                                 const double *seed, size_t seeds, double *found, size_t size)
+{
+    for (size_t k = 0; k < n; k++) {
+        found[k] = 0.0;
+        for (size_t j = 0; j < m; j++) {
+            double by_u = unknowns[k] == 3 ? ((Third *)c)->now.f64[4] : unknowns[k] == 5 ? 1.0 : 0.0;
+            double by_x = unknowns[k] == 3 ? 1.0 : unknowns[k] == 5 ? -1.0 : unknowns[k] == 2 ? 1.0 : 0.0;
+            found[k] += seed[j] * (knowns[j] == 1 ? by_u : knowns[j] == 2 ? by_x : 0.0);
+        }
+    }
+    return n == size && m == seeds ? 0 : 3;
+}
