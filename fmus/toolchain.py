@@ -33,7 +33,7 @@ from ..components.component import ComponentError, nearest
 FLAGS = (
     *("-std=c11", "-O2", "-ffp-contract=off", "-fno-builtin-pow", "-fvisibility=hidden", "-g0"),
     *("-Wall", "-Wextra", "-Wconversion"),
-    # The loops of the integration are short: vector loads of numbers just stored one by one stall (ComfortCruise +35 %).
+    # The loops of the integration are short: vector loads of what was just stored singly stall (a step up to +35 %).
     "-fno-tree-vectorize",
 )
 CL_FLAGS = ("/nologo", "/std:c11", "/O2", "/fp:precise", "/W3", "/D_CRT_SECURE_NO_WARNINGS", "/LD")

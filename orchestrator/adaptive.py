@@ -15,16 +15,25 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
-from .errors import CouplingError, FmuError, StoppedError
+from .errors import CouplingError, FmuError, RunError, StoppedError
 from .exchange import Exchange
+from .interface import Interface, Variable
+from .wiring import is_direct
 
 _SAFETY, _SMALLEST, _LARGEST = 0.9, 0.2, 5.0
 """How a step may change: of the step that the error estimate asks for, and by which factors at most."""
 _AT_END = {1: 3.0, 2: 1.8, 3: 1.9}
-"""How many times their error the two halves differ from a step with the inputs of the end, by order, on a smooth course:
-polynomials through former points have the error constants 1/2, 5/12, 3/8, those through the end -1/2, -1/12, -1/24."""
+"""How many times their error the two halves differ from a step with the inputs of the end, by order, on a smooth
+course: polynomials through former points have the error constants 1/2, 5/12, 3/8; with the end -1/2, -1/12, -1/24."""
 _ROUNDING = 1e-9
 """Part of a step that is not worth a step of its own."""
+
+
+def is_watched(interface: Interface, variable: Variable) -> bool:
+    """Whether the error of an output counts: not where it shows the inputs of the begin, however short the step is."""
+    if (variable.type, variable.variability) != ("Real", "continuous"):
+        return False
+    return variable.dependencies is None or not is_direct(interface, variable)
 
 
 @dataclass
@@ -88,8 +97,8 @@ class Adaptive:
                 is_shortest = length <= self.shortest * (1.0 + _ROUNDING)
                 try:
                     error, place = self._take(time, end, kept)
-                except FmuError as failure:  # of a shorter step it may be capable
-                    if is_shortest or isinstance(failure, StoppedError) or failure.status == "fatal":
+                except RunError as failure:  # of a shorter step they may be capable
+                    if is_shortest or isinstance(failure, StoppedError) or _is_fatal(failure):
                         raise
                     error, place = math.inf, -1
                 ideal = _SAFETY * error ** (-1.0 / (self.order + 1)) if error > 0.0 else _LARGEST
@@ -175,6 +184,11 @@ class Adaptive:
             f"absolute): its error is {error:.3g} times as large at the shortest step, {length:g} s; loosen "
             f"simulation.tolerance, or this signal's in [simulation.tolerances], or allow a smaller simulation.min_step"
         )
+
+
+def _is_fatal(failure: RunError) -> bool:
+    """Whether an FMU may not be called any more."""
+    return isinstance(failure, FmuError) and failure.status == "fatal"
 
 
 def _fit(time: float, wanted: float, until: float) -> tuple[float, float]:

@@ -3,12 +3,10 @@
 from __future__ import annotations
 
 import hashlib
-import lzma
 import shutil
 import stat
 import tempfile
 import zipfile
-import zlib
 from pathlib import Path, PurePosixPath, PureWindowsPath
 
 from .errors import FmuFileError
@@ -17,8 +15,10 @@ MAX_SIZE = 4 << 30
 """Bytes an FMU may unpack to: a bomb is refused, a large real model is not."""
 MAX_FILES = 100_000
 MAX_DESCRIPTION = 256 << 20
-_UNREADABLE = (zipfile.BadZipFile, zlib.error, lzma.LZMAError, EOFError, OSError, RuntimeError, ValueError)
-"""What `zipfile` raises on damaged, encrypted, badly named or unwritable entries (a file where a folder stands)."""
+MAX_LEVELS = 64
+"""Folders in folders: a thousand of them could be made, but not be removed again."""
+_METHODS = (zipfile.ZIP_STORED, zipfile.ZIP_DEFLATED)
+"""What FMI allows. Of others `zipfile` unpacks whole blocks in memory, whatever size an entry says it has."""
 
 
 class Workspace:
@@ -93,7 +93,7 @@ def _extract(path: Path, target: Path) -> None:
                 archive.extract(entry, target)
     except FmuFileError:
         raise
-    except _UNREADABLE as error:
+    except Exception as error:  # damaged, encrypted, unwritable (a file where a folder stands): all kinds are raised
         shutil.rmtree(target, ignore_errors=True)
         raise FmuFileError(f"{path} is not a usable FMU: {error}") from error
     if not (target / "modelDescription.xml").is_file():
@@ -110,9 +110,16 @@ def _check_entries(path: Path, entries: list[zipfile.ZipInfo]) -> None:
     for entry in entries:
         name = entry.filename
         parts = PurePosixPath(name.replace("\\", "/")).parts
+        if not name:
+            raise FmuFileError(f"{path} is refused: it holds an entry without a name")
         if ".." in parts or PurePosixPath(name).is_absolute() or PureWindowsPath(name).drive or name.startswith("\\"):
             raise FmuFileError(f"{path} is refused: the entry {name!r} points outside the archive")
         if stat.S_ISLNK(entry.external_attr >> 16):
             raise FmuFileError(f"{path} is refused: the entry {name!r} is a symbolic link")
-        if name == "modelDescription.xml" and entry.file_size > MAX_DESCRIPTION:
+        if len(parts) > MAX_LEVELS:
+            raise FmuFileError(f"{path} is refused: an entry lies {len(parts)} levels deep, {name[:40]!r}...")
+        if entry.compress_type not in _METHODS:
+            method = zipfile.compressor_names.get(entry.compress_type, f"method {entry.compress_type}")
+            raise FmuFileError(f"{path} is refused: the entry {name!r} is compressed with {method}; FMI allows deflate")
+        if parts == ("modelDescription.xml",) and entry.file_size > MAX_DESCRIPTION:
             raise FmuFileError(f"{path} is refused: its modelDescription.xml is {entry.file_size >> 20} MiB")

@@ -217,11 +217,11 @@ class CompiledLoop:
         """Go on where an FMU discarded a step that it takes in parts; raise what `Master` does otherwise."""
         slave, call = self._culprits[failed]
         assert slave is not None
-        period = self._operations[failed][2]
+        period, phase = self._operations[failed][2:]
         if call == "fmi2DoStep" and status == _DISCARD and self.threads <= 1:
             slave.resume(time, period * step, status, final=True)
             return
-        slave.time = time + step if call.startswith("fmi2Get") else time
+        slave.time = time + (period - phase) * step if call.startswith("fmi2Get") else time
         slave.check(call, status)
         self._exchange.check_finite(slave)
 

@@ -146,6 +146,8 @@ def show_run(outcome: Run, second: Run | None, quiet: bool) -> None:
         if outcome.published and outcome.status == "completed":
             show_published(out, by_source(outcome.published))
         out.print()
+    for note in outcome.notes:
+        say(out, f"note: {note}", "bold red")
     if outcome.status != "completed":
         reached = float(outcome.time[-1]) if len(outcome.time) else system.start_time
         why = f": {outcome.error}" if outcome.status == "terminated" else ""

@@ -4,11 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
 
+from .adaptive import is_watched
 from .errors import did_you_mean
 from .interface import Interface
 from .iterative import find_blocks
 from .loops import find_loops
-from .system import System
+from .system import System, split
 from .wiring import Wiring
 
 _SHOWN = 6
@@ -112,9 +113,20 @@ def describe_coupling(system: System, interfaces: Mapping[str, Interface], wirin
                 "it at each communication point"
             )
         notes.append(f"algebraic loop through {_listed(loop)}: {how}")
+    if system.algorithm == "adaptive":
+        notes += _unwatched(system, interfaces)
     if system.extrapolation:
         held = [n for n, x in interfaces.items() if any(link.target[0] == n for link in wiring.links)]
         held = [n for n in held if not interfaces[n].interpolates_inputs]
         if held:
             notes.append(f"inputs of {_listed(held)} are held over a step: canInterpolateInputs is false")
     return notes
+
+
+def _unwatched(system: System, interfaces: Mapping[str, Interface]) -> Iterable[str]:
+    """Tolerances that `adaptive` has no use for."""
+    for signal in system.tolerances:
+        instance, name = split(signal)
+        interface = interfaces[instance]
+        if not any(is_watched(interface, interface.variables[scalar]) for scalar in interface.scalars(name) or ()):
+            yield f"the tolerance of {signal} has no effect: adaptive watches continuous outputs without feed-through"

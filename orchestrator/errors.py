@@ -35,6 +35,10 @@ class FmuFileError(RailcosimError, ValueError):
 class RunError(RailcosimError, RuntimeError):
     """A run that had begun could not go on; what was computed until then is kept."""
 
+    def explain(self, cause: str) -> None:
+        """Add what is known of the cause to the message."""
+        self.args = (f"{self.args[0]}; {cause}", *self.args[1:])
+
 
 class CouplingError(RunError):
     """The values that instances exchange do not settle: a coupling diverges, or a loop has no solution."""

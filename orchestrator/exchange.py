@@ -121,6 +121,8 @@ class Exchange:
         self.owners = [name for name, parts in self.yields.items() for p in parts for _ in range(p.begin, p.end)]
         """The instance that each of the values comes from."""
         self.values: list[Any] = [0.0] * len(self.signals)
+        self.stamps: list[float] = []
+        """What time in s each of the values belongs to; kept only if there is an entry for each."""
         deepest = max((link.delay for link in links), default=0)
         self.depth = deepest + 1 if deepest else 0
         """How many recorded points delayed connections look back on, the present one included."""
@@ -211,6 +213,8 @@ class Exchange:
         """Read all outputs of an instance, finite or not, at a time in s: nothing has settled yet."""
         for part in self.yields[slave.name]:
             self.values[part.begin : part.end] = part.channel.get()
+            if self.stamps:
+                self._stamp(part, slave)
             if self.output_changes:
                 self._change(part, time)
 
@@ -233,8 +237,13 @@ class Exchange:
             # One sum instead of one test per value: it is finite unless a value is not (or all are astronomic).
             if part.is_real and not math.isfinite(sum(found)):
                 self.check_finite(slave)
+            if self.stamps:
+                self._stamp(part, slave)
             if self.output_changes:
                 self._change(part, time)
+
+    def _stamp(self, part: Yield, slave: Slave) -> None:
+        self.stamps[part.begin : part.end] = [slave.time] * (part.end - part.begin)
 
     def _change(self, part: Yield, time: float) -> None:
         for place, change in self.output_changes.items():

@@ -6,25 +6,24 @@ those of the polynomial of order 1 or 2 through the last values, each at the tim
 
 from __future__ import annotations
 
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
 from .exchange import Exchange, Feed
 from .wiring import Link
 
-Point = tuple[float, list[float]]
-"""A time in s, and the inputs that belong to it."""
+_ROUNDING = 1e-6
+"""Part of a step within which two times are one."""
 
 
 @dataclass(frozen=True)
 class _Course:
-    """The inputs of one instance that are continued: which of its feed's, and which are already of the step's end."""
+    """The inputs of one instance that are continued, all of one feed: their places in it, and their names."""
 
     feed: Feed
     members: tuple[int, ...]
     names: tuple[str, ...]
-    ahead: tuple[bool, ...]
 
 
 class Extrapolator:
@@ -34,22 +33,22 @@ class Extrapolator:
         exchange: whose inputs they are.
         links: scalar connections. Delayed ones are held, and so is what a sampled component gives or what is discrete.
         order: of the polynomial: 1 or 2.
-        ahead: targets that are given values of the end of the step, because their source has stepped before them.
+        ended: whether the values are always those of the end of the step, as in an iteration; what a source has not
+            reached yet is a guess then.
     """
 
-    def __init__(
-        self, exchange: Exchange, links: Sequence[Link], order: int, ahead: Collection[tuple[str, str]] = ()
-    ) -> None:
+    def __init__(self, exchange: Exchange, links: Sequence[Link], order: int, *, ended: bool = False) -> None:
         self._order = order
         self._exchange = exchange
+        self._ended = ended
+        exchange.stamps = [0.0] * len(exchange.values)
         smooth = {link.target for link in links if _is_smooth(exchange, link)}
         self._courses: dict[str, _Course] = {}
         for name, feeds in exchange.feeds.items():
             for feed in feeds:
                 members = tuple(k for k, target in enumerate(feed.targets) if (name, target) in smooth)
                 if members:
-                    names = tuple(feed.targets[k] for k in members)
-                    self._courses[name] = _Course(feed, members, names, tuple((name, n) in ahead for n in names))
+                    self._courses[name] = _Course(feed, members, tuple(feed.targets[k] for k in members))
         self.past: dict[str, list[list[tuple[float, float]]]] = {}
         """For each continued input of an instance, the last values and the times they belong to, newest last."""
 
@@ -62,7 +61,7 @@ class Extrapolator:
     def write(self, name: str, time: float, length: float, *, ended: bool = False) -> None:
         """Set the inputs of an instance for a step from ``time`` of ``length``, both in s, with their derivatives.
 
-        ``ended``: all of them are given values of the end of the step.
+        ``ended``: the values are those of the end of the step.
         """
         course = self._courses.get(name)
         if course is None:
@@ -70,25 +69,20 @@ class Extrapolator:
             return
         for feed in self._exchange.feeds[name]:
             values = self._exchange.inputs(feed, time)
-            orders: list[int] = []
             derivatives: list[float] = []
             if feed is course.feed:
-                for n, k in enumerate(course.members):
-                    course_of_input = self._continue(
-                        self.past[name][n], time + length * (ended or course.ahead[n]), values[k], time
-                    )
-                    values[k] = course_of_input[0]
-                    orders += range(1, self._order + 1)
-                    derivatives += course_of_input[1:]
+                for past, k in zip(self.past[name], course.members, strict=True):
+                    is_end = ended or self._ended
+                    at = time + length if is_end else self._exchange.stamps[feed.sources[k]]
+                    former = [point for point in past if point[0] < at - _ROUNDING * length][-self._order :]
+                    past[:] = [*former, (at, values[k])]
+                    values[k], *slopes = polynomial(past, time, self._order)
+                    derivatives += slopes
             feed.channel.set(values)
             if derivatives:
                 names = [n for n in course.names for _ in range(self._order)]
+                orders = [*range(1, self._order + 1)] * len(course.names)
                 self._exchange.slaves[name].interpolate(names, orders, derivatives)
-
-    def _continue(self, past: list[tuple[float, float]], at: float, value: float, time: float) -> list[float]:
-        """Value and derivatives at ``time`` of the polynomial through the last points and the new one."""
-        past[:] = [*[point for point in past if point[0] < at][-self._order :], (at, value)]
-        return polynomial(past[-self._order - 1 :], time, self._order)
 
     def restart(self) -> None:
         """Forget the past, after something has jumped: a polynomial through a jump would overshoot."""
@@ -98,12 +92,14 @@ class Extrapolator:
 
     def save(self) -> Any:
         """What it remembers."""
-        return {name: [list(points) for points in past] for name, past in self.past.items()}
+        past = {name: [list(points) for points in past] for name, past in self.past.items()}
+        return {"past": past, "stamps": list(self._exchange.stamps)}
 
-    def restore(self, saved: Mapping[str, Sequence[Sequence[Sequence[float]]]]) -> None:
+    def restore(self, saved: Mapping[str, Any]) -> None:
         """Remember what was saved."""
+        self._exchange.stamps[:] = saved["stamps"]
         self.past = {
-            name: [[(float(t), float(v)) for t, v in points] for points in past] for name, past in saved.items()
+            name: [[(float(t), float(v)) for t, v in points] for points in past] for name, past in saved["past"].items()
         }
 
 

@@ -102,7 +102,7 @@ class Host:
                     quiet[kind](doorbell.content(body))
                 except Exception as error:
                     self._problem = self._problem or error
-            self._notes[NOTE_CALL] = 0
+                self._notes[NOTE_CALL] = 0
 
     # ---------------------------------------------------------------- answered
 
@@ -120,6 +120,7 @@ class Host:
         if told:
             self._report(told)
         else:
+            self._notes[NOTE_CALL] = 0
             self._door.send(doorbell.ANSWER)
 
     def _call(self, dirty: Sequence[int], operation: str, arguments: tuple[Any, ...]) -> None:
@@ -154,6 +155,7 @@ class Host:
         os._exit(0)
 
     def _report(self, told: dict[str, Any]) -> None:
+        self._notes[NOTE_CALL] = 0
         self._door.send(doorbell.frame(doorbell.REPORT, told | {"time": self._slave.time if self._slave else 0.0}))
 
     @property

@@ -7,7 +7,6 @@ step's begin, and step first.
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any
@@ -16,7 +15,7 @@ import networkx as nx
 import numpy as np
 from numpy.typing import NDArray
 
-from .errors import CouplingError
+from .errors import CouplingError, FmuError, StoppedError
 from .exchange import Exchange
 from .interface import Interface
 from .order import derive
@@ -139,29 +138,34 @@ class Iterative:
         states = [slave.save() for slave in slaves]
         try:
             next_guess = _ACCELERATIONS[self.acceleration](self.relaxation)
-            worst, first = math.inf, math.inf
+            errors: list[Vector] = []
             for count in range(1, self.max_iterations + 1):
                 if count > 1:
                     for slave, state in zip(slaves, states, strict=True):
                         slave.restore(state)
                 guess = np.array([exchange.values[k] for k in reals], dtype=np.float64)
                 flags = [exchange.values[k] for k in others]
-                self._sweep(group, time, length, final=False)
+                try:
+                    self._sweep(group, time, length, final=False)
+                except FmuError as failure:
+                    if count == 1 or isinstance(failure, StoppedError):
+                        raise
+                    said = str(failure).partition("\n")[0]
+                    raise self._failure((time, length), reals, errors, said) from failure
                 reached = np.array([exchange.values[k] for k in reals], dtype=np.float64)
-                error = np.abs(reached - guess) / self._scale(reals, guess, reached)
+                errors.append(np.abs(reached - guess) / self._scale(reals, guess, reached))
                 if count == 1:  # the size of each value, for the method that combines them
                     scale = self._scale(reals, guess, reached)
-                worst = float(error.max(initial=0.0))
-                first = min(first, worst)
-                if worst <= 1.0 and flags == [exchange.values[k] for k in others]:
-                    self._count(count, worst)
+                flipping = [k for k, flag in zip(others, flags, strict=True) if flag != exchange.values[k]]
+                if _largest(errors[-1]) <= 1.0 and not flipping:
+                    self._count(count, _largest(errors[-1]))
                     return
                 following = next_guess(guess / scale, reached / scale) * scale if reals else guess
-                if not np.isfinite(following).all() or worst > _HOPELESS * max(first, 1.0):
+                if not np.isfinite(following).all() or _is_hopeless(errors):
                     break
                 for k, value in zip(reals, following, strict=True):
                     exchange.values[k] = float(value)
-            self._fail(reals, error, time, length, count, grows=worst > first)
+            raise self._failure((time, length), reals, errors, "", flipping)
         finally:
             for slave, state in zip(slaves, states, strict=True):
                 slave.forget(state)
@@ -175,21 +179,50 @@ class Iterative:
         self.tally.most = max(self.tally.most, iterations)
         self.tally.residual = max(self.tally.residual, worst)
 
-    def _fail(
-        self, places: Sequence[int], error: Vector, time: float, length: float, count: int, *, grows: bool
-    ) -> None:
-        names = [self.exchange.signals[places[k]] for k in np.argsort(error)[::-1][:3]]
-        how = "diverges" if grows else "does not converge"
-        raise CouplingError(
-            f"t = {time:g} s: the coupling through {', '.join(names)} {how}: after {count} iterations of the step of "
-            f"{length:g} s they still disagree by {float(error.max(initial=0.0)):.3g} times the tolerance; take a "
-            "smaller step, more simulation.max_iterations, another simulation.acceleration or a smaller "
+    def _failure(
+        self,
+        step: tuple[float, float],
+        reals: Sequence[int],
+        errors: Sequence[Vector],
+        failure: str,
+        flipping: Sequence[int] = (),
+    ) -> CouplingError:
+        """What to say of iterations that led nowhere.
+
+        Args:
+            step: its begin and its length in s.
+            reals: places of the real numbers.
+            errors: their disagreement in units of the tolerance, for each iteration.
+            failure: what an FMU failed of in the one after them, if it did.
+            flipping: places of what is no real number and still changes.
+        """
+        worst = [reals[k] for k in np.argsort(errors[-1])[::-1] if errors[-1][k] > 1.0]
+        names = ", ".join(self.exchange.signals[k] for k in [*worst, *flipping][:_SHOWN])
+        last, grows = _largest(errors[-1]), bool(failure) or _largest(errors[-1]) > _largest(errors[0])
+        what = f"still disagree by {last:.3g} times the tolerance" if worst else "still change"
+        if failure:
+            what += f", and with the next guess an FMU fails ({failure})"
+        ways = ["a smaller step"]
+        ways += [] if grows else ["more simulation.max_iterations"]
+        ways += [] if self.acceleration == "anderson" else ['simulation.acceleration = "anderson"']
+        return CouplingError(
+            f"t = {step[0]:g} s: the coupling through {names} {'diverges' if grows else 'does not converge'}: after "
+            f"{len(errors)} iterations of the step of {step[1]:g} s they {what}; take {', '.join(ways)} or a smaller "
             "simulation.relaxation"
         )
 
 
+def _largest(errors: Vector) -> float:
+    return float(errors.max(initial=0.0))
+
+
+def _is_hopeless(errors: Sequence[Vector]) -> bool:
+    """Whether values are so much farther apart than at first that nothing will bring them together."""
+    return _largest(errors[-1]) > _HOPELESS * max(_largest(errors[0]), 1.0)
+
+
 _HOPELESS = 1e12
-"""How many times the smallest mismatch so far the present one may be."""
+_SHOWN = 3
 
 
 # -------------------------------------------------------------------- from what was tried to what is tried next

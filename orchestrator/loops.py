@@ -9,7 +9,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Mapping, Sequence
-from typing import Any
 
 import networkx as nx
 import numpy as np
@@ -23,13 +22,22 @@ from .wiring import Link
 
 _DIFFERENCE = 1e-7
 """Relative step of finite differences: the square root of the rounding error, and a little more."""
+_ATTEMPTS = 8
+"""How often what is no real number may change with the solution."""
 
 
-def find_loops(interfaces: Mapping[str, Interface], links: Iterable[Link]) -> list[tuple[str, ...]]:
+def find_loops(
+    interfaces: Mapping[str, Interface], links: Iterable[Link], *, doubtful: bool = False
+) -> list[tuple[str, ...]]:
     """The algebraic loops of a system: for each the connected outputs that depend on each other, by full name.
 
     An output whose FMU lists no dependencies counts as `wiring.is_direct` has it: of another maker as independent, of
     ours as dependent on all inputs. Delayed connections break a loop.
+
+    Args:
+        interfaces: of the instances.
+        links: scalar connections.
+        doubtful: whether every output without a list counts as dependent on all inputs, as the standard has it.
     """
     graph = nx.DiGraph()
     links = [link for link in links if not link.delay]
@@ -44,7 +52,7 @@ def find_loops(interfaces: Mapping[str, Interface], links: Iterable[Link]) -> li
             continue
         listed = output.dependencies
         fed = inputs.get(instance, set())
-        depends = (fed if interface.vendor else set()) if listed is None else fed & listed
+        depends = (fed if interface.vendor or doubtful else set()) if listed is None else fed & listed
         graph.add_edges_from((("input", instance, i), ("output", instance, name)) for i in depends)
     order = {link.source: k for k, link in reversed(list(enumerate(links)))}
     found = []
@@ -60,12 +68,14 @@ class LoopSolver:
 
     Args:
         exchange: whose values they are.
-        places: where the unknown values stand; real numbers.
+        places: where the unknown values stand. What is no real number among them follows from the others: each solution
+            is passed on until it changes nothing any more.
     """
 
     def __init__(self, exchange: Exchange, places: Sequence[int]) -> None:
         self._exchange = exchange
-        self._places = list(places)
+        self._places = [k for k in places if exchange.kinds[k] == "Real"]
+        self._others = [k for k in places if exchange.kinds[k] != "Real"]
         self.signals = [exchange.signals[k] for k in places]
         self.residual = 0.0
         """The worst relative mismatch that was left at any point."""
@@ -83,12 +93,8 @@ class LoopSolver:
             for slave in self._instances
         }
 
-    def solve(self, time: float, start: Sequence[Any] | None = None) -> float:
-        """Find the values at a time in s, and leave them in the exchange and as inputs.
-
-        Args:
-            time: in s.
-            start: where the search begins; the present values by default.
+    def solve(self, time: float) -> float:
+        """Find the values at a time in s, beginning at the present ones, and leave them in the exchange and as inputs.
 
         Returns:
             The largest mismatch that is left, relative to the value's size above 1; infinite if there are no values.
@@ -96,14 +102,29 @@ class LoopSolver:
         Raises:
             FmuError: an FMU failed.
         """
-        from scipy import optimize  # noqa: PLC0415 (a heavy import for a rare case)
+        values, left = self._exchange.values, math.inf
+        for _ in range(_ATTEMPTS):
+            left = self._solve(time)
+            others = [values[k] for k in self._others]
+            if others:
+                reals = np.array([values[k] for k in self._places], dtype=np.float64)
+                left = max(left, _relative(self._mismatch(reals, time), reals))
+            if others == [values[k] for k in self._others]:
+                break
+            left = math.inf
+        self.residual = max(self.residual, left)
+        return left
 
+    def _solve(self, time: float) -> float:
+        """The same for the real numbers, whatever the others are."""
         values = self._exchange.values
-        given = np.array([values[k] for k in self._places] if start is None else start, dtype=np.float64)
+        given = np.array([values[k] for k in self._places], dtype=np.float64)
         given[~np.isfinite(given)] = 0.0
         found = given + self._mismatch(given, time)
         left = _relative(found - given, found)
         if not left <= _SETTLED:
+            from scipy import optimize  # noqa: PLC0415 (a heavy import for a rare case)
+
             self.solutions += 1
             with np.errstate(all="ignore"):
                 solution = optimize.root(
@@ -113,7 +134,6 @@ class LoopSolver:
             found = solution + self._mismatch(solution, time)
         for place, value in zip(self._places, found, strict=True):
             values[place] = float(value)
-        self.residual = max(self.residual, left)
         return left
 
     def _remaining(self, solution: NDArray[np.float64], time: float) -> float:

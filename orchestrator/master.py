@@ -9,6 +9,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -16,7 +17,7 @@ from numpy.typing import NDArray
 
 from . import adaptive, iterative
 from .compiled import CompiledLoop, can_run
-from .errors import CouplingError, FmuError
+from .errors import CouplingError, FmuError, RunError
 from .events import LATE, Schedule
 from .exchange import Exchange, types_of
 from .extrapolation import Extrapolator
@@ -24,7 +25,7 @@ from .loops import LoopSolver, find_loops
 from .settling import settle
 from .slave import Slave
 from .system import Acceleration, Algorithm, Event, Loops, System
-from .wiring import Link, is_direct
+from .wiring import Link
 
 _SOLVED = 1e-9
 """Relative residual up to which an algebraic loop counts as solved."""
@@ -123,22 +124,13 @@ class Master:
         self.signals = self.exchange.signals
         self.values = self.exchange.values
         self.kinds = self.exchange.kinds
-        self._extrapolator = self._make_extrapolator(blocks) if settings.extrapolation else None
+        order, ended = settings.extrapolation, blocks is not None
+        self._extrapolator = Extrapolator(self.exchange, links, order, ended=ended) if order else None
         self._iterative = None if blocks is None else self._make_iterative(blocks)
         self.loops: LoopSolver | None = None
         self._schedule: Schedule | None = None
         self._compiled: CompiledLoop | None = None
         self.adaptive: adaptive.Adaptive | None = None
-
-    def _make_extrapolator(self, blocks: iterative.Blocks | None) -> Extrapolator:
-        """With the inputs that are given values of the step's end: those whose source has stepped before."""
-        at = {slave.name: k for k, slave in enumerate(self.sequence)}
-        ahead: set[tuple[str, str]] = set()
-        for link in self.exchange.links:
-            a, b = link.source[0], link.target[0]
-            if self.algorithm != "jacobi" and (blocks is not None or at[a] < at[b]):
-                ahead.add(link.target)
-        return Extrapolator(self.exchange, self.exchange.links, self.settings.extrapolation, ahead)
 
     def _make_iterative(self, blocks: iterative.Blocks) -> iterative.Iterative:
         how = self.settings
@@ -159,10 +151,10 @@ class Master:
         return found
 
     def _make_loop_solver(self, unsettled: Sequence[int]) -> LoopSolver | None:
-        """For the loops that the FMUs' dependencies tell of, and those that exchange did not settle."""
+        """For the loops that the FMUs' dependencies tell of or allow, and those that exchange did not settle."""
         interfaces = {name: slave.interface for name, slave in self.slaves.items()}
-        signals = {signal for loop in find_loops(interfaces, self.exchange.links) for signal in loop}
-        places = {k for k, signal in enumerate(self.signals) if signal in signals and self.kinds[k] == "Real"}
+        signals = {signal for loop in find_loops(interfaces, self.exchange.links, doubtful=True) for signal in loop}
+        places = {k for k, signal in enumerate(self.signals) if signal in signals}
         places.update(unsettled)
         return LoopSolver(self.exchange, sorted(places)) if places else None
 
@@ -192,8 +184,7 @@ class Master:
             self.loops = self._make_loop_solver(unsettled)
         if self.settings.events:
             self._schedule = Schedule(self.settings.events, self.exchange, start_time, self.settings.rates)
-            if self._schedule.apply(start_time, 0):
-                self._jump()
+            self._let_happen(0.0, lambda: None)
         if self._extrapolator is not None:
             self._extrapolator.begin(start_time)
         self.exchange.remember()
@@ -257,8 +248,7 @@ class Master:
             return observe
 
         def see(steps: int, rows: Rows) -> bool:
-            if steps == stop and schedule.apply(self.time, steps, LATE * step):
-                self._jump()
+            if steps == stop and self._let_happen(LATE * step, lambda: observe(steps, rows)):
                 if self.exchange.depth:
                     self.exchange.history[-1] = list(self.values)
                 if len(rows) and rows[-1][0] == self.time:
@@ -267,12 +257,25 @@ class Master:
 
         return see
 
-    def _jump(self) -> None:
-        """After events: what is continued begins anew, and what depends on itself is solved with the new values."""
-        if self._extrapolator is not None:
-            self._extrapolator.restart()
-        if self.loops is not None:
-            self._solve_loops(self.time)
+    def _let_happen(self, late: float, keep: Callable[[], object]) -> bool:
+        """Events at this point; whether there were any. Then what is continued begins anew, and loops are solved anew.
+
+        Args:
+            late: by how many s an event may be due later.
+            keep: called before a model's failure is passed on, which is none of the step before.
+        """
+        schedule = self._schedule
+        try:
+            if schedule is None or not schedule.apply(self.time, self.steps, late):
+                return False
+            if self._extrapolator is not None:
+                self._extrapolator.restart()
+            if self.loops is not None:
+                self._solve_loops(self.time)
+        except RunError:
+            keep()
+            raise
+        return True
 
     def _run_in_python(
         self, start_time: float, step: float, points: tuple[int, int, int], every: int, observe: Observer
@@ -289,9 +292,12 @@ class Master:
             self.steps = k + 1
             self.time = start_time + self.steps * step
             due = self.steps % every == 0 or self.steps == count
-            if not observe(self.steps, [[self.time, *self.values]] if due else ()):
+            if not self._tell(observe, due):
                 return False
         return True
+
+    def _tell(self, observe: Observer, is_due: bool) -> bool:
+        return observe(self.steps, [[self.time, *self.values]] if is_due else ())
 
     def terminate(self) -> None:
         """End the run properly: every model may write what it keeps, also where another fails to.
@@ -371,9 +377,9 @@ class Master:
             due, late = math.inf if self._schedule is None else self._schedule.next_time(), _ROUNDING * step
             self.time = stepper.advance(self.time, due if due < row - late else row)
             self.steps += 1
-            if self._schedule is not None and self._schedule.apply(self.time, self.steps, late):
-                self._jump()
-            if not observe(self.steps, [[self.time, *self.values]] if not every or self.time == row else ()):
+            is_due = not every or self.time == row
+            self._let_happen(late, partial(self._tell, observe, is_due))
+            if not self._tell(observe, is_due):
                 return False
         return True
 
@@ -382,9 +388,7 @@ class Master:
         watched = [
             k
             for (instance, name), k in self.exchange.places.items()
-            if self.kinds[k] == "Real"
-            and (variable := interfaces[instance].variables[name]).variability == "continuous"
-            and not is_direct(interfaces[instance], variable)
+            if adaptive.is_watched(interfaces[instance], interfaces[instance].variables[name])
         ]
         memory = self._extrapolator
         return adaptive.Adaptive(

@@ -236,10 +236,10 @@ def _vendor(root: Any) -> dict[str, Any]:
     if element is None:
         return {}
     fields: dict[str, Any] = dict(element.attrib)
-    step = fields.get("recommendedStep")
+    step, arguments = fields.get("recommendedStep"), json.loads(fields.get("arguments", "{}"))
     return {
         "component": fields.get("name", ""),
-        "arguments": json.loads(fields.get("arguments", "{}")),
+        "arguments": arguments if isinstance(arguments, dict) else {},
         "digest": fields.get("digest", ""),
         "kind": fields.get("kind", ""),
         "kind_note": fields.get("kindNote", ""),

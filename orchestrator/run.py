@@ -18,6 +18,7 @@ from .archive import Workspace
 from .binary import forget_paths
 from .check import Checked, check
 from .checkpoint import check_serializable
+from .divergence import explain_divergence
 from .errors import RailcosimError, RunError, ScenarioError
 from .loading import Kind
 from .metrics import Metric, evaluate_metrics
@@ -42,6 +43,7 @@ class Run:
         checked: models, wiring, order, and the notes a user should read.
         directory: where the files are, if there are any. figures: those that were drawn.
         coupling: how the master's iterations, step sizes, loops and events went, where there were any.
+        notes: what a user should know of how it went.
         seconds: wall time of ``setup`` and ``stepping``, and the number of communication ``steps``.
     """
 
@@ -55,6 +57,7 @@ class Run:
     figures: list[Path] = field(default_factory=list)
     error: RunError | None = None
     coupling: dict[str, Any] = field(default_factory=dict)
+    notes: list[str] = field(default_factory=list)
     directory: Path | None = None
     seconds: dict[str, float] = field(default_factory=dict)
 
@@ -202,12 +205,24 @@ def _execute(system: System, job: Job, figures: bool) -> Run:
             forget_paths(workspace.folder)
     outcome = Run(checked.system, session.results(), session.status, checked, error=session.error, directory=directory)
     outcome.coupling, outcome.seconds = session.coupling, session.seconds
+    _tell_divergence(outcome)
     evaluate(outcome)
     if directory is not None:
         if figures and len(outcome.results):
             outcome.figures = draw(checked.system.figures, outcome.results, directory)
         record_file.finish(directory, outcome, job.kind)
     return outcome
+
+
+def _tell_divergence(outcome: Run) -> None:
+    """In the error of what failed of it, or else as a note."""
+    checked, error = outcome.checked, outcome.error
+    interfaces = {name: model.interface for name, model in checked.models.items()}
+    found = explain_divergence(checked.system, interfaces, checked.wiring.links, outcome.results, error)
+    if found and error is not None and outcome.status == "failed":
+        error.explain(found)
+    elif found:
+        outcome.notes.append(found)
 
 
 def evaluate(outcome: Run) -> None:

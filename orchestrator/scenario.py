@@ -37,15 +37,17 @@ MODELS = Path(os.path.abspath(models.__file__ or "")).parent
 
 def shipped() -> list[tuple[str, str]]:
     """Name and title of every scenario that comes with the package, by name."""
-    found = []
-    for path in sorted(MODELS.glob("*.toml")):
-        try:
-            data = tomllib.loads(path.read_text(encoding="utf-8"))
-        except (OSError, ValueError):  # listing the others is more useful than failing on one
-            continue
-        if "instances" in data:
-            found.append((path.stem, str(data.get("title", ""))))
-    return found
+    titles = {path.stem: _title(path) for path in sorted(MODELS.glob("*.toml"))}
+    return [(name, title) for name, title in titles.items() if title is not None]
+
+
+def _title(path: Path) -> str | None:
+    """Title of the scenario in a file; None for what is no scenario, and for what cannot be read."""
+    try:
+        data = tomllib.loads(path.read_text(encoding="utf-8"))
+    except (OSError, ValueError):  # listing the others is more useful than failing on one
+        return None
+    return str(data.get("title", "")) if "instances" in data else None
 
 
 def find(name_or_path: str | os.PathLike[str]) -> Path:
@@ -55,9 +57,11 @@ def find(name_or_path: str | os.PathLike[str]) -> Path:
         ScenarioError: there is none; the message suggests the nearest name.
     """
     text = os.fspath(name_or_path)
-    names = [name for name, _ in shipped()]
-    if text in names:
+    if os.path.basename(text) == text and _title(MODELS / f"{text}.toml") is not None:
         return MODELS / f"{text}.toml"
+    if os.path.isfile(text) and text.endswith(".toml"):
+        return Path(text)
+    names = [name for name, _ in shipped()]
     folder, file = os.path.split(text)
     if not text.endswith(".toml") and not folder:
         here = f"; did you mean './{text}.toml'?" if os.path.isfile(f"{text}.toml") else did_you_mean(text, names)

@@ -364,12 +364,11 @@ def _check_sampling(system: System, interfaces: Mapping[str, Interface], wiring:
     for name, interface in interfaces.items():
         place = _place(system.instances[name].origin)
         sample = wiring.starts[name].get("sample_time")
-        if sample is None and interface.vendor.get("sampled"):
+        if sample is None and interface.vendor.get("sampled") and "sample_time" in interface.variables:
             sample = interface.variables["sample_time"].start
-        if interface.vendor and sample:
+        if interface.vendor and sample and isinstance(sample, int | float):
             own_step = system.instances[name].step or system.step
-            count = round(own_step / sample)
-            if count < 1 or abs(count * sample - own_step) > 1e-6 * sample:
+            if not _is_multiple(own_step, sample):
                 wiring.problems.append(
                     f"{place}{name}: the communication step {own_step:g} s is not a whole multiple of its "
                     f"sample_time {sample:g} s: set step or {name}.sample_time"
@@ -377,7 +376,7 @@ def _check_sampling(system: System, interfaces: Mapping[str, Interface], wiring:
         own, step = interface.default_step, system.instances[name].step or system.step
         if own and not interface.variable_step and not interface.vendor and interface.model not in told:
             told.add(interface.model)
-            if round(step / own) < 1 or abs(round(step / own) * own - step) > 1e-6 * own:
+            if not _is_multiple(step, own):
                 wiring.notes.append(
                     f"{interface.model} cannot vary its step and is made for {own:g} s; it is stepped at {step:g} s"
                 )
@@ -387,6 +386,11 @@ def _check_sampling(system: System, interfaces: Mapping[str, Interface], wiring:
             wiring.notes.append(
                 f"{interface.model} is advised to step at {longest:g} s or faster; this run steps at {system.step:g} s"
             )
+
+
+def _is_multiple(length: float, part: float) -> bool:
+    count = length / part
+    return math.isfinite(count) and round(count) >= 1 and abs(round(count) * part - length) <= 1e-6 * part
 
 
 def _place(origin: str) -> str:

@@ -105,9 +105,10 @@ def test_too_many_files_are_refused(workspace, tmp_path, xml, monkeypatch):
     assert "is refused: it holds 11 files" in refused(workspace, path)
 
 
-def test_a_giant_description_is_refused(workspace, tmp_path, xml, monkeypatch):
+@pytest.mark.parametrize("name", ["modelDescription.xml", "./modelDescription.xml", ".//modelDescription.xml"])
+def test_a_giant_description_is_refused(workspace, tmp_path, xml, monkeypatch, name):
     monkeypatch.setattr(archive, "MAX_DESCRIPTION", 1 << 20)
-    path = xml["write_archive"](tmp_path / "big.fmu", {"modelDescription.xml": " " * (3 << 20)})
+    path = xml["write_archive"](tmp_path / "big.fmu", {name: " " * (3 << 20)})
     assert "its modelDescription.xml is 3 MiB" in refused(workspace, path)
 
 
@@ -147,7 +148,32 @@ def test_an_unknown_compression(workspace, tmp_path, xml):
     at = content.index(b"PK\x01\x02")
     content[at + 10 : at + 12] = struct.pack("<H", 99)
     path.write_bytes(content)
-    assert "is not a usable FMU" in refused(workspace, path)
+    assert "'modelDescription.xml' is compressed with method 99; FMI allows deflate" in refused(workspace, path)
+
+
+@pytest.mark.parametrize(("method", "name"), [(zipfile.ZIP_BZIP2, "bzip2"), (zipfile.ZIP_LZMA, "lzma")])
+def test_a_compression_that_unpacks_without_bounds(workspace, tmp_path, method, name):
+    """A kilobyte of bzip2 that claims to be small would take gigabytes of memory before the lie is seen."""
+    path = tmp_path / "bomb.fmu"
+    with zipfile.ZipFile(path, "w") as fmu:
+        fmu.writestr("modelDescription.xml", "<x/>")
+        fmu.writestr("resources/zeros", bytes(1 << 20), compress_type=method)
+    assert f"'resources/zeros' is compressed with {name}; FMI allows deflate" in refused(workspace, path)
+
+
+def test_an_entry_without_a_name(workspace, tmp_path):
+    path = tmp_path / "nameless.fmu"
+    with zipfile.ZipFile(path, "w") as fmu:
+        fmu.writestr("modelDescription.xml", "<x/>")
+        fmu.writestr("x", "y")
+    path.write_bytes(path.read_bytes().replace(b"xy", b"\0y").replace(b"xPK\5\6", b"\0PK\5\6"))
+    assert "is refused: it holds an entry without a name" in refused(workspace, path)
+
+
+@pytest.mark.parametrize("entry", ["f/" * 900, "f/" * 900 + "file"])
+def test_folders_in_folders_without_end(workspace, tmp_path, xml, entry):
+    path = xml["write_archive"](tmp_path / "deep.fmu", DESCRIPTION | {entry: ""})
+    assert "levels deep, 'f/f/f/" in refused(workspace, path)
 
 
 def test_no_such_file(workspace, tmp_path):

@@ -105,7 +105,7 @@ def test_missing_models_and_wrong_settings_together(problems):
     assert "did you mean 'Gust'?" in found[1]
 
 
-def test_an_fmu_that_can_be_instantiated_only_once(problems, foreign, xml):
+def test_an_fmu_that_can_be_instantiated_only_once(problems, examine, foreign, xml):
     path = foreign([xml["variable"]("y", "output")], simulation='canBeInstantiatedOnlyOncePerProcess="true"')
     system = System()
     system.add("a", path)
@@ -113,7 +113,7 @@ def test_an_fmu_that_can_be_instantiated_only_once(problems, foreign, xml):
     said = "a, b: this FMU can be instantiated only once per process; give all but one of them a process of its own by "
     assert problems(system) == [f"{said}isolate = true"]
     system.instances["b"].isolate = True
-    assert problems(system) == []
+    examine(system)
 
 
 def test_notes(examine, foreign, xml):

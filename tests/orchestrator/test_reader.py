@@ -156,6 +156,13 @@ def test_a_second_element_that_names_no_library_leaves_no_gap(reading, xml):
     assert (it.model, it.identifier, it.guid) == ("Foreign", "", "{1}")
 
 
+@pytest.mark.parametrize("given", ["[1]", "null", "3"])
+def test_build_arguments_that_are_none(reading, xml, given):
+    ours = f'<VendorAnnotations><Tool name="railcosim"><component arguments="{given}"/></Tool></VendorAnnotations>'
+    text = xml["description"]([]).replace("<ModelVariables>", f"{ours}<ModelVariables>")
+    assert reading(text).vendor["arguments"] == {}
+
+
 def laughs(encoding):
     """The billion laughs, in an encoding of choice."""
     entities = '<!ENTITY a0 "ha">' + "".join(f'<!ENTITY a{k} "{f"&a{k - 1};" * 10}">' for k in range(1, 10))

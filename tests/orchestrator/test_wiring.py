@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 from railcosim.orchestrator.loading import load_models
+from railcosim.orchestrator.reader import read
 from railcosim.orchestrator.system import System
 from railcosim.orchestrator.wiring import instance_seed, is_direct, wire
 
@@ -473,6 +474,24 @@ def test_a_sample_time_that_was_set_counts(resolve, mine):
     system = System(step=0.3)
     system.add("it", mine("Needy"), needed=0.0, needed_row=0.0, sample_time=0.1)
     assert resolve(system).problems == []
+
+
+def test_a_sample_time_that_divides_nothing(resolve, mine):
+    system = System(step=0.3)
+    system.add("it", mine("Needy"), needed=0.0, needed_row=0.0, sample_time=1e-320)
+    assert "is not a whole multiple of its sample_time 9.99989e-321 s" in resolve(system).problems[0]
+
+
+@pytest.mark.parametrize("own", ["", "String"])
+def test_an_annotation_that_promises_a_sample_time_that_is_none(xml, tmp_path, own):
+    variables = [xml["variable"]("y", "output")]
+    variables += [xml["variable"]("sample_time", "local", own, start="x")] if own else []
+    ours = '<VendorAnnotations><Tool name="railcosim"><component name="A" sampled="true"/></Tool></VendorAnnotations>'
+    text = xml["description"](variables).replace("<ModelVariables>", f"{ours}<ModelVariables>")
+    (tmp_path / "modelDescription.xml").write_text(text, encoding="utf-8")
+    system = System()
+    system.add("it", "their.fmu")
+    assert wire(system, {"it": read(tmp_path, "their.fmu")}).problems == []
 
 
 def test_a_changed_step_takes_the_sample_times_that_were_equal_along(resolve, mine):

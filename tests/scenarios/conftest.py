@@ -1,6 +1,8 @@
-"""Gives the reference solution, loaded by its path."""
+"""Gives the reference solutions, loaded by their path, and the deviations from one that several tables share."""
 
+import functools
 import importlib.util
+import runpy
 import sys
 from pathlib import Path
 
@@ -16,6 +18,13 @@ def reference():
         sys.modules[name] = module
         spec.loader.exec_module(module)
     return sys.modules[name]
+
+
+@pytest.fixture(scope="session")
+def deviation(reference):
+    """`comfort_system.deviation` from the reference; what a run of the same arguments gave is given again."""
+    path = Path(__file__).parent / "comfort_system.py"
+    return functools.cache(functools.partial(runpy.run_path(str(path))["deviation"], reference))
 
 
 @pytest.fixture(scope="session")

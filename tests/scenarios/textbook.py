@@ -5,21 +5,19 @@ from scipy.linalg import expm
 from scipy.optimize import brentq
 
 OSCILLATOR = {"m1": 1.0, "k1": 1.0, "d1": 0.1, "m2": 1.0, "k2": 1.0, "d2": 0.1, "kc": 2.0, "dc": 0.1}
-"""Masses, springs and dampers to the wall on the left and on the right, and those between the two; SI units."""
+"""Masses, springs and dampers to the walls on the left and on the right, and those between the masses; SI units."""
+STIFF = OSCILLATOR | {"m1": 0.05, "kc": 10.0, "dc": 5.0}
+"""A light mass on a strong damper: what it feels changes within a hundredth of a second."""
 
 # -------------------------------------------------------------------- two masses
 
 
-def matrix(m1, k1, d1, m2, k2, d2, kc, dc):
-    """z' = A z of the whole, z = (x1, v1, x2, v2)."""
+def motion(times, start=(1.0, 0.0, 0.0, 0.0), of=OSCILLATOR):
+    """The exact course of x1, v1, x2, v2, one row for each time."""
+    m1, k1, d1, m2, k2, d2, kc, dc = of.values()
     left = [-(k1 + kc) / m1, -(d1 + dc) / m1, kc / m1, dc / m1]
     right = [kc / m2, dc / m2, -(k2 + kc) / m2, -(d2 + dc) / m2]
-    return np.array([[0.0, 1.0, 0.0, 0.0], left, [0.0, 0.0, 0.0, 1.0], right])
-
-
-def motion(times, start=(1.0, 0.0, 0.0, 0.0), **of):
-    """The exact course of x1, v1, x2, v2, one row for each time."""
-    a = matrix(**OSCILLATOR | of)
+    a = np.array([[0.0, 1.0, 0.0, 0.0], left, [0.0, 0.0, 0.0, 1.0], right])
     return np.array([expm(a * t) @ np.array(start) for t in times])
 
 
@@ -33,92 +31,130 @@ def _moved(a, b, h):
     return [whole[:, :n], *(whole[:, n + k * m : n + (k + 1) * m] for k in range(3))]
 
 
-def _course(points, h):
-    """Value and two derivatives at time 0 of the polynomial through values at times 0, -h, ... or h, 0, -h, ..."""
-    times = np.array([t for t, _ in points])
-    weights = np.linalg.inv(np.vander(times, 3, increasing=True)[:, : len(points)])
-    rows = [sum(w * u for w, (_, u) in zip(row, points, strict=True)) for row in weights]
-    rows += [0.0 * rows[0]] * (3 - len(rows))
-    return rows[0], rows[1], 2.0 * rows[2]
-
-
 class Coupled:
-    """The algorithms as linear maps of one step h: each mass moves exactly, under inputs as the algorithm gives them.
+    """An algorithm as a linear map of one step h: each mass moves exactly, under inputs as the algorithm gives them.
 
-    The vector is (x1, v1, x2, v2) and the force, displacement and speed that passed at this point and the last two.
+    The vector is (x1, v1, x2, v2), and the force, displacement and speed that passed at this point and the last two.
+    ``order`` is that of extrapolation.
     """
 
     size = 13
 
-    def __init__(self, h, algorithm, order=0, **of):
-        p = OSCILLATOR | of
+    def __init__(self, h, algorithm, order=0, of=OSCILLATOR):
+        m1, k1, d1, m2, k2, d2, kc, dc = of.values()
         self.h, self.algorithm, self.order = h, algorithm, order
-        self.left = _moved(np.array([[0.0, 1.0], [-p["k1"] / p["m1"], -p["d1"] / p["m1"]]]), np.array([[0], [1 / p["m1"]]]), h)
-        whole = np.array([[0.0, 1.0], [-(p["k2"] + p["kc"]) / p["m2"], -(p["d2"] + p["dc"]) / p["m2"]]])
-        self.c = np.array([[p["kc"], p["dc"]]])
-        self.right = _moved(whole, np.vstack([[0.0, 0.0], self.c / p["m2"]]), h)
+        self.c = np.array([[kc, dc]])
+        self.left = _moved(np.array([[0.0, 1.0], [-k1 / m1, -d1 / m1]]), np.array([[0.0], [1.0 / m1]]), h)
+        whole = np.array([[0.0, 1.0], [-(k2 + kc) / m2, -(d2 + dc) / m2]])
+        self.right = _moved(whole, np.vstack([[0.0, 0.0], self.c / m2]), h)
 
-    def start(self, z):
-        """The vector at the beginning: nothing has passed before."""
-        u = np.concatenate([self.c @ (np.array(z[2:]) - z[:2]), z[:2]])
-        return np.concatenate([z, u, u, u])
+    def _move(self, which, x, past, ended=None, known=3):
+        """State and input at the end: ``past`` are the last inputs, newest first, and ``ended`` those of the end."""
+        points = [(-k * self.h, u) for k, u in enumerate(past[:known])]
+        points = ([] if ended is None else [(self.h, ended)]) + points
+        points = points[: self.order + 1]
+        weights = np.linalg.inv(np.vander([t for t, _ in points], increasing=True))
+        parts = [sum(w * u for w, (_, u) in zip(row, points, strict=True)) for row in weights]
+        value, slope, half = (*parts, 0.0 * parts[0], 0.0 * parts[0])[:3]
+        p, g0, g1, g2 = which
+        return p @ x + g0 @ value + g1 @ slope + g2 @ (2.0 * half), value + self.h * slope + self.h**2 * half
 
-    def _inputs(self, past, now, ahead):
-        """Value and derivatives at the begin of the step, and the value at its end."""
-        last = [now, *past] if ahead else past
-        times = [self.h * (ahead - k) for k in range(len(last))]
-        value, slope, bend = _course(list(zip(times, last, strict=True))[: self.order + 1], self.h)
-        return value, slope, bend, value + self.h * slope + 0.5 * self.h**2 * bend
+    def step(self, z, ended=None, known=3):
+        """The vector after a step; of many columns at once.
 
-    def _move(self, which, x, inputs):
-        p, *g = which
-        return p @ x + sum(part @ u for part, u in zip(g, inputs[:3], strict=True))
-
-    def step(self, z, ended=None):
-        """The vector after a step; of columns all at once. ``ended``: what the iteration takes for the end's values."""
+        ``ended`` is what an iteration takes for the force at the end; ``known`` how many points have passed.
+        """
         x1, x2 = z[:2], z[2:4]
         force, moved = [z[k : k + 1] for k in (4, 7, 10)], [z[k : k + 2] for k in (5, 8, 11)]
         if self.algorithm == "iterative":
-            x1 = self._move(self.left, x1, self._inputs(force, ended[:1], ahead=True))
-            other = self._inputs(moved, x1, ahead=True)
+            x1, _ = self._move(self.left, x1, force, ended, known)
+            x2, at_end = self._move(self.right, x2, moved, x1, known)
         else:
-            other = self._inputs(moved, None, ahead=False)
-        x2 = self._move(self.right, x2, other)
-        f = self.c @ (x2 - other[3])
-        if self.algorithm == "gauss-seidel":
-            x1 = self._move(self.left, x1, self._inputs(force, f, ahead=True))
-        elif self.algorithm == "jacobi":
-            x1 = self._move(self.left, x1, self._inputs(force, None, ahead=False))
+            x2, at_end = self._move(self.right, x2, moved, None, known)
+        f = self.c @ (x2 - at_end)
+        if self.algorithm != "iterative":
+            x1, _ = self._move(self.left, x1, force, f if self.algorithm == "gauss-seidel" else None, known)
         return np.vstack([x1, x2, f, x1, z[4:10]])
 
-    def matrix(self):
+    def matrix(self, known=3):
         """The map as a matrix."""
         unit = np.eye(self.size)
         if self.algorithm != "iterative":
-            return self.step(unit)
-        nothing = self.step(unit, np.zeros((3, self.size)))
-        return nothing + self._answer()[:, :1] @ np.linalg.solve(np.eye(1) - self._answer()[4:5, :1], nothing[4:5])
+            return self.step(unit, known=known)
+        plain, answer = self.step(unit, np.zeros((1, self.size)), known), self._answer(known)
+        return plain + answer @ plain[4:5] / (1.0 - answer[4, 0])
 
-    def _answer(self):
-        """How the end of the step answers to the force, displacement and speed that are taken for its end's."""
-        return self.step(np.zeros((self.size, 3)), np.eye(3))
+    def _answer(self, known=3):
+        """How the end of the step answers to the force that is taken for that of its end."""
+        return self.step(np.zeros((self.size, 1)), np.ones((1, 1)), known)
 
     def contraction(self):
-        """The factor by which plain iteration reduces the distance to the step's solution, with its sign."""
+        """The factor, with its sign, by which plain iteration changes the distance to the step's solution."""
         return float(self._answer()[4, 0])
 
     def radius(self):
-        """The factor by which the slowest decaying or fastest growing part changes in a step."""
+        """The factor by which the part that decays slowest, or grows fastest, changes in a step."""
         return float(np.abs(np.linalg.eigvals(self.matrix())).max())
 
+    def run(self, start, count):
+        """The course from (x1, v1, x2, v2): one row for each point."""
+        u = np.concatenate([self.c @ (np.array(start[2:]) - start[:2]), start[:2]])
+        z = np.concatenate([start, u, u, u])
+        maps = [self.matrix(known) for known in (1, 2, 3)]
+        rows = [z]
+        for k in range(count):
+            rows.append(maps[min(k, 2)] @ rows[-1])
+        return np.array(rows)[:, :4]
 
-def limit(algorithm, order=0, low=0.01, high=3.0, **of):
-    """The shortest step between the bounds in s beyond which the coupling is unstable; None where it is stable."""
+
+def limit(algorithm, order=0, of=OSCILLATOR, low=1e-3, high=3.0):
+    """The shortest step in s beyond which the coupling is unstable; infinite where it is stable up to ``high``."""
 
     def growth(h):
-        return Coupled(h, algorithm, order, **of).radius() - 1.0
+        return Coupled(h, algorithm, order, of).radius() - 1.0
 
     steps = np.geomspace(low, high, 200)
     grown = [growth(h) for h in steps]
     k = next((k for k in range(1, len(steps)) if grown[k] > 0.0), None)
-    return None if k is None else brentq(growth, steps[k - 1], steps[k], xtol=1e-12)
+    return np.inf if k is None else float(brentq(growth, steps[k - 1], steps[k], xtol=1e-12))
+
+
+# -------------------------------------------------------------------- a ball on the ground
+
+
+def bounces(count, stiffness=1e4, damping=20.0, mass=1.0, gravity=9.81, height=1.0):
+    """Times of the first impacts, and the height that each rebound reaches, in s and m.
+
+    The ball falls freely; on the ground it is a damped oscillator around its weight's deflection, until spring and
+    damper would pull.
+    """
+    rate = damping / (2.0 * mass)
+    frequency = np.sqrt(stiffness / mass - rate**2)
+    sag = mass * gravity / stiffness
+    time, speed, found = 0.0, 0.0, []
+    for _ in range(count):
+        fall = (speed + np.sqrt(speed**2 + 2.0 * gravity * height)) / gravity
+        time, speed = time + fall, speed - gravity * fall
+        impact, a, b = time, sag, (speed + rate * sag) / frequency
+
+        def contact(t, a=a, b=b):
+            wave = np.exp(-rate * t) * np.array([np.cos(frequency * t), np.sin(frequency * t)])
+            return np.array([a, b]) @ wave - sag, np.array([b * frequency - rate * a, -a * frequency - rate * b]) @ wave
+
+        def push(t, contact=contact):
+            return -stiffness * contact(t)[0] - damping * contact(t)[1]
+
+        end = brentq(push, 0.3 * np.pi / frequency, 1.1 * np.pi / frequency)
+        height, speed = contact(end)
+        time += end
+        found.append((impact, height + speed**2 / (2.0 * gravity)))
+    return np.array(found)
+
+
+# -------------------------------------------------------------------- a loop
+
+
+def root(time, swing=0.0):
+    """x1 of 2 x1^2 + 5 x2 = 42 - swing sin(t), x1 - 6 x2 = 4: the positive one."""
+    right = 42.0 - swing * np.sin(time)
+    return (-5.0 / 6.0 + np.sqrt(25.0 / 36.0 + 8.0 * (10.0 / 3.0 + right))) / 4.0
