@@ -143,7 +143,8 @@ def _check_times(system: System) -> list[str]:
     if not 0.0 < system.stop_time - system.start_time < math.inf:
         return [f"stop_time {system.stop_time!r} s must lie after start_time {system.start_time!r} s"]
     if system.algorithm == "adaptive":  # which lands wherever it is told to
-        return []
+        wrong = system.record is not None and not 0.0 < system.record < math.inf
+        return [f"record must be a positive number, not {system.record!r} s"] if wrong else []
     record = system.step if system.record is None else system.record
     duration = "stop_time - start_time" if system.start_time else "stop_time"
     problems = []

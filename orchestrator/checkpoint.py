@@ -117,12 +117,17 @@ class Checkpoint:
 
         Raises:
             FmuError: an FMU does not take its state back.
+            ScenarioError: it is of another system.
         """
         for name, slave in master.slaves.items():
             state = slave.deserialize(self.states[name])
             slave.restore(state)
             slave.forget(state)
-        master.restore(self.progress)
+        try:
+            master.restore(self.progress)
+        except (LookupError, TypeError, ValueError) as error:
+            what = f"{type(error).__name__}: {error}"
+            raise ScenarioError(f"{FILE} does not fit its system ({what}); run the scenario from the start") from error
 
     def check(self, models: Mapping[str, Model], directory: Path) -> None:
         """Refuse to go on with other models than the run began with.
@@ -169,7 +174,9 @@ def read(directory: Path) -> Checkpoint:
     """
     path = directory / FILE
     if not path.is_file():
-        raise ScenarioError(f"{directory} has no {FILE}: only a run with --checkpoint-every can be resumed")
+        raise ScenarioError(
+            f"{directory} has no {FILE}: only a run with --checkpoint-every can be resumed, once it has written one"
+        )
     try:
         with zipfile.ZipFile(path) as archive:
             content = json.loads(archive.read("checkpoint.json"))

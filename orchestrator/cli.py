@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import importlib.metadata
+import io
 import os
 import sys
 from collections.abc import Sequence
@@ -19,6 +20,7 @@ from . import cli_analysis, cli_models, console
 from .archive import Workspace
 from .check import check as check_system
 from .check import describe_stepping
+from .checkpoint import read as read_checkpoint
 from .cli_options import (
     FAILED,
     FMU_FAILED,
@@ -41,12 +43,12 @@ from .cli_options import (
 )
 from .errors import FmuError, RailcosimError, RunError, ScenarioError
 from .isolation import isolate
-from .plots import draw
+from .plots import check_figures, draw
 from .published import PublishedRow
 from .reproduce import cases
 from .results import Results
 from .rows import BINARY, recover
-from .run import Run, at_half_the_step, execute, resume
+from .run import Run, at_half_the_step, execute, go_on
 from .scenario import load, shipped
 from .topology import describe as describe_topology
 
@@ -60,6 +62,8 @@ app = typer.Typer(
 
 def main() -> None:
     """Entry point: every expected error becomes one message and an exit code."""
+    if isinstance(sys.stdout, io.TextIOWrapper):  # a terminal or pipe may lack letters that a title or a file name has
+        sys.stdout.reconfigure(errors="backslashreplace")
     code = call()
     for stream in (sys.stdout, sys.stderr):
         with suppress(OSError):  # whoever read it may be gone
@@ -160,8 +164,9 @@ def run(
                 "--resume takes the run as its directory has it: give no scenario and no change but --stop; --threads, "
                 "--checkpoint-every, --no-figures and --quiet may stand with it"
             )
-        with console.progress(str(resume_from), quiet) as progress:
-            outcome = resume(resume_from, stop_time=stop, progress=progress, **how)
+        point = read_checkpoint(resume_from)
+        with console.progress(point.system.name, quiet, point.system.start_time, point.time) as progress:
+            outcome = go_on(resume_from, stop_time=stop, progress=progress, **how)
     else:
         if scenario is None:
             raise ScenarioError("name a scenario (see 'orchestrate list'), or a run to go on with by --resume DIR")
@@ -255,6 +260,9 @@ def plot(
     """
     results = results.parent if results.is_file() else results
     loaded = Results.load(results)
+    problems = [] if signals else check_figures(loaded.figures, [*loaded.names(), *loaded.parameters])
+    if problems:
+        raise ScenarioError(problems)
     if (results / BINARY).is_file():
         print(recover(results))
     figures = [{"title": ", ".join(signals), "y": signals}] if signals else loaded.figures

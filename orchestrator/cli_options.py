@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import tomllib
 from enum import StrEnum
 from typing import Annotated, Any
 
@@ -11,6 +10,7 @@ import typer
 from .errors import ScenarioError
 from .scenario import load
 from .system import System
+from .toml_source import parse_value
 
 OK, FAILED, WRONG_INPUT, FMU_FAILED, INTERRUPTED = 0, 1, 2, 3, 130
 
@@ -82,10 +82,7 @@ def build_arguments(builds: list[str] | None) -> dict[str, Any]:
         name, equals, value = text.partition("=")
         if not equals or not name:
             raise ScenarioError(f"--with {text}: write NAME=VALUE, as in --with carriages=8")
-        try:
-            arguments[name.strip()] = tomllib.loads(f"value = {value}")["value"]
-        except tomllib.TOMLDecodeError:
-            arguments[name.strip()] = value
+        arguments[name.strip()] = parse_value(value)
     return arguments
 
 

@@ -269,7 +269,7 @@ def _draw(comparison: Comparison, directory: Path) -> list[Path]:
 
 
 def write_json(comparison: Comparison, path: Path) -> None:
-    """Everything, numbers as they are; what JSON has no number for is text."""
+    """Everything, numbers as they are; what JSON has no number for is text, what UTF-8 has no bytes for is escaped."""
     content = {
         "variants": [
             {
@@ -300,12 +300,13 @@ def write_json(comparison: Comparison, path: Path) -> None:
         "wins": dict(zip(comparison.names, comparison.wins(), strict=True)),
         "figures": [figure.name for figure in comparison.figures],
     }
-    path.write_text(json.dumps(content, indent=1, ensure_ascii=False) + "\n", encoding="utf-8")
+    text = json.dumps(content, indent=1, ensure_ascii=False) + "\n"
+    path.write_text(text, encoding="utf-8", errors="backslashreplace")
 
 
 def write_csv(comparison: Comparison, path: Path) -> None:
     """The table: one line for each metric and index, one column for each variant."""
-    with path.open("w", newline="", encoding="utf-8") as stream:
+    with path.open("w", newline="", encoding="utf-8", errors="backslashreplace") as stream:
         writer = csv.writer(stream, lineterminator="\n")
         writer.writerow(["metric", "index", "unit", "better", *comparison.names, "winner"])
         for row in comparison.rows:

@@ -55,13 +55,14 @@ def say(out: Console, text: str, style: str = "", *, whole: bool = False) -> Non
 
 
 @contextmanager
-def progress(title: str, quiet: bool, start: float = 0.0) -> Iterator[OnProgress | None]:
+def progress(title: str, quiet: bool, start: float = 0.0, reached: float | None = None) -> Iterator[OnProgress | None]:
     """A progress bar on a terminal, one line per 10 % otherwise, nothing when quiet.
 
     Args:
         title: what is running.
         quiet: whether to show nothing.
         start: where the run begins, in s.
+        reached: how far it has got already, in s; nothing is said of that.
     """
     if quiet:
         yield None
@@ -76,15 +77,17 @@ def progress(title: str, quiet: bool, start: float = 0.0) -> Iterator[OnProgress
 
             yield show
     else:
-        yield _lines(title, start)
+        yield _lines(title, start, start if reached is None else reached)
 
 
-def _lines(title: str, start: float) -> OnProgress:
+def _lines(title: str, start: float, reached: float) -> OnProgress:
     told = 0
 
     def show(time: float, stop: float) -> None:
         nonlocal told
-        while told < int(10.0 * (time - start) / (stop - start) + 1e-9):
+        done, before = (int(10.0 * (t - start) / (stop - start) + 1e-9) for t in (time, reached))
+        told = max(told, before)
+        while told < done:
             told += 1
             print(f"{title}: {10 * told} % of {stop - start:g} s", file=sys.stderr, flush=True)
 
@@ -182,7 +185,8 @@ def _coupling(how: Mapping[str, Any]) -> Iterator[str]:
             f"{steps['shortest_step'] or 0.0:.3g} and {steps['longest_step']:.3g} s long"
         )
     if "events" in how:
-        yield f"{len(how['events'])} events, listed in run.json"
+        count = sum(what["phase"] == "begin" for what in how["events"])
+        yield f"{count} event{'s' * (count != 1)}, listed in run.json"
 
 
 def _show_head(out: Console, outcome: Run) -> None:

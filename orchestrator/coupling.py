@@ -25,7 +25,7 @@ def check_coupling(system: System, interfaces: Mapping[str, Interface], wiring: 
         blocks = find_blocks(interfaces, wiring.links)
         problems += _cannot(
             [name for name in interfaces if name in blocks.cyclic and not interfaces[name].can_save_state],
-            "cannot save the state that iterative comes back to (canGetAndSetFMUstate is false), and is in a cycle; "
+            "in a cycle, and the state that iterative comes back to cannot be saved (canGetAndSetFMUstate is false); "
             "choose gauss-seidel or jacobi, or break the cycle by a delay",
         )
     elif system.algorithm == "adaptive":
@@ -36,16 +36,16 @@ def check_coupling(system: System, interfaces: Mapping[str, Interface], wiring: 
 def _check_adaptive(system: System, interfaces: Mapping[str, Interface], wiring: Wiring) -> Iterable[str]:
     sampled = [name for name, interface in interfaces.items() if interface.vendor.get("sampled")]
     yield from _cannot(
-        sampled, "is sampled at steps of its own, which adaptive cannot step over; choose gauss-seidel or iterative"
+        sampled, "sampled at points of its own, which adaptive cannot step over; choose gauss-seidel or iterative"
     )
     others = {name: interface for name, interface in interfaces.items() if name not in sampled}
     yield from _cannot(
         [name for name, interface in others.items() if not interface.can_save_state],
-        "cannot save the state that adaptive comes back to (canGetAndSetFMUstate is false); choose gauss-seidel",
+        "the state that adaptive comes back to cannot be saved (canGetAndSetFMUstate is false); choose gauss-seidel",
     )
     yield from _cannot(
         [name for name, interface in others.items() if not interface.variable_step],
-        "cannot vary its step (canHandleVariableCommunicationStepSize is false); choose gauss-seidel or iterative",
+        "the step cannot vary (canHandleVariableCommunicationStepSize is false); choose gauss-seidel or iterative",
     )
     late = sorted({link.connection.target for link in wiring.links if link.delay})
     if late:
@@ -58,11 +58,13 @@ def _check_adaptive(system: System, interfaces: Mapping[str, Interface], wiring:
 def _check_rates(system: System) -> Iterable[str]:
     duration = system.stop_time - system.start_time
     for instance in system.instances.values():
-        if instance.step is None:
+        if instance.step is None or instance.step == system.step:
             continue
         place = f"{instance.origin}: " if instance.origin else ""
         if system.algorithm not in ("gauss-seidel", "jacobi"):
             yield f"{place}{instance.name} has a step of its own, which goes with gauss-seidel and jacobi only"
+        elif system.algebraic_loops == "solve":
+            yield f"{place}{instance.name} has a step of its own, with which algebraic_loops = 'solve' does not go"
         own = f"{place}{instance.name}: its step = {instance.step:g} s"
         if not _is_multiple(instance.step, system.step):
             yield f"{own} is not a whole multiple of the system's, {system.step:g} s"
@@ -92,7 +94,7 @@ def _check_tolerances(system: System, interfaces: Mapping[str, Interface]) -> It
 
 def _cannot(names: Sequence[str], what: str) -> Iterable[str]:
     if names:
-        yield f"{_listed(names)} {what}"
+        yield f"{_listed(names)}: {what}"
 
 
 def _listed(names: Sequence[str]) -> str:

@@ -124,7 +124,8 @@ def find_growth(time: Array, values: Array, step: float, *, size: float = 1.0, f
         steps = (time[-1] - time[begin]) / step
         grown = peaks[-1] / max(peaks[begin], size)
         if grown > _ALL and steps > (_FAILED_STEPS if failed else _STEPS) - 0.5:
-            factor = math.exp(math.log(peaks[-1] / peaks[begin]) / steps)
+            middle = (begin + len(peaks) - 1) // 2  # at the begin, what grows is hidden in what was there
+            factor = math.exp(math.log(peaks[-1] / peaks[middle]) * step / (time[-1] - time[middle]))
             if factor > fastest:
                 return Growth(factor, float(time[begin]))
     return None

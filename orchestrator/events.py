@@ -177,9 +177,10 @@ class Schedule:
 
     def _set(self, event: Event, target: Target, time: float) -> None:
         slave = self._exchange.slaves[target[0]]
-        slave.time = time
         variable = slave.interface.variables[target[1]]
+        before, slave.time = slave.time, time  # for what it says if it fails
         slave.channel(variable.type, [target[1]]).set([given(event.value, variable)])
+        slave.time = before
 
     def _present(self, target: Target, time: float) -> Any:
         """The value that passes now."""

@@ -89,8 +89,7 @@ class Fmi1Slave(LoadedSlave):
         done after fmiInitializeSlave and before the first step. That call therefore stands where the mode begins:
         start values have been set, and what connected instances give each other can be exchanged until it settles.
         """
-        start, stop = self._span
-        self.call("fmiInitializeSlave", start, True, stop)
+        self.call("fmiInitializeSlave", self._span[0], *self._end())
 
     def exit_initialization(self) -> None:
         """Nothing is left to be done."""

@@ -99,8 +99,7 @@ class Fmi3Slave(LoadedSlave):
 
     def enter_initialization(self) -> None:
         """Enter initialization mode."""
-        start, stop = self._span
-        self.call("fmi3EnterInitializationMode", False, 0.0, start, True, stop)
+        self.call("fmi3EnterInitializationMode", False, 0.0, self._span[0], *self._end())
 
     def exit_initialization(self) -> None:
         """Leave initialization mode: without an event mode, the first step may follow."""

@@ -96,7 +96,7 @@ class FmuSlave(LoadedSlave):
     def setup(self, start_time: float, stop_time: float) -> None:
         """Announce the experiment."""
         super().setup(start_time, stop_time)
-        self.call("fmi2SetupExperiment", 0, 0.0, start_time, 1, self._span[1])
+        self.call("fmi2SetupExperiment", 0, 0.0, start_time, *self._end())
 
     def _last_successful_time(self) -> float | None:
         ask, found = self.functions.get("fmi2GetRealStatus"), c_double(math.nan)

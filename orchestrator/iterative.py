@@ -94,14 +94,27 @@ class Iterative:
     tally: Tally = field(default_factory=Tally)
 
     def __post_init__(self) -> None:
-        self._unknowns = {
-            group: self._fed_back(group) for group in self.blocks.continuous if not self.blocks.cyclic.isdisjoint(group)
+        self._exchanged = {
+            group: self._find_exchanged(group)
+            for group in self.blocks.continuous
+            if not self.blocks.cyclic.isdisjoint(group)
         }
 
-    def _fed_back(self, group: Sequence[str]) -> list[int]:
-        """Places of the values that one of the group gives to another, or to itself."""
-        sources = {k for name in group for feed in self.exchange.feeds[name] for k in feed.sources}
-        return sorted(k for k in sources if self.exchange.owners[k] in group)
+    def _find_exchanged(self, group: Sequence[str]) -> tuple[list[int], list[int]]:
+        """Places of the values that one of the group gives to another or itself.
+
+        First those that are needed before their source has stepped, and have to be guessed; then the others.
+        """
+        owners, at = self.exchange.owners, {name: k for k, name in enumerate(group)}
+        passed = {
+            (k, at[owners[k]] >= at[name])
+            for name in group
+            for feed in self.exchange.feeds[name]
+            for k, age in zip(feed.sources, feed.ages, strict=True)
+            if age is None and owners[k] in at
+        }
+        guessed = {k for k, early in passed if early}
+        return sorted(guessed), sorted({k for k, _ in passed} - guessed)
 
     def advance(self, time: float, length: float) -> None:
         """Take one step from ``time`` of ``length``, both in s.
@@ -116,7 +129,7 @@ class Iterative:
             exchange.slaves[name].step(time, length)
             exchange.read_finite(exchange.slaves[name], end, direct=True)
         for group in self.blocks.continuous:
-            if group in self._unknowns:
+            if group in self._exchanged:
                 self._iterate(group, time, length)
             else:
                 self._sweep(group, time, length, final=True)
@@ -131,10 +144,11 @@ class Iterative:
             self.exchange.read_finite(self.exchange.slaves[name], time + length)
 
     def _iterate(self, group: tuple[str, ...], time: float, length: float) -> None:
-        exchange, places = self.exchange, self._unknowns[group]
+        exchange, (guessed, passed) = self.exchange, self._exchanged[group]
         slaves = [exchange.slaves[name] for name in group]
-        reals = [k for k in places if exchange.kinds[k] == "Real"]
-        others = [k for k in places if exchange.kinds[k] != "Real"]
+        reals = [k for k in (*guessed, *passed) if exchange.kinds[k] == "Real"]
+        others = [k for k in (*guessed, *passed) if exchange.kinds[k] != "Real"]
+        unknowns = slice(sum(exchange.kinds[k] == "Real" for k in guessed))
         states = [slave.save() for slave in slaves]
         try:
             next_guess = _ACCELERATIONS[self.acceleration](self.relaxation)
@@ -155,15 +169,15 @@ class Iterative:
                 reached = np.array([exchange.values[k] for k in reals], dtype=np.float64)
                 errors.append(np.abs(reached - guess) / self._scale(reals, guess, reached))
                 if count == 1:  # the size of each value, for the method that combines them
-                    scale = self._scale(reals, guess, reached)
+                    scale = self._scale(reals, guess, reached)[unknowns]
                 flipping = [k for k, flag in zip(others, flags, strict=True) if flag != exchange.values[k]]
                 if _largest(errors[-1]) <= 1.0 and not flipping:
                     self._count(count, _largest(errors[-1]))
                     return
-                following = next_guess(guess / scale, reached / scale) * scale if reals else guess
+                following = next_guess(guess[unknowns] / scale, reached[unknowns] / scale) * scale
                 if not np.isfinite(following).all() or _is_hopeless(errors):
                     break
-                for k, value in zip(reals, following, strict=True):
+                for k, value in zip(reals[unknowns], following, strict=True):
                     exchange.values[k] = float(value)
             raise self._failure((time, length), reals, errors, "", flipping)
         finally:
@@ -198,7 +212,8 @@ class Iterative:
         """
         worst = [reals[k] for k in np.argsort(errors[-1])[::-1] if errors[-1][k] > 1.0]
         names = ", ".join(self.exchange.signals[k] for k in [*worst, *flipping][:_SHOWN])
-        last, grows = _largest(errors[-1]), bool(failure) or _largest(errors[-1]) > _largest(errors[0])
+        last, first = _largest(errors[-1]), _largest(errors[0])
+        grows = bool(failure) or last > _GROWN * first
         what = f"still disagree by {last:.3g} times the tolerance" if worst else "still change"
         if failure:
             what += f", and with the next guess an FMU fails ({failure})"
@@ -221,7 +236,8 @@ def _is_hopeless(errors: Sequence[Vector]) -> bool:
     return _largest(errors[-1]) > _HOPELESS * max(_largest(errors[0]), 1.0)
 
 
-_HOPELESS = 1e12
+_HOPELESS, _GROWN = 1e12, 10.0
+"""How many times farther apart than at first values are that nothing will bring together, or that are getting away."""
 _SHOWN = 3
 
 

@@ -134,7 +134,8 @@ def write_linear(directory: Path, model: Linearization, stability: Stability, pa
         "version": importlib.metadata.version("railcosim"),
     }
     path = directory / "linear.json"
-    path.write_text(json.dumps(content, indent=1, ensure_ascii=False) + "\n", encoding="utf-8")
+    text = json.dumps(content, indent=1, ensure_ascii=False) + "\n"
+    path.write_text(text, encoding="utf-8", errors="backslashreplace")
     return path
 
 

@@ -157,6 +157,8 @@ class Loop:
         self.time = master.time
         self.blocks = {name: make_block(slave, checked.models[name]) for name, slave in master.slaves.items()}
         self.notes += dict.fromkeys(block.note for block in self.blocks.values() if block.note)
+        if system.events:
+            self.notes.append("events act on the way; signals that they change at that time are taken as unchanged")
         types = {
             (name, v.name): v.type for name, slave in master.slaves.items() for v in slave.interface.variables.values()
         }

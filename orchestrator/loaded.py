@@ -196,12 +196,17 @@ class LoadedSlave(ABC):
     # ---------------------------------------------------------------- initialization
 
     def setup(self, start_time: float, stop_time: float) -> None:
-        """Announce the experiment.
+        """Announce the experiment; of one that may go on beyond its end, the stop time is infinite.
 
         The stop time is a trifle late: the last step may end after it by a rounding error, and some FMUs refuse that.
         """
         self.time = start_time
         self._span = (start_time, stop_time + 8.0 * math.ulp(max(abs(start_time), abs(stop_time))))
+
+    def _end(self) -> tuple[bool, float]:
+        """Whether an end of the experiment was announced, and which, in s."""
+        stop = self._span[1]
+        return math.isfinite(stop), stop if math.isfinite(stop) else 0.0
 
     @abstractmethod
     def enter_initialization(self) -> None:

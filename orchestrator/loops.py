@@ -18,7 +18,7 @@ from .errors import FmuError
 from .exchange import Exchange
 from .interface import Interface
 from .slave import Slave
-from .wiring import Link
+from .wiring import Link, is_direct
 
 _DIFFERENCE = 1e-7
 """Relative step of finite differences: the square root of the rounding error, and a little more."""
@@ -63,6 +63,23 @@ def find_loops(
     return sorted(found)
 
 
+def find_feeders(interfaces: Mapping[str, Interface], links: Iterable[Link], members: Iterable[str]) -> set[str]:
+    """Instances through which what members of a loop are given passes at once, from input to output.
+
+    Sampled ones are none: what they give is of their last sample.
+    """
+    links = [
+        link
+        for link in links
+        if not link.delay
+        and is_direct(interfaces[link.source[0]], interfaces[link.source[0]].variables[link.source[1]])
+        and not interfaces[link.source[0]].vendor.get("sampled")
+    ]
+    graph = nx.DiGraph((link.source[0], link.target[0]) for link in links)
+    within = set(members)
+    return {name for member in within & set(graph) for name in nx.ancestors(graph, member)} - within
+
+
 class LoopSolver:
     """Solves for values that depend on themselves.
 
@@ -70,10 +87,11 @@ class LoopSolver:
         exchange: whose values they are.
         places: where the unknown values stand. What is no real number among them follows from the others: each solution
             is passed on until it changes nothing any more.
+        feeders: instances that pass on at once what others give, in their order: they are brought up to date first.
     """
 
-    def __init__(self, exchange: Exchange, places: Sequence[int]) -> None:
-        self._exchange = exchange
+    def __init__(self, exchange: Exchange, places: Sequence[int], feeders: Sequence[Slave] = ()) -> None:
+        self._exchange, self._feeders = exchange, feeders
         self._places = [k for k in places if exchange.kinds[k] == "Real"]
         self._others = [k for k in places if exchange.kinds[k] != "Real"]
         self.signals = [exchange.signals[k] for k in places]
@@ -103,15 +121,20 @@ class LoopSolver:
             FmuError: an FMU failed.
         """
         values, left = self._exchange.values, math.inf
+        for slave in self._feeders:
+            self._exchange.write(slave.name, time)
+            self._exchange.read(slave, time)
         for _ in range(_ATTEMPTS):
             left = self._solve(time)
-            others = [values[k] for k in self._others]
-            if others:
-                reals = np.array([values[k] for k in self._places], dtype=np.float64)
-                left = max(left, _relative(self._mismatch(reals, time), reals))
-            if others == [values[k] for k in self._others]:
+            if not self._others:
                 break
-            left = math.inf
+            reals = np.array([values[k] for k in self._places], dtype=np.float64)
+            others = [values[k] for k in self._others]
+            left = max(left, _relative(self._mismatch(reals, time), reals))
+            if others != [values[k] for k in self._others]:
+                left = math.inf
+            elif left <= _AGREE:
+                break
         self.residual = max(self.residual, left)
         return left
 
@@ -217,6 +240,8 @@ class LoopSolver:
         return np.asarray((reached - base[list(rows)]) / (moved - kept[place]))
 
 
+_AGREE = 1e-9
+"""Relative mismatch up to which what is no real number is taken to fit the real ones."""
 _SETTLED = 1e-13
 """Relative mismatch below which nothing is solved."""
 

@@ -21,7 +21,7 @@ from .errors import CouplingError, FmuError, RunError
 from .events import LATE, Schedule
 from .exchange import Exchange, types_of
 from .extrapolation import Extrapolator
-from .loops import LoopSolver, find_loops
+from .loops import LoopSolver, find_feeders, find_loops
 from .settling import settle
 from .slave import Slave
 from .system import Acceleration, Algorithm, Event, Loops, System
@@ -156,12 +156,19 @@ class Master:
         signals = {signal for loop in find_loops(interfaces, self.exchange.links, doubtful=True) for signal in loop}
         places = {k for k, signal in enumerate(self.signals) if signal in signals}
         places.update(unsettled)
-        return LoopSolver(self.exchange, sorted(places)) if places else None
+        feeders = find_feeders(interfaces, self.exchange.links, {self.exchange.owners[k] for k in places})
+        ordered = [slave for slave in self.sequence if slave.name in feeders]
+        return LoopSolver(self.exchange, sorted(places), ordered) if places else None
 
     # ---------------------------------------------------------------- initialization
 
-    def initialize(self, start_time: float, stop_time: float) -> None:
+    def initialize(self, start_time: float, stop_time: float, *, may_go_on: bool = False) -> None:
         """Set start values and let connected values settle; time zero is that consistent state.
+
+        Args:
+            start_time: in s.
+            stop_time: in s.
+            may_go_on: whether the run may be resumed beyond its stop time, of which the models are then not told.
 
         Raises:
             FmuError: a model failed.
@@ -169,7 +176,7 @@ class Master:
         """
         self.time, self._stop_time = start_time, stop_time
         for slave in self.slaves.values():
-            slave.setup(start_time, stop_time)
+            slave.setup(start_time, math.inf if may_go_on else stop_time)
             self._set_starts(slave)
         for slave in self.slaves.values():
             slave.enter_initialization()
@@ -366,15 +373,16 @@ class Master:
     def _run_adaptively(
         self, start_time: float, step: float, points: tuple[int, int], every: float, observe: Observer
     ) -> bool:
-        last = self._stop_time
+        last, late = self._stop_time, _ROUNDING * step
         end = last if points[0] == points[1] else min(last, start_time + points[0] * step)
         stepper = self.adaptive = self.adaptive or self._make_adaptive(step)
         while self.time < end:
             row = last
             if every:  # the next point at which a row is due
                 done = math.floor((self.time - start_time) / (every * step) + _ROUNDING)
-                row = min(last, start_time + (done + 1) * every * step)
-            due, late = math.inf if self._schedule is None else self._schedule.next_time(), _ROUNDING * step
+                row = start_time + (done + 1) * every * step
+                row = row if row < last - late else last
+            due = math.inf if self._schedule is None else self._schedule.next_time()
             self.time = stepper.advance(self.time, due if due < row - late else row)
             self.steps += 1
             is_due = not every or self.time == row

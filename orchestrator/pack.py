@@ -105,6 +105,14 @@ def _chosen(platforms: Sequence[str]) -> tuple[str, ...]:
 
 def _refused(system: System, checked: Checked, platforms: Sequence[str]) -> list[str]:
     problems = [problem for link in checked.wiring.links for problem in _refused_link(link)]
+    lost = {
+        f"algorithm = {system.algorithm}": system.algorithm not in ("gauss-seidel", "jacobi"),
+        f"extrapolation = {system.extrapolation}": bool(system.extrapolation),
+        "algebraic_loops = solve": system.algebraic_loops == "solve",
+        "[[events]]": bool(system.events),
+        **{f"{name}: a step of its own": x.step not in (None, system.step) for name, x in system.instances.items()},
+    }
+    problems += [f"{what} cannot be packed: a container has one step, and holds values" for what in lost if lost[what]]
     for name, model in checked.models.items():
         if model.interface.vendor.get("kind") == "python" or "pythonfmu" in model.interface.generator.lower():
             problems.append(

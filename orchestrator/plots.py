@@ -351,7 +351,10 @@ def _across(x: Any, signals: Signals, index: int | None, constants: Mapping[str,
         return np.asarray(constants[x["name"]])
     if x is None:
         return signals.time
-    return np.asarray(parse(x, FUNCTIONS).evaluate(signals, index), dtype=np.float64)
+    values = np.asarray(parse(x, FUNCTIONS).evaluate(signals, index), dtype=np.float64)
+    if not values.ndim:
+        raise ExpressionError(f"x = '{x}' is a single number; draw over a signal")
+    return values
 
 
 def _named(label: str, own: str, alone: bool, member: int) -> str:
@@ -371,11 +374,11 @@ def _label(expression: Expression, resolved: list[list[str]], index: int | None,
     ]
     if not families:
         return _short(expression.text)
-    array = re.split(r"[\[.]", families[0])[0]
+    array = families[0].partition("[")[0]
     numbers = [re.findall(r"\[([\d,]+)\]", name) for name in families if name.startswith(f"{array}[")]
-    first = sorted({int(number) for found in numbers for number in found[0].split(",")[:1]})
-    own = "–".join(map(str, first))
-    return " ".join([array, own, *numbers[0][1:]])
+    first = sorted({tuple(map(int, found[0].split(","))) for found in numbers})
+    own = "–".join(",".join(map(str, index)) for index in first)
+    return " ".join([array.replace(".", " "), own, *numbers[0][1:]])
 
 
 def _short(text: str) -> str:

@@ -154,7 +154,9 @@ def _texts(checked: Checked) -> list[str]:
 
 def _dump(path: Path, content: dict[str, Any]) -> None:
     part = path.with_name(path.name + ".part")
-    part.write_text(json.dumps(_plain(content), indent=1, ensure_ascii=False) + "\n", encoding="utf-8")
+    text = json.dumps(_plain(content), indent=1, ensure_ascii=False) + "\n"
+    # What stands for the bytes of a file name that is not UTF-8 becomes the escape that JSON has for it.
+    part.write_text(text, encoding="utf-8", errors="backslashreplace")
     os.replace(part, path)
 
 

@@ -70,6 +70,7 @@ class Results:
         try:
             record = json.loads((directory / "run.json").read_text(encoding="utf-8"))
             columns = read_rows(directory, record["texts"])
+            _check_record(record)
             return cls(
                 columns,
                 columns.pop("time"),
@@ -82,8 +83,28 @@ class Results:
             )
         except KeyError as error:
             raise ScenarioError(f"{directory} holds no run that can be read: it has no {error}") from error
-        except (OSError, ValueError, TypeError) as error:
+        except (OSError, ValueError, TypeError, RecursionError) as error:
             raise ScenarioError(f"{directory} holds no run that can be read: {error}") from error
+
+
+def _check_record(record: Mapping[str, Any]) -> None:
+    """Refuse a run.json in which somebody has written something else than we do.
+
+    Raises:
+        ValueError: with the key.
+        KeyError: one is missing.
+    """
+    tables, figures = {"units": str, "parameters": str | int | float | None}, record["figures_wanted"]
+    wrong = [
+        key
+        for key, kind in tables.items()
+        if not isinstance(record[key], dict) or not all(isinstance(value, kind) for value in record[key].values())
+    ]
+    wrong += [key for key in ("step", "stop_time") if not isinstance(record[key], int | float)]
+    if not isinstance(figures, list) or not all(isinstance(figure, dict) for figure in figures):
+        wrong.append("figures_wanted")
+    if wrong:
+        raise ValueError(f"its {wrong[0]} in run.json is not what a run writes there")
 
 
 class Recorder:

@@ -29,7 +29,7 @@ from .results import Results
 from .session import Job, Progress, Session, Status, rows_before
 from .system import Algorithm, Instance, System
 
-__all__ = ["Progress", "Run", "evaluate", "execute", "resume", "run"]
+__all__ = ["Progress", "Run", "evaluate", "execute", "go_on", "resume", "run"]
 
 
 @dataclass
@@ -123,6 +123,11 @@ def run(
         checkpoint_every=checkpoint_every,
         progress=progress,
     )
+    return _raised(outcome)
+
+
+def _raised(outcome: Run) -> Run:
+    """The outcome of a run, unless that is a failure."""
     if outcome.error is not None and outcome.status == "failed":
         outcome.error.run = outcome  # type: ignore[attr-defined]
         raise outcome.error
@@ -168,7 +173,29 @@ def resume(
 
     Raises:
         ScenarioError: there is no checkpoint that fits.
+        FmuError, CouplingError: as `run` has it.
     """
+    outcome = go_on(
+        directory,
+        stop_time=stop_time,
+        figures=figures,
+        threads=threads,
+        checkpoint_every=checkpoint_every,
+        progress=progress,
+    )
+    return _raised(outcome)
+
+
+def go_on(
+    directory: str | Path,
+    *,
+    stop_time: float | None = None,
+    figures: bool = True,
+    threads: int = 1,
+    checkpoint_every: float | None = None,
+    progress: Progress | None = None,
+) -> Run:
+    """As `resume`, but a model that fails ends the run with ``status = "failed"`` instead of raising."""
     directory = Path(directory)
     _check_distance(checkpoint_every)
     point = checkpoint.read(directory)

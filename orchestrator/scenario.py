@@ -251,7 +251,7 @@ class _Scenario:
             preset=self.preset,
             presets=self.names,
             default_preset=self.default,
-            name=self.path.stem,
+            name=self.path.stem.encode(errors="replace").decode(),  # the bytes of a file name need not be letters
             path=str(self.path),
             text=self.source.text,
             origins=origins | self._origins(),

@@ -119,7 +119,7 @@ class Session:
         settings = Settings.of(system, self.job.threads)
         sequence = checked.order.sequence
         master = Master(self._slaves, sequence, wiring.links, wiring.starts, system.algorithm, settings=settings)
-        master.initialize(system.start_time, system.stop_time)
+        master.initialize(system.start_time, system.stop_time, may_go_on=self.job.checkpoint_every is not None)
         if self.job.begin is None or self._past is None:
             self._recorder = Recorder(master.signals, master.kinds, self.job.directory)
             self._recorder.extend([[system.start_time, *master.values]])
@@ -164,13 +164,15 @@ class Session:
             nonlocal shown, told
             recorder.extend(rows)
             time = master.time
-            if stopped.is_set() and time < last and not (len(rows) and rows[-1][0] == time):
-                recorder.extend([[time, *master.values]])  # the point at which the run was stopped
             reached = int((time - system.start_time) / percent + 1e-9)
             if progress is not None and (reached > told or clock.monotonic() - shown > 0.1 or time >= last):
                 shown, told = clock.monotonic(), reached
                 progress(time, system.stop_time)
-            return not stopped.is_set()
+            if not stopped.is_set():
+                return True
+            if time < last and not (len(rows) and rows[-1][0] == time):
+                recorder.extend([[time, *master.values]])  # the point at which the run was stopped
+            return False
 
         return observe
 

@@ -32,7 +32,7 @@ class Slave(Protocol):
     time: float
 
     def setup(self, start_time: float, stop_time: float) -> None:
-        """Announce the experiment and enter nothing yet."""
+        """Announce the experiment, whose stop time may be infinite, and enter nothing yet."""
 
     def enter_initialization(self) -> None:
         """Enter initialization mode."""

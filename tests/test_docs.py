@@ -76,8 +76,10 @@ def run_page(page: Path, folder: Path) -> None:
 
 @pytest.mark.skipif(sys.platform == "win32", reason="the pages speak to a POSIX shell")
 @pytest.mark.parametrize("page", [page for page in PAGES if blocks(page)], ids=lambda page: page.name)
-def test_what_a_page_shows_is_what_happens(page: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setenv("RAILCOSIM_CACHE", str(tmp_path / "cache"))
+def test_what_a_page_shows_is_what_happens(
+    page: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, session_cache: Path
+) -> None:
+    monkeypatch.setenv("RAILCOSIM_CACHE", str(session_cache))
     folder = tmp_path / "work"
     folder.mkdir()
     run_page(page, folder)

@@ -34,10 +34,10 @@ def pytest_generate_tests(metafunc):
 
 
 @pytest.fixture(scope="session", autouse=True)
-def cache(tmp_path_factory):
-    """A cache of our own: no test may be served by what an earlier version left in the user's."""
+def cache(session_cache):
+    """The session's cache: no test may be served by what an earlier version left in the user's."""
     with pytest.MonkeyPatch.context() as patch:
-        patch.setenv("RAILCOSIM_CACHE", str(tmp_path_factory.mktemp("cache")))
+        patch.setenv("RAILCOSIM_CACHE", str(session_cache))
         yield
 
 

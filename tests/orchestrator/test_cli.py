@@ -387,6 +387,7 @@ def test_describe_reads_a_class_in_a_file_and_an_fmu_alike(tmp_path: Path) -> No
         (["describe", "nope.fmu"], "error: nope.fmu cannot be read"),
         (["describe", "text.fmu"], "error: text.fmu is not a usable FMU"),
         (["describe", "Gust", "--with", "a"], "error: --with a: write NAME=VALUE, as in --with carriages=8"),
+        (["describe", "Schedule", "--with", f"points={'9' * 5000}"], "takes a whole number of at least 1, not '9999"),
         (["describe", "text.fmu", "--with", "a=1"], "error: text.fmu is built already; it takes no --with a"),
         (["describe", "Schedule", "--with", "ponts=3"], "Schedule has no 'ponts'; did you mean 'points'?"),
         (["check", "nope"], "there is no shipped scenario 'nope'"),
@@ -445,6 +446,9 @@ def test_plot_draws_the_figures_of_a_run_again_or_chosen_signals(small: Path) ->
     (path,) = chosen.stdout.split()
     assert (small / path).read_bytes().startswith(b"\x89PNG")
     assert "did you mean 'train.speed'?" in refused("plot", "out", "train.sped", folder=small)
+    record = json.loads((small / "out" / "run.json").read_text(encoding="utf-8"))
+    (small / "out" / "run.json").write_text(json.dumps(record | {"figures_wanted": [{"y": "train.sped"}]}))
+    assert "title is missing" in refused("plot", "out", folder=small)
 
 
 def test_new_says_what_to_type_next(tmp_path: Path) -> None:

@@ -42,7 +42,7 @@ def both(monkeypatch):
     """Run compiled, then in Python; gives the first outcome when the two are the same to the bit."""
 
     def go(system):
-        used = []
+        used, threads = [], None
         with monkeypatch.context() as patch:
             loop = compiled.CompiledLoop.run
             patch.setattr(compiled.CompiledLoop, "run", lambda *args: used.append(1) or loop(*args))
@@ -56,6 +56,9 @@ def both(monkeypatch):
         for name in fast.names():
             assert fast[name].tobytes() == slow[name].tobytes(), name
         assert fast.coupling == slow.coupling
+        for name in fast.names() if system.algorithm == "jacobi" else ():
+            threads = threads or execute(system, threads=2)
+            assert fast[name].tobytes() == threads[name].tobytes(), name
         return fast
 
     return go

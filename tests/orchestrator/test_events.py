@@ -1,6 +1,8 @@
 """Events while a run goes: what each does to whom, from when to when, with answers known by hand."""
 
 import json
+import re
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -319,9 +321,9 @@ def test_again_and_again(go, chain, algorithm):
     assert list(result["source.n"]) == [10 + k + 100 * (k % 4 in (1, 2)) for k in range(12)]
 
 
-@pytest.mark.parametrize("step", [1.0, 0.1])
+@pytest.mark.parametrize("step", [1.0, 0.3])
 def test_one_that_begins_again_as_it_ends_samples_and_holds(go, chain, step):
-    """Whatever rounding makes of 0.3 k and 0.3 (k - 1) + 0.3."""
+    """Whatever rounding makes of 0.9 k and 0.9 (k - 1) + 0.9: for some k the end comes later than the next begin."""
     event = Event("source.n", "freeze", 3 * step, duration=3 * step, every=3 * step)
     result = go(chain(event, step=step, stop_time=60 * step))
     assert list(result["source.n"]) == [10 + (k if k < 3 else k // 3 * 3) for k in range(61)]
@@ -495,6 +497,19 @@ def test_a_frozen_position_sensor_makes_a_requirement_fail(tmp_path):
     for name in result.names():
         earlier = result.time < 250.0
         assert np.array_equal(result[name][earlier], before[name][earlier])
+
+
+def test_the_example_of_the_documentation(tmp_path):
+    """docs/faults_and_checkpoints.md, with the numbers that it tells."""
+    page = Path(__file__).parents[2] / "docs" / "faults_and_checkpoints.md"
+    example = re.search(r"```toml\n(.*?)```", page.read_text(encoding="utf-8"), re.DOTALL)[1]
+    (tmp_path / "example.toml").write_text(example)
+    result = execute(load(tmp_path / "example.toml"))
+    (verdict,) = result.requirements
+    assert (verdict.verdict, verdict.time, verdict.index) == ("fail", pytest.approx(80.1), 2)
+    assert result["train[2].acceleration"].min() == pytest.approx(-1.3, abs=0.05)
+    gap = result["train[1].position"] - result["train[2].position"]
+    assert gap[800] == pytest.approx(7400.0 - 160.0, abs=1.0)
 
 
 def test_the_fallback_trusts_the_age_of_data_not_the_data():

@@ -461,7 +461,7 @@ def test_algorithms_that_come_back_to_saved_states(by_hand, algorithm):
 def test_algorithms_refuse_what_cannot_save_its_state(by_hand):
     system = System(stop_time=2.0, step=0.25, algorithm="adaptive")
     system.add("a", str(by_hand(1)))
-    with pytest.raises(ScenarioError, match=r"^a cannot save the state that adaptive comes back to"):
+    with pytest.raises(ScenarioError, match=r"^a: the state that adaptive comes back to cannot be saved"):
         run(system)
 
 

@@ -272,6 +272,11 @@ def test_an_event_on_a_direct_slow_output(go, system):
         (0.5, {}, "source: its step = 0.5 s is not a whole multiple of the system's, 1 s"),
         (2.0, {}, "source: its step = 2 s does not divide the run of 9 s into whole steps"),
         (3.0, {"algorithm": "iterative"}, "source has a step of its own, which goes with gauss-seidel and jacobi only"),
+        (
+            3.0,
+            {"algebraic_loops": "solve"},
+            "source has a step of its own, with which algebraic_loops = 'solve' does not go",
+        ),
         (3.0, {"algorithm": "adaptive"}, "source has a step of its own, which goes with gauss-seidel and jacobi only"),
     ],
 )
@@ -286,6 +291,11 @@ def test_a_sample_time_must_divide_the_instance_s_own_step(system, workspace):
         ScenarioError, match=r"source: the communication step 3 s is not a whole multiple of its sample"
     ):
         check(system({"source": ("Counter", 3.0, {"sample_time": 2.0})}), workspace, "plain")
+
+
+@pytest.mark.parametrize("how", [{"algorithm": "iterative"}, {"algorithm": "adaptive"}, {"algebraic_loops": "solve"}])
+def test_a_step_of_its_own_that_is_the_system_s_is_none(system, workspace, how):
+    check(system({"source": ("Lag", 1.0)}, **how), workspace, "plain")
 
 
 def test_check_tells_of_a_step_of_its_own(system, workspace):

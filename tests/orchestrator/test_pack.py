@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from fmpy.validation import validate_fmu
 from railcosim.fmus.build import build, native_problem, resolve
-from railcosim.orchestrator import RailcosimError, ScenarioError, System, load, run
+from railcosim.orchestrator import Event, RailcosimError, ScenarioError, System, load, run
 from railcosim.orchestrator.cli import call
 from railcosim.orchestrator.expose import Exposed, select
 from railcosim.orchestrator.pack import pack
@@ -210,6 +210,24 @@ def test_what_a_container_cannot_do_is_refused_by_name(tmp_path, options, part):
         pack(system, tmp_path / "one.fmu")
     assert "'train.disturbance' = 'gust.acceleration'" in str(caught.value)
     assert not (tmp_path / "one.fmu").exists()
+
+
+@pytest.mark.parametrize(
+    ("what", "change"),
+    [
+        ("[[events]]", lambda s: s.events.append(Event("gust.acceleration", "freeze", 0.5))),
+        ("train: a step of its own", lambda s: setattr(s.instances["train"], "step", 0.2)),
+        ("algorithm = iterative", lambda s: setattr(s, "algorithm", "iterative")),
+        ("extrapolation = 1", lambda s: setattr(s, "extrapolation", 1)),
+        ("algebraic_loops = solve", lambda s: setattr(s, "algebraic_loops", "solve")),
+    ],
+)
+def test_what_would_be_lost_in_a_container_is_refused(tmp_path, what, change):
+    system = train()
+    change(system)
+    with pytest.raises(ScenarioError) as caught:
+        pack(system, tmp_path / "one.fmu")
+    assert caught.value.problems == [f"{what} cannot be packed: a container has one step, and holds values"]
 
 
 def test_a_conversion_of_units_is_refused(tmp_path, components):

@@ -158,6 +158,28 @@ def test_what_holds_no_run(tmp_path):
     assert "could not convert string to float: 'many'" in refusal()
     (tmp_path / "results.csv").write_text("")
     assert "it has no 'time'" in refusal()
+    (tmp_path / "run.json").write_text("[" * 100_000)
+    refusal()
+
+
+@pytest.mark.parametrize(
+    ("key", "value"),
+    [
+        ("units", []),
+        ("units", {"x": 3}),
+        ("parameters", {"x": [1.0]}),
+        ("step", "0.1"),
+        ("stop_time", None),
+        ("figures_wanted", {}),
+        ("figures_wanted", ["speed"]),
+    ],
+)
+def test_a_record_that_somebody_has_edited(tmp_path, key, value):
+    saved(tmp_path, ["x"], [(0.0, 1.0)])
+    assert len(Results.load(tmp_path)) == 1
+    (tmp_path / "run.json").write_text(json.dumps(RECORD | {key: value}))
+    with pytest.raises(ScenarioError, match=f"its {key} in run.json is not what a run writes there"):
+        Results.load(tmp_path)
 
 
 @pytest.fixture

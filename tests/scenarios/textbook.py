@@ -96,6 +96,12 @@ class Coupled:
         """The factor by which the part that decays slowest, or grows fastest, changes in a step."""
         return float(np.abs(np.linalg.eigvals(self.matrix())).max())
 
+    def slowest(self):
+        """(x1, v1, x2, v2) in that part."""
+        values, vectors = np.linalg.eig(self.matrix())
+        part = vectors[:4, np.argmax(np.abs(values))].real
+        return part / np.abs(part).max()
+
     def run(self, start, count):
         """The course from (x1, v1, x2, v2): one row for each point."""
         u = np.concatenate([self.c @ (np.array(start[2:]) - start[:2]), start[:2]])
@@ -113,7 +119,7 @@ def limit(algorithm, order=0, of=OSCILLATOR, low=1e-3, high=3.0):
     def growth(h):
         return Coupled(h, algorithm, order, of).radius() - 1.0
 
-    steps = np.geomspace(low, high, 200)
+    steps = np.geomspace(low, high, 60)
     grown = [growth(h) for h in steps]
     k = next((k for k in range(1, len(steps)) if grown[k] > 0.0), None)
     return np.inf if k is None else float(brentq(growth, steps[k - 1], steps[k], xtol=1e-12))
