@@ -29,8 +29,8 @@ from .declarations import (
 )
 
 Values = dict[str, Any]
-MAX_LENGTH = 100_000
-"""Longest axis of an array: each element becomes a variable of the FMU, and a slip of the pen would fill the memory."""
+MAX_LENGTH = 10_000
+"""Longest axis of an array: each element becomes a variable of the FMU, and a slip of the pen would take for ever."""
 
 
 class ComponentError(ValueError):

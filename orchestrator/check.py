@@ -22,6 +22,9 @@ from .requirements import check_requirements
 from .system import ALGORITHMS, SWEEPING, System, split
 from .wiring import Wiring, wire
 
+_MOST_STEPS = 1e15
+"""So many points in time are not told apart, let alone run through."""
+
 
 @dataclass(frozen=True)
 class Checked:
@@ -150,7 +153,9 @@ def _check_times(system: System) -> list[str]:
     problems = []
     for name, length in ((duration, system.stop_time - system.start_time), ("record", record)):
         count = length / system.step
-        if not 0.5 < count < math.inf or abs(count - round(count)) > 1e-6:
+        if count >= _MOST_STEPS:
+            problems.append(f"{name} = {length:g} s is {count:.3g} steps of {system.step:g} s: too many to count")
+        elif not count > 0.5 or abs(count - round(count)) > 1e-6:
             problems.append(f"{name} = {length:g} s is not a whole multiple of step = {system.step:g} s")
     return problems
 

@@ -152,7 +152,9 @@ class Iterative:
         states = [slave.save() for slave in slaves]
         try:
             next_guess = _ACCELERATIONS[self.acceleration](self.relaxation)
-            errors: list[Vector] = []
+            wrong: list[int] = []
+            sizes: list[float] = []
+            error = scale = np.zeros(0)
             for count in range(1, self.max_iterations + 1):
                 if count > 1:
                     for slave, state in zip(slaves, states, strict=True):
@@ -165,21 +167,25 @@ class Iterative:
                     if count == 1 or isinstance(failure, StoppedError):
                         raise
                     said = str(failure).partition("\n")[0]
-                    raise self._failure((time, length), reals, errors, said) from failure
+                    raise self._failure((time, length), wrong, error, sizes, said) from failure
                 reached = np.array([exchange.values[k] for k in reals], dtype=np.float64)
-                errors.append(np.abs(reached - guess) / self._scale(reals, guess, reached))
+                distance = np.abs(reached - guess)
+                error = distance / self._scale(reals, guess, reached)
                 if count == 1:  # the size of each value, for the method that combines them
-                    scale = self._scale(reals, guess, reached)[unknowns]
-                flipping = [k for k, flag in zip(others, flags, strict=True) if flag != exchange.values[k]]
-                if _largest(errors[-1]) <= 1.0 and not flipping:
-                    self._count(count, _largest(errors[-1]))
+                    scale = self._scale(reals, guess, reached)
+                sizes.append(_largest(distance / scale))
+                wrong = [reals[k] for k in np.argsort(error)[::-1] if error[k] > 1.0]
+                wrong += [k for k, flag in zip(others, flags, strict=True) if flag != exchange.values[k]]
+                if not wrong:
+                    self._count(count, _largest(error))
                     return
-                following = next_guess(guess[unknowns] / scale, reached[unknowns] / scale) * scale
-                if not np.isfinite(following).all() or _is_hopeless(errors):
+                u = unknowns
+                following = next_guess(guess[u] / scale[u], reached[u] / scale[u]) * scale[u]
+                if not np.isfinite(following).all() or sizes[-1] > _HOPELESS * max(sizes[0], 1.0):
                     break
-                for k, value in zip(reals[unknowns], following, strict=True):
+                for k, value in zip(reals[u], following, strict=True):
                     exchange.values[k] = float(value)
-            raise self._failure((time, length), reals, errors, "", flipping)
+            raise self._failure((time, length), wrong, error, sizes)
         finally:
             for slave, state in zip(slaves, states, strict=True):
                 slave.forget(state)
@@ -194,27 +200,21 @@ class Iterative:
         self.tally.residual = max(self.tally.residual, worst)
 
     def _failure(
-        self,
-        step: tuple[float, float],
-        reals: Sequence[int],
-        errors: Sequence[Vector],
-        failure: str,
-        flipping: Sequence[int] = (),
+        self, step: tuple[float, float], wrong: Sequence[int], error: Vector, sizes: Sequence[float], failure: str = ""
     ) -> CouplingError:
         """What to say of iterations that led nowhere.
 
         Args:
             step: its begin and its length in s.
-            reals: places of the real numbers.
-            errors: their disagreement in units of the tolerance, for each iteration.
+            wrong: places of the values that disagree.
+            error: by how much those do that are real, in units of the tolerance.
+            sizes: how far apart values were at most, for each iteration.
             failure: what an FMU failed of in the one after them, if it did.
-            flipping: places of what is no real number and still changes.
         """
-        worst = [reals[k] for k in np.argsort(errors[-1])[::-1] if errors[-1][k] > 1.0]
-        names = ", ".join(self.exchange.signals[k] for k in [*worst, *flipping][:_SHOWN])
-        last, first = _largest(errors[-1]), _largest(errors[0])
-        grows = bool(failure) or last > _GROWN * first
-        what = f"still disagree by {last:.3g} times the tolerance" if worst else "still change"
+        names = ", ".join(self.exchange.signals[k] for k in wrong[:_SHOWN])
+        grows = bool(failure) or sizes[-1] > _GROWN * sizes[0]
+        worst = _largest(error)
+        what = f"still disagree by {worst:.3g} times the tolerance" if worst > 1.0 else "still change"
         if failure:
             what += f", and with the next guess an FMU fails ({failure})"
         ways = ["a smaller step"]
@@ -222,18 +222,13 @@ class Iterative:
         ways += [] if self.acceleration == "anderson" else ['simulation.acceleration = "anderson"']
         return CouplingError(
             f"t = {step[0]:g} s: the coupling through {names} {'diverges' if grows else 'does not converge'}: after "
-            f"{len(errors)} iterations of the step of {step[1]:g} s they {what}; take {', '.join(ways)} or a smaller "
+            f"{len(sizes)} iterations of the step of {step[1]:g} s they {what}; take {', '.join(ways)} or a smaller "
             "simulation.relaxation"
         )
 
 
 def _largest(errors: Vector) -> float:
     return float(errors.max(initial=0.0))
-
-
-def _is_hopeless(errors: Sequence[Vector]) -> bool:
-    """Whether values are so much farther apart than at first that nothing will bring them together."""
-    return _largest(errors[-1]) > _HOPELESS * max(_largest(errors[0]), 1.0)
 
 
 _HOPELESS, _GROWN = 1e12, 10.0

@@ -96,14 +96,14 @@ def _interface(description: Any, root: Any, beside: Beside) -> Interface:
 
 def _parse(path: Path, name: str) -> Any:
     try:
-        # Of bytes that do not fit the encoding lxml says where they are only if it has not read the file itself.
-        root = etree.fromstring(path.read_bytes(), etree.XMLParser(resolve_entities=False, no_network=True))
-    except etree.XMLSyntaxError as error:
-        raise FmuFileError(f"{name}: its modelDescription.xml is not XML: {error.msg}") from error
+        parsed = etree.parse(str(path), etree.XMLParser(resolve_entities=False, no_network=True))
+    except (etree.XMLSyntaxError, OSError) as error:  # the latter where bytes do not fit the encoding
+        what = getattr(error, "msg", None) or "it has bytes that do not fit its encoding"
+        raise FmuFileError(f"{name}: its modelDescription.xml is not XML: {what}") from error
     # Asked of the parser, not searched for in the bytes: they may be in any encoding.
-    if root.getroottree().docinfo.internalDTD is not None:
+    if parsed.docinfo.internalDTD is not None:
         raise FmuFileError(f"{name} is refused: its modelDescription.xml has a DOCTYPE, which may declare XML entities")
-    return root
+    return parsed.getroot()
 
 
 def _read(folder: Path, repaired: Any) -> tuple[Any, list[str]]:

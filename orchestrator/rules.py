@@ -20,6 +20,8 @@ def broken_rules(folder: Path, interface: Interface) -> list[str]:
         folder: where it was unpacked.
         interface: its interface, with our annotation.
     """
+    if interface.version != "2.0":
+        return [f"it says that it is one of ours, but is of FMI {interface.version}"]
     root = etree.parse(str(folder / "modelDescription.xml")).getroot()
     broken = [*_variables(root, interface), *_units(interface), *_archive(root, folder)]
     if interface.vendor.get("kind") == "native":
@@ -29,7 +31,8 @@ def broken_rules(folder: Path, interface: Interface) -> list[str]:
 
 def _variables(root: Any, interface: Interface) -> Iterator[str]:
     names = [v.get("name") for v in root.iter("ScalarVariable")]
-    initial = {names[int(u.get("index")) - 1]: u for u in root.iterfind("ModelStructure/InitialUnknowns/Unknown")}
+    unknowns = {_index(u): u for u in root.iterfind("ModelStructure/InitialUnknowns/Unknown")}
+    initial = {name: unknowns[place] for place, name in enumerate(names, 1) if place in unknowns}
     for v in interface.variables.values():
         if not v.description and v.causality != "local":
             yield f"{v.name} has no description"
@@ -44,6 +47,12 @@ def _variables(root: Any, interface: Interface) -> Iterator[str]:
     for name, unknown in initial.items():
         if unknown.get("dependencies") is None:
             yield f"{name} lists no dependencies in InitialUnknowns"
+
+
+def _index(unknown: Any) -> int:
+    """The number of a variable; 0 where the file, which says that it is one of ours, has something else there."""
+    text = unknown.get("index", "")
+    return int(text) if text.isdecimal() and len(text) < 10 else 0
 
 
 def _units(interface: Interface) -> Iterator[str]:
@@ -67,7 +76,7 @@ def _native(root: Any, interface: Interface, folder: Path) -> Iterator[str]:
     for capability in (*_CAPABILITIES, *(("canInterpolateInputs",) if moves else ())):
         if simulation.get(capability) != "true":
             yield f"{capability} is not declared"
-    files = [f.get("name") for f in simulation.iterfind("SourceFiles/File")]
+    files = [f.get("name", "") for f in simulation.iterfind("SourceFiles/File")]
     if not files:
         yield "no source files are listed"
     for name in files:
@@ -77,6 +86,6 @@ def _native(root: Any, interface: Interface, folder: Path) -> Iterator[str]:
     derivatives = {
         k for k, v in enumerate(variables, 1) if v.find("Real") is not None and v.find("Real").get("derivative")
     }
-    listed = {int(u.get("index")) for u in root.iterfind("ModelStructure/Derivatives/Unknown")}
+    listed = {_index(u) for u in root.iterfind("ModelStructure/Derivatives/Unknown")}
     for k in sorted(derivatives - listed):
         yield f"{variables[k - 1].get('name')} is missing from ModelStructure/Derivatives"

@@ -170,7 +170,7 @@ def test_an_unknown_name_without_a_near_one_lists_all(samples):
         ({"masses": True}, "Chain: build argument 'masses' takes a whole number of at least 2, not True"),
         (
             {"masses": 10**9},
-            "Chain: build argument 'masses' is 1000000000; arrays have at most 100000 elements on an axis",
+            "Chain: build argument 'masses' is 1000000000; arrays have at most 10000 elements on an axis",
         ),
         ({"time": [1.0]}, "Chain.time takes a float, not [1.0]"),
         ({"momentum": 1.0}, "Chain.momentum is computed and cannot be set"),

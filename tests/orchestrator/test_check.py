@@ -54,6 +54,8 @@ def test_a_system_that_is_fit_to_run(examine):
         ({"stop_time": 0.04}, "stop_time = 0.04 s is not a whole multiple of step = 0.1 s"),
         ({"start_time": 0.05}, "stop_time - start_time = 9.95 s is not a whole multiple of step = 0.1 s"),
         ({"record": 0.25}, "record = 0.25 s is not a whole multiple of step = 0.1 s"),
+        ({"stop_time": 1e300}, "stop_time = 1e+300 s is 1e+301 steps of 0.1 s: too many to count"),
+        ({"record": 1e300}, "record = 1e+300 s is 1e+301 steps of 0.1 s: too many to count"),
         ({"record": 0.0}, "record = 0 s is not a whole multiple of step = 0.1 s"),
         ({"record": -0.5}, "record = -0.5 s is not a whole multiple of step = 0.1 s"),
         ({"record": float("nan")}, "record = nan s is not a whole multiple of step = 0.1 s"),

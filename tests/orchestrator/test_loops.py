@@ -1,5 +1,6 @@
 """Algebraic loops: how they are found, how they are solved at each point, and what is said of them."""
 
+import json
 from types import SimpleNamespace
 
 import networkx as nx
@@ -395,6 +396,9 @@ def test_run_prints_the_residual(file, capsys, tmp_path):
     assert code == 0
     assert "algebraic loop through 2 signals: worst relative residual " in out
     assert float(out.split("worst relative residual ")[1].split()[0]) < 1e-9
+    told = json.loads((tmp_path / "out" / "run.json").read_text())["coupling"]["algebraic_loop"]
+    assert told["signals"] == ["a.y", "b.y"]
+    assert (told["solutions"], told["worst_residual"] < 1e-9) == (40, True)
 
 
 def test_check_prints_the_loop_and_what_becomes_of_it(file, capsys):

@@ -32,6 +32,7 @@ class Run:
         for i in range(1, 13):
             self.columns[f"car[{i}].speed"] = self.time / i
         self.columns |= {f"consist[{i}].force[{k}]": self.time * k for i in (1, 2) for k in (1, 2)}
+        self.columns |= {f"lone.{name}": self.time for name in ("force[1]", "force[2]", "map[1,1]", "map[1,2]")}
 
     def names(self):
         return self.columns.keys()
@@ -73,6 +74,10 @@ def drawn(tmp_path, **figure):
         (["train[:].speed - target.value"], ["train 1", "train 2", "train 3"]),
         (["consist[2].force[:]"], ["consist 2 1", "consist 2 2"]),
         (["consist[i].force[1]"], ["consist 1 1", "consist 2 1"]),
+        (["lone.force[:]"], ["lone force 1", "lone force 2"]),
+        (["lone.force[i] - lone.force[i-1]", "lone.force[i]"],
+         ["lone force 1–2", "lone force 1", "lone force 2"]),
+        (["lone.map[1,:]"], ["lone map 1,1", "lone map 1,2"]),
         (["abs(train[1].speed)"], ["abs(train[1].speed)"]),
         (["train[:].speed", "train[:].position"],
          [f"train {i} {what}" for what in ("speed", "position") for i in (1, 2, 3)]),
@@ -205,12 +210,14 @@ def test_one_bad_figure_does_not_cost_the_others(tmp_path):
         {"title": "Bad", "y": ["target.valu"]},
         {"title": "Mathematics", "y": ["target.value"], "y_label": r"$\nonsense{$"},
         {"title": "Varies", "y": ["target.value"], "bands": ["train[1].speed"]},
+        {"title": "Stands", "y": ["target.value"], "x": "max(train[1].speed)"},
         {"title": "Good", "y": ["target.value"]},
     ]
     with pytest.raises(ScenarioError) as caught:
         draw(figures, RUN, tmp_path)
     assert [path.name for path in tmp_path.iterdir()] == ["good.png"]
-    first, second, third = caught.value.problems
+    first, second, third, fourth = caught.value.problems
+    assert "x = 'max(train[1].speed)' is a single number; draw over a signal" in fourth
     assert "figure 'Bad' was not drawn: " in first
     assert "did you mean 'target.value'?" in first
     assert "figure 'Mathematics' was not drawn: " in second

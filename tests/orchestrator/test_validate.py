@@ -264,6 +264,17 @@ def test_our_own_rules_bind_our_own_fmus(tmp_path):
         assert part in found
 
 
+@pytest.mark.parametrize("index", ["99", "", "x", "9" * 50])
+def test_a_file_that_says_it_is_ours_is_not_believed(tmp_path, xml, index):
+    ours = '<VendorAnnotations><Tool name="railcosim"><component kind="native"/></Tool></VendorAnnotations>'
+    text = xml["description"]([xml["variable"]("y", "output")], simulation='needsExecutionTool="false"')
+    text = text.replace("<ModelVariables>", f"{ours}<ModelVariables>")
+    text = text.replace("<InitialUnknowns>", f'<Derivatives><Unknown index="{index}"/></Derivatives><InitialUnknowns>')
+    text = text.replace('<InitialUnknowns><Unknown index="1"/>', f'<InitialUnknowns><Unknown index="{index}"/>')
+    path = xml["write_archive"](tmp_path / "theirs.fmu", {"modelDescription.xml": text})
+    assert "y is calculated and missing from InitialUnknowns" in detail(validate(path), "rules of railcosim")
+
+
 @pytest.mark.parametrize(
     ("name", "content"),
     [

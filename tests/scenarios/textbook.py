@@ -18,7 +18,9 @@ def motion(times, start=(1.0, 0.0, 0.0, 0.0), of=OSCILLATOR):
     left = [-(k1 + kc) / m1, -(d1 + dc) / m1, kc / m1, dc / m1]
     right = [kc / m2, dc / m2, -(k2 + kc) / m2, -(d2 + dc) / m2]
     a = np.array([[0.0, 1.0, 0.0, 0.0], left, [0.0, 0.0, 0.0, 1.0], right])
-    return np.array([expm(a * t) @ np.array(start) for t in times])
+    rates, modes = np.linalg.eig(a)
+    parts = np.linalg.solve(modes, np.array(start, dtype=complex))
+    return ((modes * parts) @ np.exp(np.outer(rates, times))).T.real
 
 
 def _moved(a, b, h):
@@ -128,7 +130,7 @@ def limit(algorithm, order=0, of=OSCILLATOR, low=1e-3, high=3.0):
 # -------------------------------------------------------------------- a ball on the ground
 
 
-def bounces(count, stiffness=1e4, damping=20.0, mass=1.0, gravity=9.81, height=1.0):
+def bounces(count, *, stiffness=1e4, damping=20.0, mass=1.0, gravity=9.81, height=1.0):
     """Times of the first impacts, and the height that each rebound reaches, in s and m.
 
     The ball falls freely; on the ground it is a damped oscillator around its weight's deflection, until spring and

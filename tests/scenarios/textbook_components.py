@@ -19,7 +19,7 @@ class Left(Component):
 
 
 class Right(Component):
-    """A mass on a spring and a damper to the wall, and on another pair to a given displacement, whose force it tells."""
+    """A mass on a spring and a damper to the wall, and on others to a given displacement, whose force it tells."""
 
     mass = Parameter("kg", 1.0)
     stiffness = Parameter("N/m", 1.0)
