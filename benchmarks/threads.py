@@ -15,7 +15,8 @@ import time
 
 from railcosim.orchestrator.archive import Workspace
 from railcosim.orchestrator.check import check
-from railcosim.orchestrator.master import Master, Rows, Settings
+from railcosim.orchestrator.master import Master, Rows
+from railcosim.orchestrator.settings import Settings
 from railcosim.orchestrator.system import System
 
 STEP, STOP = 0.1, 1e6

@@ -122,6 +122,12 @@ def describe_coupling(system: System, interfaces: Mapping[str, Interface], wirin
         held = [n for n in held if not interfaces[n].interpolates_inputs]
         if held:
             notes.append(f"inputs of {_listed(held)} are held over a step: canInterpolateInputs is false")
+    elif system.algorithm == "iterative":
+        able = [n for n in find_blocks(interfaces, wiring.links).cyclic if interfaces[n].interpolates_inputs]
+        if able:
+            notes.append(
+                f"{_listed(sorted(able))} can interpolate inputs: extrapolation = 1 makes iterative second order there"
+            )
     return notes
 
 

@@ -23,9 +23,10 @@ from .check import Checked, check
 from .errors import FmuError, ScenarioError, did_you_mean
 from .loading import Kind
 from .local_model import Array, Continuous, Stepped, make_block
-from .master import Master, Settings
+from .master import Master
 from .one_step import Composition
 from .run import Progress
+from .settings import Settings
 from .settling import settle
 from .slave import Slave
 from .system import System

@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field
 from functools import partial
 from typing import Any
 
@@ -22,9 +21,10 @@ from .events import LATE, Schedule
 from .exchange import Exchange, types_of
 from .extrapolation import Extrapolator
 from .loops import LoopSolver, find_feeders, find_loops
+from .settings import Settings
 from .settling import settle
 from .slave import Slave
-from .system import Acceleration, Algorithm, Event, Loops, System
+from .system import Algorithm
 from .wiring import Link
 
 _SOLVED = 1e-9
@@ -36,46 +36,6 @@ _SHORTEST = 2.0**-20
 Rows = Sequence[Sequence[Any]] | NDArray[np.float64]
 Observer = Callable[[int, Rows], bool]
 """Called after one or more steps with how many were taken and the rows (time, values) that were due; False stops."""
-
-
-@dataclass(frozen=True)
-class Settings:
-    """How a master couples, as `System` describes it.
-
-    Attributes:
-        rates: how many communication steps an instance takes at once, by name, where that is not one.
-        threads: how many threads step instances in parallel (``jacobi`` in the compiled loop).
-    """
-
-    extrapolation: int = 0
-    algebraic_loops: Loops = "delay"
-    tolerance: float | None = None
-    tolerances: Mapping[str, Sequence[float]] = field(default_factory=dict)
-    max_iterations: int = 50
-    relaxation: float = 1.0
-    acceleration: Acceleration = "anderson"
-    min_step: float | None = None
-    rates: Mapping[str, int] = field(default_factory=dict)
-    events: Sequence[Event] = ()
-    threads: int = 1
-
-    @classmethod
-    def of(cls, system: System, threads: int = 1) -> Settings:
-        """Those of a system."""
-        own = {name: round(x.step / system.step) for name, x in system.instances.items() if x.step is not None}
-        return cls(
-            extrapolation=system.extrapolation,
-            algebraic_loops=system.algebraic_loops,
-            tolerance=system.tolerance,
-            tolerances=system.tolerances,
-            max_iterations=system.max_iterations,
-            relaxation=system.relaxation,
-            acceleration=system.acceleration,
-            min_step=system.min_step,
-            rates={name: rate for name, rate in own.items() if rate > 1},
-            events=system.events,
-            threads=threads,
-        )
 
 
 class Master:

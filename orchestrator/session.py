@@ -21,8 +21,9 @@ from .checkpoint import Checkpoint
 from .errors import RunError, ScenarioError, StoppedError
 from .isolation import instantiate
 from .loading import Kind
-from .master import Master, Rows, Settings
+from .master import Master, Rows
 from .results import Recorder, Results
+from .settings import Settings
 from .slave import Slave
 
 Status = Literal["completed", "terminated", "interrupted", "failed"]
