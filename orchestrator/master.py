@@ -21,7 +21,7 @@ from .events import LATE, Schedule
 from .exchange import Exchange, types_of
 from .extrapolation import Extrapolator
 from .loops import LoopSolver, find_feeders, find_loops
-from .settings import Settings
+from .settings import DEFAULT, Settings
 from .settling import settle
 from .slave import Slave
 from .system import Algorithm
@@ -59,7 +59,7 @@ class Master:
         starts: Mapping[str, Mapping[str, Any]],
         algorithm: Algorithm,
         *,
-        settings: Settings = Settings(),
+        settings: Settings = DEFAULT,
     ) -> None:
         self.slaves = slaves
         self.algorithm = algorithm
