@@ -119,7 +119,7 @@ def _check_entries(path: Path, entries: list[zipfile.ZipInfo]) -> None:
         if len(parts) > MAX_LEVELS:
             raise FmuFileError(f"{path} is refused: an entry lies {len(parts)} levels deep, {name[:40]!r}...")
         if entry.compress_type not in _METHODS:
-            method = zipfile.compressor_names.get(entry.compress_type, f"method {entry.compress_type}")
-            raise FmuFileError(f"{path} is refused: the entry {name!r} is compressed with {method}; FMI allows deflate")
+            method = f"method {entry.compress_type}"
+            raise FmuFileError(f"{path} is refused: the entry {name!r} is compressed by {method}; FMI allows deflate")
         if parts == ("modelDescription.xml",) and entry.file_size > MAX_DESCRIPTION:
             raise FmuFileError(f"{path} is refused: its modelDescription.xml is {entry.file_size >> 20} MiB")

@@ -258,6 +258,7 @@ def test_a_run_and_its_resumption(orchestrate, scenario, tmp_path, monkeypatch):
     code, out, err = orchestrate("run", "--resume", "parts", "--stop", 6, "--no-figures")
     assert code == 0
     assert "Two things" in out
+    assert "\n1 event, listed in run.json\n" in out
     assert "1 of 1 requirements pass" in out
     assert err.splitlines() == [f"things: {percent} % of 6 s" for percent in range(60, 101, 10)]
     for name in ("results.csv", "metrics.json"):
