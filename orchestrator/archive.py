@@ -18,6 +18,7 @@ MAX_DESCRIPTION = 256 << 20
 MAX_LEVELS = 64
 """Folders in folders: a thousand of them could be made, but not be removed again."""
 _METHODS = (zipfile.ZIP_STORED, zipfile.ZIP_DEFLATED)
+_OTHER_METHODS = {zipfile.ZIP_BZIP2: "bzip2", zipfile.ZIP_LZMA: "lzma"}
 """What FMI allows. Of others `zipfile` unpacks whole blocks in memory, whatever size an entry says it has."""
 
 
@@ -119,7 +120,7 @@ def _check_entries(path: Path, entries: list[zipfile.ZipInfo]) -> None:
         if len(parts) > MAX_LEVELS:
             raise FmuFileError(f"{path} is refused: an entry lies {len(parts)} levels deep, {name[:40]!r}...")
         if entry.compress_type not in _METHODS:
-            method = f"method {entry.compress_type}"
-            raise FmuFileError(f"{path} is refused: the entry {name!r} is compressed by {method}; FMI allows deflate")
+            method = _OTHER_METHODS.get(entry.compress_type, f"method {entry.compress_type}")
+            raise FmuFileError(f"{path} is refused: the entry {name!r} is compressed with {method}; FMI allows deflate")
         if parts == ("modelDescription.xml",) and entry.file_size > MAX_DESCRIPTION:
             raise FmuFileError(f"{path} is refused: its modelDescription.xml is {entry.file_size >> 20} MiB")

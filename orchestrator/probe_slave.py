@@ -1,50 +1,75 @@
-"""One probe of one FMU of FMI 1.0 or 3.0, run by `validate` as a module in a process of its own, as `probe` is.
-
-It drives the FMU as our master does, through the face of an instance.
-"""
+"""Probes of FMUs of every version: they drive an FMU as our master does, through the face of an instance."""
 
 from __future__ import annotations
 
 import math
 import struct
-import sys
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from . import probe
 from .errors import FmuError
-from .instances import SLAVES
-from .interface import Variable
-from .probe import STEPS, RefusedError, compare
-from .reader import read
-from .slave import Slave
+from .instances import SLAVES, call_name
+from .interface import Interface, Variable
+from .loaded import LoadedSlave
 
-_KEPT = 5
+STEPS = 20
+_HALF = STEPS // 2
+_TIMES = 20
+"""How often an FMU is instantiated where that is allowed."""
+
+
+class DoubtfulError(Exception):
+    """Something that works, though the standard says it should not."""
+
+
+@dataclass(frozen=True)
+class Task:
+    """What a probe has to know.
+
+    Attributes:
+        probe: which one. interface: the FMU's. folder: where the FMU was unpacked. step: in s.
+        answer: the file for the verdict. trying: the file that says what is being tried, in case it is the last thing.
+    """
+
+    probe: str
+    interface: Interface
+    folder: Path
+    step: float
+    answer: Path
+    trying: Path
+
+
+Probe = Callable[[Task], str]
+"""It says what it found, after ``"skipped: "`` why it looked for nothing.
+
+Raises FmuError if the FMU fails or gives what is wrong, DoubtfulError if it does what it should not.
+"""
 
 
 class Tried:
-    """An instance, and the steps it has taken.
+    """An instance, and the steps of one length that it takes from t = 0 s.
 
     Args:
-        spec: what the FMU is: folder, step, start time.
-        name: of the instance.
+        slave: the instance.
+        step: in s.
     """
 
-    def __init__(self, spec: dict[str, Any], name: str) -> None:
-        folder = Path(spec["folder"])
-        interface = read(folder, folder.name)
-        self.slave: Slave = SLAVES[interface.version](name, interface, folder)
-        self.begin, self.step = float(spec["start_time"]), float(spec["step"])
+    def __init__(self, slave: LoadedSlave, step: float) -> None:
+        self.slave = slave
+        self.step = step
         self.taken = 0
-        kinds = dict.fromkeys(v.type for v in interface.of("output"))
-        names = {kind: [v.name for v in interface.of("output") if v.type == kind] for kind in kinds}
-        self._outputs = [(names[kind], self.slave.channel(kind, names[kind])) for kind in kinds]
+        names: dict[Any, list[str]] = {}
+        for variable in slave.interface.of("output"):
+            names.setdefault(variable.type, []).append(variable.name)
+        self._outputs = [(each, slave.channel(kind, each)) for kind, each in names.items()]
 
     def initialize(self) -> Tried:
         """Instantiated -> ready to step."""
-        self.slave.setup(self.begin, self.begin + 10 * STEPS * self.step)
+        self.taken = 0
+        self.slave.setup(0.0, STEPS * self.step)  # with an end, which some demand
         self.slave.enter_initialization()
         self.slave.exit_initialization()
         return self
@@ -53,13 +78,13 @@ class Tried:
         """All outputs.
 
         Raises:
-            RefusedError: one is not finite.
+            FmuError: one is not finite.
         """
         values = []
         for names, channel in self._outputs:
             for name, value in zip(names, channel.get(), strict=True):
                 if isinstance(value, float) and not math.isfinite(value):
-                    raise RefusedError(f"output {name} is {value!r} at t = {self.slave.time:g} s")
+                    raise FmuError(f"output {name} is {value!r} at t = {self.slave.time:g} s", log=self.slave.log)
                 values.append(value)
         return values
 
@@ -67,51 +92,58 @@ class Tried:
         """Take steps; all outputs after each."""
         rows = []
         for _ in range(steps):
-            self.slave.step(self.begin + self.taken * self.step, self.step, final=False)
+            self.slave.step(self.taken * self.step, self.step, final=False)
             self.taken += 1
             rows.append(self.read())
         return rows
 
 
 @contextmanager
-def _instances(spec: dict[str, Any], count: int = 1) -> Iterator[list[Tried]]:
-    made = [Tried(spec, f"probe{k}") for k in range(count)]
-    yield made
-    for it in made:
-        it.slave.free()
+def _instances(task: Task, count: int = 1) -> Iterator[list[Tried]]:
+    """Some instances, freed at the end; not after a failure, when the process ends without that."""
+    interface = task.interface
+    slaves = [SLAVES[interface.version](f"probe{k}", interface, task.folder) for k in range(count)]
+    yield [Tried(slave, task.step) for slave in slaves]
+    for slave in slaves:
+        slave.free()
 
 
-def instantiate(spec: dict[str, Any]) -> str:
+def compare(expected: list[list[Any]], found: list[list[Any]], where: str) -> None:
+    """Refuse rows of outputs that are not as expected."""
+    for k, (a, b) in enumerate(zip(expected, found, strict=True)):
+        if a != b:
+            raise FmuError(f"other outputs {where}: at step {k + 1}, {a!r} became {b!r}")
+
+
+def instantiate(task: Task) -> str:
     """Load, instantiate and free, again and again where that is allowed."""
-    again = 1 if spec["single"] else 20
-    for _ in range(again):
-        with _instances(spec):
+    times = 1 if task.interface.single_instance else _TIMES
+    for _ in range(times):
+        with _instances(task):
             pass
-    return f"instantiated and freed {again} time{'s' * (again > 1)}"
+    return f"instantiated and freed {times} time{'s' * (times > 1)}"
 
 
-def simulate(spec: dict[str, Any]) -> str:
+def simulate(task: Task) -> str:
     """Initialize with start values, step, read every output, terminate."""
-    with _instances(spec) as (it,):
+    with _instances(task) as (it,):
         it.initialize()
         it.read()
         rows = it.run()
         it.slave.terminate()
-    return f"{STEPS} steps of {spec['step']:g} s, {len(rows[0])} outputs finite"
+    return f"{STEPS} steps of {task.step:g} s, {len(rows[0])} outputs finite"
 
 
-def starts(spec: dict[str, Any]) -> str:
+def starts(task: Task) -> str:
     """Parameters and inputs have the start values that the description says."""
-    count = 0
-    with _instances(spec) as (it,):
+    described = [v for v in task.interface.of("parameter", "input") if v.start is not None]
+    with _instances(task) as (it,):
         it.initialize()
-        for variable in it.slave.interface.of("parameter", "input"):
-            if variable.start is not None:
-                (found,) = it.slave.channel(variable.type, [variable.name]).get()
-                if found != _held(variable):
-                    raise RefusedError(f"{variable.name} starts at {found!r}, not at {variable.start!r} as described")
-                count += 1
-    return f"{count} parameters and inputs start as described"
+        for variable in described:
+            (found,) = it.slave.channel(variable.type, [variable.name]).get()
+            if found != _held(variable):
+                raise FmuError(f"{variable.name} starts at {found!r}, not at {variable.start!r} as described")
+    return f"{len(described)} parameters and inputs start as described"
 
 
 def _held(variable: Variable) -> Any:
@@ -121,13 +153,13 @@ def _held(variable: Variable) -> Any:
     return variable.start
 
 
-def second_instance(spec: dict[str, Any]) -> str:
+def second_instance(task: Task) -> str:
     """Two instances, stepped in turn, do not disturb one another."""
-    if spec["single"]:
+    if task.interface.single_instance:
         return "skipped: can be instantiated only once per process"
-    with _instances(spec) as (alone,):
+    with _instances(task) as (alone,):
         expected = alone.initialize().run()
-    with _instances(spec, 2) as (a, b):
+    with _instances(task, 2) as (a, b):
         a.initialize()
         b.initialize()
         rows: list[list[Any]] = []
@@ -138,52 +170,36 @@ def second_instance(spec: dict[str, Any]) -> str:
     return "two instances stepped in turn give what one gives alone"
 
 
-def state(spec: dict[str, Any]) -> str:
+def state(task: Task) -> str:
     """Save, restore, serialize and deserialize the state, where the description says that it can."""
-    if not spec["can_save"]:
+    interface = task.interface
+    if not interface.can_save_state:
         return "skipped: does not say that it can get and set its state"
-    with _instances(spec) as (it,):
-        it.initialize().run(STEPS // 2)
+    with _instances(task) as (it,):
+        it.initialize().run(_HALF)
         saved = it.slave.save()
-        expected = it.run(STEPS // 2)
+        expected = it.run(_HALF)
         it.slave.restore(saved)
-        it.taken = STEPS // 2
-        compare(expected, it.run(STEPS // 2), "from a restored state")
-        content = it.slave.serialize(saved) if spec["can_serialize"] else b""
+        it.taken = _HALF
+        compare(expected, it.run(_HALF), f"after {call_name(interface, 'restore', 'Real', ())}")
+        content = it.slave.serialize(saved) if interface.can_serialize_state else b""
         it.slave.forget(saved)
-    if not spec["can_serialize"] or spec["single"]:
+    if not interface.can_serialize_state or interface.single_instance:
         return "a run from a restored state repeats the first"
-    with _instances(spec) as (it,):
+    with _instances(task) as (it,):
         it.initialize()
         saved = it.slave.deserialize(content)
         it.slave.restore(saved)
         it.slave.forget(saved)
-        it.taken = STEPS // 2
-        compare(expected, it.run(STEPS // 2), "from a serialized state")
+        it.taken = _HALF
+        compare(expected, it.run(_HALF), "from a serialized state")
     return "a run from a restored or serialized state repeats the first"
 
 
-def _plainly(tried: Callable[[dict[str, Any]], str]) -> Callable[[dict[str, Any]], str]:
-    """A probe that tells an FMU's failure in a line."""
-
-    def telling(spec: dict[str, Any]) -> str:
-        try:
-            return tried(spec)
-        except FmuError as error:
-            what, *said = str(error).split("\n")
-            kept = [line.strip() for line in said][-_KEPT:]
-            raise RefusedError(f"{what}; it said: {' / '.join(kept)}" if kept else what) from error
-
-    return telling
-
-
-PROBES = {
-    "instantiate": _plainly(instantiate),
-    "simulate": _plainly(simulate),
-    "starts": _plainly(starts),
-    "instances": _plainly(second_instance),
-    "state": _plainly(state),
+PROBES: dict[str, Probe] = {
+    "instantiate": instantiate,
+    "simulate": simulate,
+    "starts": starts,
+    "instances": second_instance,
+    "state": state,
 }
-
-if __name__ == "__main__":
-    probe.main(sys.argv[1], PROBES)

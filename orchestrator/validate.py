@@ -4,15 +4,15 @@ from __future__ import annotations
 
 import json
 import os
+import pickle
 import signal
 import subprocess
-import sys
 import tempfile
 from collections.abc import Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, Literal
+from typing import Literal
 
 import fmpy
 from fmpy.validation import validate_fmu
@@ -21,11 +21,14 @@ from rich.console import Console
 from rich.table import Table
 from rich.text import Text
 
+from . import probe_fmi2
 from .archive import Workspace
 from .binary import library, names_of_platform
 from .errors import FmuFileError
-from .interface import Interface, Variable
+from .host_process import starting
+from .interface import Interface
 from .loading import load_fmu
+from .probe_slave import Task
 from .rules import broken_rules
 from .translate import is_pedantry
 
@@ -48,8 +51,6 @@ _SCHEMAS = {
     "2.0": "fmi2/fmi2ModelDescription.xsd",
     "3.0": "fmi3/fmi3ModelDescription.xsd",
 }
-_FMI_2_ONLY = ("reset", "order")
-"""Probes of bare calls, which other versions call otherwise."""
 
 
 @dataclass(frozen=True)
@@ -138,53 +139,20 @@ def _probed(interface: Interface, folder: Path, path: Path, timeout: float) -> l
         problems.append(f"{found.name} stands in binaries/{found.parent.name}, not in binaries/{here[0]}")
     problems = [f"{problem}: most importers need that" for problem in problems]
     findings = [_listed("binary", problems, f"for {', '.join(platforms)}")]
-    spec = _spec(interface, folder, found)
     with ThreadPoolExecutor(os.cpu_count() or 1) as pool:
-        answers = pool.map(lambda probe: _probe(probe, spec, folder.parent, timeout), PROBES)
+        answers = pool.map(lambda probe: _probe(probe, interface, folder, timeout), PROBES)
         findings += [_judged(title, answer, interface) for title, answer in zip(PROBES.values(), answers, strict=True)]
     return findings
 
 
-def _spec(interface: Interface, folder: Path, found: Path) -> dict[str, Any]:
-    """What a probe has to know."""
-    outputs: dict[str, list[tuple[str, int]]] = {}
-    for variable in interface.of("output"):
-        outputs.setdefault(variable.type, []).append((variable.name, variable.reference))
-    return {
-        "version": interface.version,
-        "folder": str(folder),
-        "library": str(found),
-        "guid": interface.guid,
-        "identifier": interface.identifier,
-        # pythonfmu passes even its errors on only while debug logging is on
-        "talks": "pythonfmu" in interface.generator.lower() or interface.vendor.get("kind") == "python",
-        "single": interface.single_instance,
-        "can_save": interface.can_save_state,
-        "can_serialize": interface.can_serialize_state,
-        "start_time": 0.0,
-        "step": interface.default_step or interface.vendor.get("recommended_step") or _DEFAULT_STEP,
-        "outputs": outputs,
-        "starts": [(v.type, v.name, v.reference, v.start) for v in interface.variables.values() if _has_start(v)],
-    }
-
-
-def _has_start(variable: Variable) -> bool:
-    return variable.causality in ("parameter", "input") and variable.start is not None
-
-
-def _probe(probe: str, spec: dict[str, Any], folder: Path, timeout: float) -> tuple[Verdict, str]:
-    place = Path(tempfile.mkdtemp(prefix=f"{probe}_", dir=folder))
-    answer = place / "answer.json"
-    trying = place / "trying.txt"
-    more = {"probe": probe, "answer": str(answer), "trying": str(trying)}
-    (place / "spec.json").write_text(json.dumps(spec | more), encoding="utf-8")
-    if spec["version"] == "2.0":
-        script = [str(Path(__file__).with_name("probe.py"))]
-    elif probe in _FMI_2_ONLY:
+def _probe(probe: str, interface: Interface, folder: Path, timeout: float) -> tuple[Verdict, str]:
+    if probe in probe_fmi2.PROBES and interface.version != "2.0":
         return "skipped", "tried with FMI 2.0 only"
-    else:
-        script = ["-m", f"{__package__}.probe_slave"]
-    command = [sys.executable, "-P", *script, str(place / "spec.json")]
+    place = Path(tempfile.mkdtemp(prefix=f"{probe}_", dir=folder.parent))
+    step = interface.default_step or interface.vendor.get("recommended_step") or _DEFAULT_STEP
+    task = Task(probe, interface, folder, step, answer=place / "answer.json", trying=place / "trying.txt")
+    (place / "task").write_bytes(pickle.dumps(task))
+    command = [*starting("probe"), str(place / "task")]
     with (place / "output.txt").open("wb") as output:
         process = subprocess.Popen(
             command, cwd=place, stdin=subprocess.DEVNULL, stdout=output, stderr=output, start_new_session=True
@@ -197,10 +165,10 @@ def _probe(probe: str, spec: dict[str, Any], folder: Path, timeout: float) -> tu
         except BaseException:
             _end(process)
             raise
-    if answer.is_file():
-        told = json.loads(answer.read_text(encoding="utf-8"))
+    if task.answer.is_file():
+        told = json.loads(task.answer.read_text(encoding="utf-8"))
         return told["verdict"], told["detail"]
-    at = f" at {trying.read_text(encoding='utf-8')}" if trying.is_file() else ""
+    at = f" at {task.trying.read_text(encoding='utf-8')}" if task.trying.is_file() else ""
     return "fail", f"it took its process down{at} ({_cause(code)}){_last_words(place / 'output.txt')}"
 
 
