@@ -291,6 +291,7 @@ def test_a_file_that_another_process_has_just_written_and_holds_is_taken(fresh_c
         build("ComfortCruise")
 
 
+@pytest.mark.long
 def test_processes_building_at_once_do_not_break_each_other(fresh_cache, sample):
     code = (
         "import sys, time, zipfile\nfrom railcosim.fmus.build import build\n"

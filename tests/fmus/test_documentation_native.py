@@ -184,7 +184,8 @@ def test_what_cannot_be_traced_is_said(write_component):
 # ---------------------------------------------------------------- reference signals
 
 
-@pytest.mark.parametrize("kind", ["native", pytest.param("python", marks=pytest.mark.long)])
+@pytest.mark.long
+@pytest.mark.parametrize("kind", ["native", "python"])
 @pytest.mark.parametrize("name", CATALOGUE)
 def test_an_importer_that_follows_the_files_gets_the_reference(name, kind, tmp_path):
     """FMPy, which knows nothing of us, reads settings and input, and arrives at the reference to rounding error."""

@@ -346,6 +346,7 @@ def test_the_runs_move_something(path):
     assert any(moved) or path in IDLE
 
 
+@pytest.mark.long
 def test_a_whole_scenario_gives_the_same_results_in_all_three_ways():
     """Wang et al. 2020: five trains, their controllers, target and gust, closed loop over 350 s."""
     runs = {kind: run(load(MODELS / "comfort_cruise.toml"), kind=kind) for kind in ("plain", "python", "native")}

@@ -933,6 +933,7 @@ def test_the_file_does_not_depend_on_the_locale_of_the_host(tmp_path, unpack):
 # ---------------------------------------------------------------- size
 
 
+@pytest.mark.long
 def test_a_model_of_thousands_of_values_runs(load, write_component):
     many = write_component(
         "from railcosim.components import Component, Input, Output, Size, State\n"

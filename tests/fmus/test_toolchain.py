@@ -456,6 +456,7 @@ def test_an_interrupted_native_build_leaves_nothing(fresh_cache, tmp_path, monke
     assert zipfile.ZipFile(build("Gust", kind="native")).testzip() is None
 
 
+@pytest.mark.long
 @needs_native
 def test_processes_building_natively_at_once_do_not_break_each_other(fresh_cache):
     code = (

@@ -163,7 +163,7 @@ def native():
 
 
 @ALGORITHMS
-@pytest.mark.parametrize("kind", [native(), "python"])
+@pytest.mark.parametrize("kind", [native(), pytest.param("python", marks=pytest.mark.long)])
 def test_a_whole_scenario(both, used, algorithm, kind):
     """350 s of the comfort scenario: real inputs one by one and side by side, a schedule, a gust, booleans."""
     result = both(load("comfort_cruise"), kind=kind, algorithm=algorithm)

@@ -531,6 +531,7 @@ else:
 """
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("thread", ["main", "thread"])
 @pytest.mark.parametrize("deed", ["step hang", "nothing"])
 def test_a_process_ends_with_its_master_even_inside_a_step(hostile, deed, thread, tmp_path):

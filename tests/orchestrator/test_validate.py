@@ -208,6 +208,7 @@ def test_leniency_of_another_maker_is_a_warning(lag):
     assert report.passed
 
 
+@pytest.mark.long
 @needs_compiler
 def test_an_fmu_that_hangs_is_ended(lag):
     begin = time.monotonic()

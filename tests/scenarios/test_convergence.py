@@ -13,7 +13,9 @@ import pytest
 case = runpy.run_path(str(Path(__file__).with_name("comfort_system.py")))
 STEPS = (1.0, 0.5, 0.25)
 CASES = pytest.mark.parametrize(
-    "law", [{"comfort": True, "gust": 0.5}, {"comfort": False, "gust": 0.0}], ids=["tanh with gust", "bottom layer"]
+    "law",
+    [pytest.param({"comfort": True, "gust": 0.5}, marks=pytest.mark.long), {"comfort": False, "gust": 0.0}],
+    ids=["tanh with gust", "bottom layer"],
 )
 
 
