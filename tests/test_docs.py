@@ -74,16 +74,9 @@ def run_page(page: Path, folder: Path) -> None:
                 assert same, f"{place}: {command} prints\n{got}\nand not\n{wanted}"
 
 
-LONG = ("own_controller.md", "linear_analysis.md")
-"""Pages whose commands take seconds: their turn is in the long tier."""
-
-
 @pytest.mark.skipif(sys.platform == "win32", reason="the pages speak to a POSIX shell")
-@pytest.mark.parametrize(
-    "page",
-    [pytest.param(p, marks=pytest.mark.long if p.name in LONG else ()) for p in PAGES if blocks(p)],
-    ids=lambda page: page.name,
-)
+@pytest.mark.long
+@pytest.mark.parametrize("page", [page for page in PAGES if blocks(page)], ids=lambda page: page.name)
 def test_what_a_page_shows_is_what_happens(
     page: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, session_cache: Path
 ) -> None:

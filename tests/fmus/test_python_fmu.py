@@ -93,7 +93,10 @@ def scalars(component, values):
 # ---------------------------------------------------------------- the same numbers as in plain Python
 
 
-@pytest.mark.parametrize(("step", "sampling"), [(STEP, 1), (STEP, 2), (0.1, 1), (0.1, 4)])
+@pytest.mark.parametrize(
+    ("step", "sampling"),
+    [(STEP, 2), *(pytest.param(*case, marks=pytest.mark.long) for case in ((STEP, 1), (0.1, 1), (0.1, 4)))],
+)
 def test_fmpy_gives_what_plain_python_gives(reference, unpack, built, step, sampling):
     """FMPy against components.simulate: the same bits where FMPy's arithmetic on time is exact, else 1e-12 of the
     signal's size.

@@ -81,7 +81,7 @@ def test_a_checkpoint_is_taken_and_resumed(hostile, tmp_path):
     assert contents(resume(tmp_path / "out", stop_time=5.0)) == contents(whole)
 
 
-@pytest.mark.parametrize("kind", ["native", "python"])
+@pytest.mark.parametrize("kind", ["native", pytest.param("python", marks=pytest.mark.long)])
 def test_a_whole_scenario(kind):
     system = load("comfort_cruise", stop_time=60.0)
     whole = run(system, kind=kind)

@@ -34,6 +34,7 @@ def test_couplers_neither_push_nor_pull_the_train_as_a_whole():
     assert masses @ train.derivatives()["vehicle_speed"] == pytest.approx(5e4, rel=1e-9)
 
 
+@pytest.mark.long
 def test_steady_traction_gives_the_tensions_of_a_rigid_train():
     """Once the modes have died out, every coupler carries what the rigid train's balance says."""
     train = CoupledSubwayTrain(**FREE)

@@ -185,6 +185,7 @@ def test_unusable_build_arguments(build, message):
         SubwayTrain(**build)
 
 
+@pytest.mark.long
 def test_integration_is_converged_at_the_default_step():
     """One departure at 0.9 m/s2: a step five times shorter changes the position by nothing that counts."""
 
