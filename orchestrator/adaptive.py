@@ -15,7 +15,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
-from .errors import CouplingError, FmuError, RunError, StoppedError
+from .errors import CouplingError, FmuError, LostError, RunError, StoppedError
 from .exchange import Exchange
 from .interface import Interface, Variable
 from .wiring import is_direct
@@ -188,7 +188,7 @@ class Adaptive:
 
 def _is_fatal(failure: RunError) -> bool:
     """Whether an FMU may not be called any more."""
-    return isinstance(failure, FmuError) and failure.status == "fatal"
+    return isinstance(failure, LostError) or (isinstance(failure, FmuError) and failure.status == "fatal")
 
 
 def _fit(time: float, wanted: float, until: float) -> tuple[float, float]:

@@ -67,6 +67,10 @@ class FmuError(RunError):
         return "\n".join([f"{head}{super().__str__()}", *lines])
 
 
+class LostError(FmuError):
+    """The process of an isolated FMU is gone: it crashed, hung or used too much memory."""
+
+
 class StoppedError(FmuError):
     """An FMU asks for the end of the simulation: no failure, but the end."""
 

@@ -16,7 +16,7 @@ from typing import Any
 
 from . import doorbell
 from .doorbell import Cells, frame
-from .errors import FmuError
+from .errors import FmuError, LostError
 from .host_process import HostLostError, HostProcess
 from .instances import call_name
 from .interface import Interface, Type
@@ -326,7 +326,7 @@ class IsolatedSlave:
         self.log = lost.log
         self.moment += 1
         time = self.time if self._is_made else None
-        self._lost = FmuError(str(lost), instance=self.name, time=time, log=lost.log)
+        self._lost = LostError(str(lost), instance=self.name, time=time, log=lost.log)
         return self._lost
 
     def _checked(self, report: dict[str, Any]) -> dict[str, Any]:

@@ -6,7 +6,7 @@ import math
 from collections.abc import Sequence
 from typing import Any
 
-from .errors import FmuError, ScenarioError
+from .errors import FmuError, LostError, ScenarioError
 from .exchange import Exchange
 from .loops import LoopSolver
 from .slave import Slave
@@ -35,6 +35,7 @@ def settle(exchange: Exchange, sequence: Sequence[Slave], time: float) -> list[i
 
     Raises:
         ScenarioError: no consistent values were found; the signals involved and the residual are named.
+        LostError: the process of an isolated FMU is gone.
     """
     values = exchange.values
     flushed = len(sequence) + 1  # sweeps after which every chain has settled, whatever the order
@@ -74,6 +75,8 @@ def _solve(exchange: Exchange, sequence: Sequence[Slave], time: float, moving: S
             worst = max(left, _largest_change(found, exchange.values))
             if worst <= _SOLVED:
                 return unknown
+    except LostError:
+        raise
     except (FmuError, ValueError, OverflowError) as error:
         raise ScenarioError(f"the initial values of {names} do not settle: {error}") from error
     raise ScenarioError(

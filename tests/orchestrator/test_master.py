@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from railcosim.orchestrator.errors import FmuError, ScenarioError
+from railcosim.orchestrator.errors import FmuError, LostError, ScenarioError
 from railcosim.orchestrator.master import Master
 from railcosim.orchestrator.run import run
 from railcosim.orchestrator.system import System
@@ -325,6 +325,15 @@ def test_a_loop_is_solved(system, gain, kind, algorithm):
 def test_a_contraction_is_solved_by_exchange_alone(system, monkeypatch):
     monkeypatch.setattr("railcosim.orchestrator.settling.LoopSolver.solve", lambda *_: pytest.fail("Newton was called"))
     assert go(loop(system, 0.5))["a.y"][0] == pytest.approx(2.0, abs=1e-11)
+
+
+def test_a_process_that_is_lost_while_a_loop_is_solved_is_no_matter_of_the_scenario(system, monkeypatch):
+    def lose(*_):
+        raise LostError("its process crashed", instance="a")
+
+    monkeypatch.setattr("railcosim.orchestrator.settling.LoopSolver.solve", lose)
+    with pytest.raises(LostError, match="a: its process crashed"):
+        go(loop(system, 2.0))
 
 
 def test_a_loop_with_two_unknowns_that_is_not_linear(system):
