@@ -283,6 +283,9 @@ def in_time():
     def late(*_):
         raise TimeoutError("the test hangs")
 
+    if not hasattr(signal, "SIGALRM"):  # on Windows
+        yield
+        return
     before = signal.signal(signal.SIGALRM, late)
     signal.alarm(90)
     yield

@@ -4,6 +4,7 @@ import contextlib
 import csv
 import io
 import json
+import os
 import re
 import signal
 import subprocess
@@ -449,6 +450,18 @@ def test_plot_draws_the_figures_of_a_run_again_or_chosen_signals(small: Path) ->
     record = json.loads((small / "out" / "run.json").read_text(encoding="utf-8"))
     (small / "out" / "run.json").write_text(json.dumps(record | {"figures_wanted": [{"y": "train.sped"}]}))
     assert "title is missing" in refused("plot", "out", folder=small)
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="file names are text there")
+def test_letters_that_a_pipe_or_utf_8_lacks_are_escaped(tmp_path: Path) -> None:
+    name = os.fsdecode(b"gr\xf6\xdfe.toml")  # Latin-1
+    (tmp_path / name).write_text(BARE.replace("A train", "Größe eines Zuges"), encoding="utf-8")
+    command = [*COMMAND, "run", name, "--kind", "plain", "-o", "out"]
+    place = os.environ | {"PYTHONIOENCODING": "ascii"}
+    done = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True, env=place, check=False)
+    assert (done.returncode, done.stderr.splitlines()[0]) == (OK, "gr??e: 10 % of 2 s")
+    assert "Gr\\xf6\\xdfe eines Zuges" in done.stdout
+    assert json.loads((tmp_path / "out" / "run.json").read_text(encoding="utf-8"))["path"] == name
 
 
 def test_new_says_what_to_type_next(tmp_path: Path) -> None:

@@ -150,6 +150,7 @@ RECORDED = st.recursive(
     lambda inner: st.lists(inner, max_size=2) | st.dictionaries(st.sampled_from(["title", "y", "x", "t.speed"]), inner),
     max_leaves=4,
 )
+FIGURES = RECORDED | st.fixed_dictionaries({}, optional=dict.fromkeys(("title", "y", "x", "panels"), RECORDED))
 KEYS = words("texts units parameters step stop_time status figures_wanted")
 TABLES = ["", "time\n", "time,t.speed\n1,x\n", "a,b\n1,2\n", "time,time\n1,2\n", "time,t.speed\n", "\0", "1\n2,"]
 HEADS = [b"", b"{}", b"\xff\n", b"[1]\n", b'{"columns": 3, "whole": []}\n', b'{"columns": "time", "whole": []}\n']
@@ -174,4 +175,6 @@ def test_results_that_somebody_has_edited_are_drawn_or_refused(explore, desk):
 
     missing = st.lists(KEYS, max_size=1)
     tables, blocks = st.sampled_from([None, *TABLES]), st.sampled_from([None, *BLOCKS])
-    explore(rule, st.dictionaries(KEYS, RECORDED, max_size=2), missing, tables, blocks, quick=30, deep=250)
+    wanted = st.fixed_dictionaries({"figures_wanted": st.lists(FIGURES, min_size=1, max_size=2)})
+    changes = st.dictionaries(KEYS, RECORDED, max_size=2) | wanted
+    explore(rule, changes, missing, tables, blocks, quick=30, deep=250)
