@@ -130,7 +130,8 @@ def run(
     threads: Annotated[
         int,
         typer.Option(
-            min=1, help="Threads that step instances in parallel: jacobi with compiled FMUs; pays for heavy FMUs only."
+            min=1,
+            help="Threads that step instances in parallel: jacobi with FMI 2.0 FMUs. Pays for many or heavy ones on idle cores.",
         ),
     ] = 1,
     checkpoint_every: Annotated[
