@@ -21,11 +21,11 @@ import time
 from pathlib import Path
 
 from railcosim.orchestrator import System, load
-from railcosim.orchestrator.archive import Workspace
-from railcosim.orchestrator.binary import forget_paths
-from railcosim.orchestrator.check import Checked, check
-from railcosim.orchestrator.master import Master, Rows
-from railcosim.orchestrator.results import Recorder
+from railcosim.orchestrator.fmi.archive import Workspace
+from railcosim.orchestrator.fmi.binding.libraries import forget_paths
+from railcosim.orchestrator.master.loop import Master, Rows
+from railcosim.orchestrator.run.checking import Checked, check
+from railcosim.orchestrator.run.results import Recorder
 
 GOALS = {
     "ten trips": 2.0,
@@ -90,7 +90,7 @@ def measured(name: str, repetitions: int) -> str:
 
 def whole(name: str, repetitions: int) -> str:
     """Wall and CPU time of ``orchestrate run NAME``, files written."""
-    code = "from railcosim.orchestrator.cli import main; main()"
+    code = "from railcosim.orchestrator.cli.app import main; main()"
     walls, cpus = [], []
     for _ in range(repetitions):
         with tempfile.TemporaryDirectory() as folder:

@@ -19,10 +19,10 @@ from pathlib import Path
 import fmpy
 from railcosim.components import CATALOGUE
 from railcosim.fmus.build import build
-from railcosim.orchestrator.archive import Workspace
-from railcosim.orchestrator.binary import library
-from railcosim.orchestrator.fmu import FmuSlave
-from railcosim.orchestrator.loading import load_fmu
+from railcosim.orchestrator.fmi.archive import Workspace
+from railcosim.orchestrator.fmi.binding.fmi2 import FmuSlave
+from railcosim.orchestrator.fmi.binding.libraries import library
+from railcosim.orchestrator.fmi.models import load_fmu
 
 HERE = Path(__file__).parent
 HEADERS = Path(fmpy.__file__).parent / "c-code"

@@ -20,13 +20,13 @@ from dataclasses import replace
 from pathlib import Path
 
 from railcosim.fmus.build import build
-from railcosim.orchestrator import compiled
-from railcosim.orchestrator.archive import Workspace
-from railcosim.orchestrator.check import check
-from railcosim.orchestrator.isolated import IsolatedSlave
-from railcosim.orchestrator.isolation import instantiate
-from railcosim.orchestrator.master import Master, Rows
-from railcosim.orchestrator.results import Recorder
+from railcosim.orchestrator.fmi.archive import Workspace
+from railcosim.orchestrator.isolation.choice import instantiate
+from railcosim.orchestrator.isolation.proxy import IsolatedSlave
+from railcosim.orchestrator.master import compiled
+from railcosim.orchestrator.master.loop import Master, Rows
+from railcosim.orchestrator.run.checking import check
+from railcosim.orchestrator.run.results import Recorder
 from railcosim.orchestrator.system import Algorithm, System
 from ring import HERE, light
 

@@ -13,8 +13,8 @@ import sys
 import time
 
 import numpy as np
-from railcosim.orchestrator import compiled
-from railcosim.orchestrator.run import run
+from railcosim.orchestrator.master import compiled
+from railcosim.orchestrator.run.execution import run
 from railcosim.orchestrator.system import System
 
 GOAL = 2.0

@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 from railcosim.orchestrator import System, run
-from railcosim.orchestrator.run import Run
+from railcosim.orchestrator.run.execution import Run
 
 STUCK = f"{Path(__file__).with_name('stuck_ato.py')}:StuckAto"
 WAIT, TRIP = 2.0, 190.0

@@ -22,7 +22,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from railcosim.orchestrator.run import run
+from railcosim.orchestrator.run.execution import run
 from railcosim.orchestrator.system import System
 
 PARTS = Path(__file__).with_name("braking_leader.py")

@@ -34,14 +34,14 @@ import fmpy
 import numpy as np
 from peers import PEERS, STEP, Candidate, Ring
 from railcosim.fmus.build import build
-from railcosim.orchestrator import compiled
-from railcosim.orchestrator.archive import Workspace
-from railcosim.orchestrator.check import check
-from railcosim.orchestrator.fmu import FmuSlave
-from railcosim.orchestrator.master import Master, Rows
-from railcosim.orchestrator.reader import read
-from railcosim.orchestrator.results import Recorder
-from railcosim.orchestrator.run import run
+from railcosim.orchestrator.fmi.archive import Workspace
+from railcosim.orchestrator.fmi.binding.fmi2 import FmuSlave
+from railcosim.orchestrator.fmi.reader import read_interface
+from railcosim.orchestrator.master import compiled
+from railcosim.orchestrator.master.loop import Master, Rows
+from railcosim.orchestrator.run.checking import check
+from railcosim.orchestrator.run.execution import run
+from railcosim.orchestrator.run.results import Recorder
 from railcosim.orchestrator.system import System
 
 HERE = Path(__file__).parent
@@ -333,7 +333,9 @@ def line(count: int, repetitions: int) -> None:
 
 def light(path: Path, folder: Path) -> Path:
     """The FMU with the library of light.c instead of its own."""
-    references = {v.name: v.reference for v in read(Path(fmpy.extract(str(path))), str(path)).variables.values()}
+    references = {
+        v.name: v.reference for v in read_interface(Path(fmpy.extract(str(path))), str(path)).variables.values()
+    }
     flags = [f"-D{name.upper()}={references[name]}" for name in ("u", "x", "rate")]
     library = compile_c(HERE / "light.c", folder / "light.so", *flags).read_bytes()
     target = folder / "Light.fmu"

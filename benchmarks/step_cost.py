@@ -23,11 +23,11 @@ from pathlib import Path
 
 from fmpy.fmi2 import FMU2Slave
 from railcosim.orchestrator import load
-from railcosim.orchestrator.archive import Workspace
-from railcosim.orchestrator.binary import forget_paths
-from railcosim.orchestrator.check import Checked, check
-from railcosim.orchestrator.master import Master, Rows
-from railcosim.orchestrator.results import Recorder
+from railcosim.orchestrator.fmi.archive import Workspace
+from railcosim.orchestrator.fmi.binding.libraries import forget_paths
+from railcosim.orchestrator.master.loop import Master, Rows
+from railcosim.orchestrator.run.checking import Checked, check
+from railcosim.orchestrator.run.results import Recorder
 from railcosim.orchestrator.system import System
 
 SCENARIO = "comfort_cruise"
@@ -157,7 +157,7 @@ def whole(repetitions: int, kinds: list[str]) -> None:
 
 
 def _run(kind: str, folder: Path) -> tuple[float, float]:
-    code = "from railcosim.orchestrator.cli import main; main()"
+    code = "from railcosim.orchestrator.cli.app import main; main()"
     command = [sys.executable, "-c", code, "run", SCENARIO, "--kind", kind, "-o", str(folder / "results")]
     environment = os.environ | {"RAILCOSIM_CACHE": str(folder / "cache")}
     before, begin = os.times(), time.perf_counter()

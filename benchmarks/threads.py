@@ -13,10 +13,10 @@ import os
 import statistics
 import time
 
-from railcosim.orchestrator.archive import Workspace
-from railcosim.orchestrator.check import check
-from railcosim.orchestrator.master import Master, Rows
-from railcosim.orchestrator.settings import Settings
+from railcosim.orchestrator.fmi.archive import Workspace
+from railcosim.orchestrator.master.loop import Master, Rows
+from railcosim.orchestrator.master.settings import Settings
+from railcosim.orchestrator.run.checking import check
 from railcosim.orchestrator.system import System
 
 STEP, STOP = 0.1, 1e6

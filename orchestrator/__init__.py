@@ -1,8 +1,7 @@
 """The master orchestrator: `System`, `load` and `run` are what a script needs."""
 
 from .errors import CouplingError, FmuError, FmuFileError, RailcosimError, RunError, ScenarioError
-from .results import Results
-from .run import Run, resume, run
+from .run import Results, Run, resume, run
 from .scenario import load
 from .system import Connection, Event, Instance, System
 

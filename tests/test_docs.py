@@ -39,7 +39,7 @@ def execute(command: str, folder: Path) -> tuple[int, str]:
     """Run a shell command with this Python and its ``orchestrate``; exit code, and what it prints on both streams."""
     (folder / "bin").mkdir(exist_ok=True)
     script = folder / "bin" / "orchestrate"
-    script.write_text(f"#!{sys.executable}\nfrom railcosim.orchestrator.cli import main\nmain()\n")
+    script.write_text(f"#!{sys.executable}\nfrom railcosim.orchestrator.cli.app import main\nmain()\n")
     script.chmod(0o755)
     if not (folder / "bin" / "python").exists():
         (folder / "bin" / "python").write_text(f'#!/bin/sh\nexec "{sys.executable}" "$@"\n')
@@ -123,7 +123,7 @@ def test_links_and_pictures_of_a_page_exist(page: Path) -> None:
 @pytest.mark.parametrize("page", PAGES, ids=lambda page: page.name)
 def test_every_command_a_page_mentions_is_one_of_orchestrate(page: Path) -> None:
     """`orchestrate new ...` in running text and tables: the command exists, and so do its options."""
-    from railcosim.orchestrator.cli import app
+    from railcosim.orchestrator.cli.app import app
     from typer.main import get_command
 
     known = get_command(app).commands  # type: ignore[attr-defined]

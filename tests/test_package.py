@@ -101,9 +101,9 @@ def test_the_wheel_runs_beside_folders_of_the_same_names(installed: Path, foreig
 def test_the_command_line_of_the_wheel_finds_its_scenarios(installed: Path, foreign: Path) -> None:
     """The command an entry point runs, from the foreign folder, models and all."""
     names = {path.stem for path in (ROOT / "models").glob("*.toml")}
-    listed = python("-m", "railcosim.orchestrator.cli", "list", folder=foreign, path=installed)
+    listed = python("-m", "railcosim.orchestrator.cli.app", "list", folder=foreign, path=installed)
     assert all(f"  {name}: " in listed for name in names)
-    checking = ("-m", "railcosim.orchestrator.cli", "check", "comfort_cruise_bottom_layer")
+    checking = ("-m", "railcosim.orchestrator.cli.app", "check", "comfort_cruise_bottom_layer")
     text = python(*checking, folder=foreign, path=installed)
     assert text.endswith("no errors\n")
 
@@ -139,7 +139,7 @@ def test_the_wheel_holds_what_fmus_are_made_of(wheel: Path) -> None:
 def test_the_command_starts_without_heavy_imports() -> None:
     """What only some runs need is imported when it is needed: figures, optimization, tables."""
     heavy = ("matplotlib", "scipy", "pandas", "casadi", "hypothesis")
-    code = f"import sys, railcosim.orchestrator.cli; print([name for name in {heavy!r} if name in sys.modules])"
+    code = f"import sys, railcosim.orchestrator.cli.app; print([name for name in {heavy!r} if name in sys.modules])"
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     assert done.stdout.strip() == "[]"
 

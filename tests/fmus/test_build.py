@@ -15,9 +15,9 @@ import pytest
 from railcosim.components import ComponentError, simulate
 from railcosim.fmus import build as build_module
 from railcosim.fmus.build import build, build_component, cache_folder, plain, resolve, write_archive
-from railcosim.orchestrator.archive import Workspace
 from railcosim.orchestrator.errors import FmuFileError
-from railcosim.orchestrator.loading import load_fmu
+from railcosim.orchestrator.fmi.archive import Workspace
+from railcosim.orchestrator.fmi.models import load_fmu
 
 USER = (
     "from railcosim.components import Component, Output\n\n\nclass C(Component):\n    y = Output('1')\n\n"

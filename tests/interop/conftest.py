@@ -13,9 +13,9 @@ import numpy as np
 import pytest
 from railcosim.fmus.build import native_problem, resolve
 from railcosim.orchestrator import load, run
-from railcosim.orchestrator.archive import Workspace
-from railcosim.orchestrator.check import check
-from railcosim.orchestrator.interface import Interface, Variable
+from railcosim.orchestrator.fmi.archive import Workspace
+from railcosim.orchestrator.fmi.interface import Interface, Variable
+from railcosim.orchestrator.run.checking import check
 
 TOOLS = ("fmpy", "libcosimpy", "ecospy", "fmu_manipulation_toolbox", "OMSimulator", "pyfmi")
 LEAST_IN_CI = 4

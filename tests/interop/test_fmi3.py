@@ -13,7 +13,7 @@ from fmpy.container_fmu.config import Component
 from fmpy.model_description import CoSimulation, ModelDescription, ModelVariable, Unknown
 from railcosim.fmus.build import build, native_problem, resolve
 from railcosim.orchestrator import System, run
-from railcosim.orchestrator.validate import PROBES, validate
+from railcosim.orchestrator.validation.report import PROBES, validate
 
 PROBLEM = native_problem(resolve("PointMassTrain"))
 pytestmark = [

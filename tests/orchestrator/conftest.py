@@ -14,21 +14,12 @@ from xml.sax.saxutils import quoteattr
 import fmpy
 import pytest
 import pythonfmu
-from railcosim.orchestrator.archive import Workspace
-from railcosim.orchestrator.loading import load_fmu
+from railcosim.orchestrator.fmi.archive import Workspace
+from railcosim.orchestrator.fmi.models import load_fmu
 
 _WRAPPER = next(
     (Path(pythonfmu.__file__).parent / "resources" / "binaries" / fmpy.platform).glob("*pythonfmu-export.*")
 )
-
-_HEAD = """from railcosim.components import Component, Data, Input, Memory, Noise, Output, Parameter, Size, State, maths
-
-
-class Base(Component):
-    pass
-
-
-"""
 
 _SLAVE = '''import math
 
@@ -100,17 +91,6 @@ def own_cache(session_cache):
 def workspace():
     with Workspace() as place:
         yield place
-
-
-@pytest.fixture
-def components(tmp_path):
-    """Write a user's component file; gives a function from class name to reference."""
-
-    def write(body, name="mine.py"):
-        (tmp_path / name).write_text(_HEAD + body, encoding="utf-8")
-        return lambda cls: f"{tmp_path / name}:{cls}"
-
-    return write
 
 
 def variable(name, causality, kind="Real", start=None, dependencies=None, **attributes):
@@ -187,7 +167,7 @@ def xml():
     return {"variable": variable, "description": description, "write_archive": write_archive}
 
 
-HERE = Path(__file__).parent
+FOREIGN = Path(__file__).parent / "foreign"
 GCC = shutil.which("gcc")
 
 
@@ -201,7 +181,7 @@ def compile_c(tmp_path_factory):
             pytest.skip("FMUs by hand need gcc")
         if name not in made:
             target = tmp_path_factory.mktemp("c") / f"{name}{fmpy.sharedLibraryExtension}"
-            subprocess.run([GCC, "-shared", "-fPIC", "-O1", HERE / name, "-o", target, "-lm"], check=True)
+            subprocess.run([GCC, "-shared", "-fPIC", "-O1", FOREIGN / name, "-o", target, "-lm"], check=True)
             made[name] = target.read_bytes()
         return made[name]
 
@@ -215,7 +195,7 @@ def by_hand(compile_c, tmp_path):
 
     def pack(version, *changes, library=None, name=None):
         identifier, platform = facts[version]
-        text = (HERE / f"fmi{version}.xml").read_text(encoding="utf-8")
+        text = (FOREIGN / f"fmi{version}.xml").read_text(encoding="utf-8")
         for old, new in changes:
             assert old in text
             text = text.replace(old, new)

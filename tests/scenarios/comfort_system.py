@@ -4,7 +4,7 @@ Load it by its path; it needs no scenario file, so that what is tested is the ma
 """
 
 import numpy as np
-from railcosim.orchestrator.run import run
+from railcosim.orchestrator.run.execution import run
 from railcosim.orchestrator.system import System
 
 

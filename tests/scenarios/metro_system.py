@@ -4,7 +4,7 @@ Load it by its path; it needs no scenario file, so that sampling, delay and faul
 """
 
 import numpy as np
-from railcosim.orchestrator.run import run
+from railcosim.orchestrator.run.execution import run
 from railcosim.orchestrator.system import System
 
 AS_STATED = {"learning_gain": [100.0, 0.01, 0.01], "limit_estimate": False}

@@ -1,7 +1,7 @@
 """The published case of the laws of Huang et al. 2022 as a `System` by hand, held against the reference solution."""
 
 import numpy as np
-from railcosim.orchestrator.run import run
+from railcosim.orchestrator.run.execution import run
 from railcosim.orchestrator.system import System
 
 

@@ -3,9 +3,10 @@
 import json
 
 import pytest
-from railcosim.orchestrator import checkpoint, load
-from railcosim.orchestrator.run import go_on, run
-from railcosim.orchestrator.scenario import shipped
+from railcosim.orchestrator import load
+from railcosim.orchestrator.run import checkpoint
+from railcosim.orchestrator.run.execution import go_on, run
+from railcosim.orchestrator.scenario.loading import shipped
 from railcosim.orchestrator.system import Event
 
 SHORT, TRIPS = 40.0, 450.0
@@ -25,7 +26,7 @@ def test_a_resumed_run_has_the_same_results(name, tmp_path):
     one = run(system, output=whole, figures=False)
     assert one.status == "completed"
     run(system, output=parts, figures=False, checkpoint_every=middle)
-    point = checkpoint.read(parts)
+    point = checkpoint.read_checkpoint(parts)
     assert point.time == pytest.approx(middle)
     again = go_on(parts, figures=False)
     assert again.status == "completed"

@@ -11,8 +11,8 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from railcosim.orchestrator.linearize import linearize
-from railcosim.orchestrator.run import run
+from railcosim.orchestrator.linearization.closed_loop import linearize
+from railcosim.orchestrator.run.execution import run
 
 comfort_system = runpy.run_path(str(Path(__file__).with_name("comfort_system.py")))["comfort_system"]
 pytest.importorskip("casadi")

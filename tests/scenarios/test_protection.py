@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from railcosim.components import Protection
 from railcosim.fmus.build import native_problem
-from railcosim.orchestrator.run import run
+from railcosim.orchestrator.run.execution import run
 from railcosim.orchestrator.system import System
 
 pytestmark = pytest.mark.skipif(bool(native_problem(Protection)), reason="many steps take minutes without native FMUs")

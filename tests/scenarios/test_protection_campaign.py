@@ -6,7 +6,7 @@ import sys
 from pathlib import Path
 
 import pytest
-from railcosim.orchestrator.run import evaluate
+from railcosim.orchestrator.run.execution import evaluate
 
 BENCHMARKS = Path(__file__).parents[2] / "benchmarks"
 

@@ -12,7 +12,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from railcosim.orchestrator.errors import CouplingError, FmuError
-from railcosim.orchestrator.run import run
+from railcosim.orchestrator.run.execution import run
 from railcosim.orchestrator.system import System
 
 HERE = Path(__file__).parent

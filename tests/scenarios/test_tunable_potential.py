@@ -11,7 +11,7 @@ import pytest
 from railcosim.components import CATALOGUE
 from railcosim.fmus.build import native_problem
 from railcosim.orchestrator import load, run
-from railcosim.orchestrator.cli import call
+from railcosim.orchestrator.cli.app import call
 
 LAWS = ("FixedDistanceCruise", "RangePotentialCruise", "TunablePotentialCruise")
 helpers = runpy.run_path(str(Path(__file__).with_name("platoon_system.py")))

@@ -1,0 +1,128 @@
+"""FMUs to keep, for other tools: built, copied to a folder whole or not at all, and listed with their checksums."""
+
+from __future__ import annotations
+
+import hashlib
+import os
+import shutil
+import tempfile
+import time
+from collections.abc import Callable, Mapping, Sequence
+from pathlib import Path
+from typing import Any, Literal
+
+from ..components import ComponentError
+from ..components.tracing import TracingError
+from . import toolchain
+from .build import build, native_problem, resolve
+from .description import Kind
+from .toolchain import CompilerError
+
+CHECKSUMS = "SHA256SUMS"
+
+
+def release(
+    references: Sequence[str],
+    arguments: Mapping[str, Any],
+    directory: Path,
+    *,
+    kind: Literal["auto", "native", "python"] = "auto",
+    platforms: Sequence[str] = (),
+    checksums: bool = False,
+    tell: Callable[[str], None] = lambda line: None,
+) -> list[Path]:
+    """Build components and copy their FMUs to a folder.
+
+    Args:
+        references: catalogue names or ``"file.py:Class"``.
+        arguments: build arguments, for all of them.
+        directory: made if it is not there.
+        kind: ``"auto"`` is native where that is possible, and tells why where it is not.
+        platforms: of native FMUs, keys of `toolchain.PLATFORMS` or ``all``; this machine's by default.
+        checksums: whether to write `CHECKSUMS`, which ``sha256sum -c`` checks.
+        tell: takes a line on each FMU's progress.
+
+    Returns:
+        What was written.
+
+    Raises:
+        ComponentError: two components of one name, or platforms asked of a Python FMU.
+        ComponentError: a component cannot be built; what was built before it stays.
+    """
+    _check(references, kind, platforms)
+    chosen = toolchain.chosen(platforms)
+    directory.mkdir(parents=True, exist_ok=True)
+    listing = directory / CHECKSUMS
+    if checksums:
+        listing.unlink(missing_ok=True)  # it would not fit the new FMUs if this is interrupted
+    if kind != "python" and chosen != (toolchain.here(),):
+        tell("cross-compiling with ziglang: its first build for Windows takes about a minute")
+    written: list[Path] = []
+    for count, reference in enumerate(references, start=1):
+        begin = time.perf_counter()
+        source, made, problem = package(reference, arguments, kind, platforms)
+        target = directory / source.name
+        _copy(source, target)
+        written.append(target)
+        note = f", not a native one: {problem}" if problem else ""
+        what = f"native, {' '.join(chosen)}" if made == "native" else f"a Python FMU{note}"
+        cost = f"{time.perf_counter() - begin:.1f} s, {target.stat().st_size / 1000:.0f} kB"
+        tell(f"[{count}/{len(references)}] {target.stem}: {what} ({cost})")
+    if checksums:
+        lines = (f"{hashlib.sha256(path.read_bytes()).hexdigest()}  {path.name}\n" for path in sorted(written))
+        listing.write_text("".join(lines), encoding="utf-8", newline="\n")
+        written.append(listing)
+    return written
+
+
+def package(
+    reference: str,
+    arguments: Mapping[str, Any],
+    kind: Literal["auto", "native", "python"],
+    platforms: Sequence[str] = (),
+) -> tuple[Path, Kind, str]:
+    """The FMU of a component in the cache, its kind, and why it is not native if that was left open."""
+    if kind != "auto":
+        return build(reference, arguments, kind=kind, platforms=platforms), kind, ""
+    component = resolve(reference)
+    problem = native_problem(component)
+    if platforms and not component.requires:
+        problem = ""  # asked for by name: what is missing is an error then, not a reason for another kind
+    if not problem:
+        try:
+            return build(reference, arguments, kind="native", platforms=platforms), "native", ""
+        except TracingError as error:
+            problem = str(error).splitlines()[0]
+        except CompilerError as error:
+            if platforms:
+                raise
+            problem = str(error).splitlines()[0]
+    return build(reference, arguments, kind="python"), "python", problem
+
+
+def default_directory() -> Path:
+    """``fmus/dist`` in a checkout, the current folder elsewhere."""
+    checkout = Path("fmus/build.py").is_file() and Path("pyproject.toml").is_file()
+    return Path("fmus/dist") if checkout else Path()
+
+
+def _check(references: Sequence[str], kind: str, platforms: Sequence[str]) -> None:
+    if kind == "python" and platforms:
+        raise ComponentError("--platforms is for native FMUs; a Python FMU always carries linux64 and win64")
+    names: dict[str, str] = {}
+    for reference in references:
+        name = resolve(reference).__name__
+        if names.setdefault(name, reference) != reference:
+            raise ComponentError(f"{names[name]} and {reference} would both be written to {name}.fmu; build them apart")
+
+
+def _copy(source: Path, target: Path) -> None:
+    handle, name = tempfile.mkstemp(suffix=".part", dir=target.parent)
+    os.close(handle)
+    try:
+        shutil.copyfile(source, name)
+        os.chmod(name, 0o644)
+        os.replace(name, target)
+    except BaseException:
+        Path(name).unlink(missing_ok=True)
+        raise

@@ -1,0 +1,7 @@
+"""``orchestrate``: the command line."""
+
+from .app import main
+
+__all__ = [
+    "main",
+]

@@ -1,0 +1,5 @@
+"""``python -m railcosim.orchestrator.cli``."""
+
+from . import main
+
+main()

@@ -1,0 +1,161 @@
+"""Commands of ``orchestrate`` that compare and analyse; `cli` registers them."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from ..comparison import compare as compare_systems
+from ..comparison import read_directions, variants
+from . import console
+from .comparison import show_comparison
+from .options import (
+    FAILED,
+    FMU_FAILED,
+    INTERRUPTED,
+    OK,
+    Kind,
+    KindName,
+    Preset,
+    Quiet,
+    Scenario,
+    Set,
+    Step,
+    Stop,
+    Swap,
+    With,
+    load_system,
+)
+
+Scenarios = Annotated[
+    list[str], typer.Argument(metavar="SCENARIO...", help="Shipped scenarios (see 'orchestrate list'), or .toml files.")
+]
+
+
+def compare(
+    scenarios: Scenarios,
+    *,
+    presets: Annotated[
+        list[str] | None, typer.Option("--preset", help="Add a variant: the scenario under this preset; repeatable.")
+    ] = None,
+    swaps: Annotated[
+        list[str] | None,
+        typer.Option("--swap", help="Add a variant with another model: cruise=OtherComponent; repeatable."),
+    ] = None,
+    settings: Set = None,
+    builds: With = None,
+    stop: Stop = None,
+    step: Step = None,
+    directions: Annotated[
+        list[str] | None,
+        typer.Option("--better", help="What is better, where the metric does not say: gap_at_end=larger; repeatable."),
+    ] = None,
+    kind: Kind = KindName.auto,
+    output: Annotated[
+        Path | None, typer.Option("--output", "-o", help="Directory; results/compare-<scenarios> by default.")
+    ] = None,
+    no_figures: Annotated[bool, typer.Option("--no-figures", help="Draw nothing.")] = False,
+    quiet: Quiet = False,
+) -> None:
+    """Run variants side by side: one table of metrics, a winner per row, overlaid figures.
+
+    Variants: each SCENARIO as it stands, then under each --preset, then with each --swap. Several changes to one
+    variant are parted by commas: --swap cruise=A,train=B. Exit codes: 0 fine; 1 a requirement failed in a variant; 2
+    the input is wrong; 3 a variant failed; 130 interrupted.
+    """
+    systems = variants(
+        scenarios,
+        presets=presets or (),
+        swaps=swaps or (),
+        settings=settings or (),
+        builds=builds or (),
+        stop_time=stop,
+        step=step,
+    )
+    names = dict.fromkeys(system.name for system in systems.values())
+    metrics = {name: text for system in systems.values() for name, text in system.metrics.items()}
+    directory = output or Path("results") / "-".join(["compare", *names])
+    comparison = compare_systems(
+        systems,
+        kind=kind.value,
+        output=directory,
+        figures=not no_figures,
+        directions=read_directions(directions or (), metrics),
+        progress=lambda name, start: console.progress(name, quiet, start),
+    )
+    show_comparison(comparison, quiet)
+    if comparison.interrupted:
+        raise typer.Exit(INTERRUPTED)
+    if comparison.broken:
+        raise typer.Exit(FMU_FAILED)
+    raise typer.Exit(FAILED if comparison.requirement_failed else OK)
+
+
+def linearize(
+    scenario: Scenario,
+    *,
+    at: Annotated[float, typer.Option("--at", help="Time of the run to linearize at, s: a communication point.")],
+    inputs: Annotated[
+        list[str] | None,
+        typer.Option(
+            help="Inputs of the model: train[1].disturbance,target.value; disturbances and sources by default."
+        ),
+    ] = None,
+    outputs: Annotated[
+        list[str] | None, typer.Option(help="Outputs of the model: train[:].speed; all shown states by default.")
+    ] = None,
+    sampled: Annotated[
+        bool, typer.Option("--sampled", help="The model of one communication step, also of a continuous system.")
+    ] = False,
+    duration: Annotated[float | None, typer.Option(help="Length of the step responses in s.")] = None,
+    preset: Preset = None,
+    settings: Set = None,
+    builds: With = None,
+    swaps: Swap = None,
+    step: Step = None,
+    kind: Kind = KindName.auto,
+    output: Annotated[
+        Path | None, typer.Option("--output", "-o", help="Directory; results/<scenario>-linear by default.")
+    ] = None,
+    no_figures: Annotated[bool, typer.Option("--no-figures", help="Draw nothing.")] = False,
+    quiet: Quiet = False,
+) -> None:
+    """Linearize the closed loop at a time of a run: eigenvalues, stability, step and Bode figures, string stability.
+
+    Exit codes: 0 stable (string stability is told, not judged); 1 not stable; 2 the input is wrong; 3 an FMU failed.
+    """
+    # SciPy, which only this command needs, would slow every other one down.
+    from ..linearization import (  # noqa: PLC0415
+        draw_linear,
+        stability,
+        string_stability,
+    )
+    from ..linearization import linearize as linearize_system  # noqa: PLC0415
+    from .linear import show_linear, write_linear  # noqa: PLC0415
+
+    if duration is not None and not 0.0 < duration < float("inf"):
+        raise typer.BadParameter("it must be a positive time in s.", param_hint="'--duration'")
+    system = load_system(scenario, preset, settings, builds, swaps, step=step)
+    with console.progress(system.name, quiet, system.start_time) as progress:
+        model = linearize_system(
+            system,
+            at,
+            inputs=inputs or (),
+            outputs=outputs or (),
+            kind=kind.value,
+            sampled=sampled,
+            progress=progress,
+        )
+    found, passings = stability(model), string_stability(model)
+    directory = output or Path("results") / "-".join(filter(None, (system.name, preset, "linear")))
+    directory.mkdir(parents=True, exist_ok=True)
+    write_linear(directory, model, found, passings)
+    figures = [] if no_figures else draw_linear(model, found, passings, directory, duration=duration)
+    if not quiet:
+        out = console.console()
+        show_linear(out, model, found, passings)
+        drawn = f", {len(figures)} figure{'s' * (len(figures) > 1)}" if figures else ""
+        console.say(out, f"Files in {directory}: linear.json{drawn}", whole=True)
+    raise typer.Exit(OK if found.verdict == "stable" else FAILED)

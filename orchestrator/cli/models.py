@@ -1,0 +1,157 @@
+"""The commands of ``orchestrate`` that are about models: describe, build, pack, validate, new. `cli` registers them."""
+
+from __future__ import annotations
+
+import shlex
+import sys
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from ...components import CATALOGUE
+from ...fmus.build import build as build_fmu
+from ...fmus.release import default_directory, release
+from ..errors import ScenarioError
+from ..fmi import Workspace, load_fmu
+from ..packing import pack as pack_system
+from ..validation import TIMEOUT, show_report
+from ..validation import validate as validate_fmu
+from . import console
+from .options import (
+    FAILED,
+    OK,
+    Algorithm,
+    PackagingName,
+    Preset,
+    Quiet,
+    Scenario,
+    Set,
+    Step,
+    Stop,
+    Swap,
+    With,
+    build_arguments,
+    load_system,
+)
+from .skeleton import write_skeleton
+
+
+def describe(
+    model: Annotated[str, typer.Argument(help="A component's name, my_file.py:Class, or the path of any FMU.")],
+    builds: Annotated[list[str] | None, typer.Option("--with", help="Give a build argument: carriages=8.")] = None,
+) -> None:
+    """Show the interface of a component or of any FMU.
+
+    Variables by causality, with units, start values and direct dependencies; build arguments; where it comes from.
+    """
+    arguments = build_arguments(builds)
+    if model.endswith(".fmu") and arguments:
+        raise ScenarioError(f"{model} is built already; it takes no --with {', '.join(arguments)}")
+    path = Path(model) if model.endswith(".fmu") else build_fmu(model, arguments)
+    with Workspace() as workspace:
+        interface = load_fmu(path, workspace).interface
+    out = console.console()
+    vendor = interface.vendor
+    console.say(out, interface.model, "bold")
+    facts = {
+        "": interface.description,
+        "note": vendor.get("note", ""),
+        "source": vendor.get("source", ""),
+        "build arguments": ", ".join(f"{k} = {v!r}" for k, v in vendor.get("arguments", {}).items()),
+        "digest": vendor.get("digest", ""),
+        "kind": f"{vendor['kind']}: {vendor['kind_note']}" if vendor else "",
+        "FMI": interface.version,
+        "made with": interface.generator,
+        "guid": interface.guid,
+        "default step": "" if interface.default_step is None else f"{interface.default_step:g} s",
+        "saves its state": "yes" if interface.can_save_state else "no",
+    }
+    for label, fact in facts.items():
+        if fact:
+            console.say(out, f"{label}: {fact}" if label else fact)
+    for warning in interface.warnings:
+        console.say(out, f"warning: {warning}", "yellow")
+    console.show_interface(out, interface)
+
+
+def build(
+    names: Annotated[list[str] | None, typer.Argument(help="Component names or my_file.py:Class.")] = None,
+    *,
+    every: Annotated[bool, typer.Option("--all", help="Build the whole catalogue, with SHA256SUMS.")] = False,
+    builds: Annotated[list[str] | None, typer.Option("--with", help="Give a build argument: carriages=8.")] = None,
+    kind: Annotated[
+        PackagingName, typer.Option(help="native: compiled C; python: Python FMUs; auto: native if possible.")
+    ] = PackagingName.auto,
+    platforms: Annotated[
+        str | None,
+        typer.Option(
+            help="Of native FMUs: all, or some of linux64,win64,darwin64,aarch64-linux; this machine's by default."
+        ),
+    ] = None,
+    output: Annotated[Path | None, typer.Option("--output", "-o", help="Directory for the FMUs.")] = None,
+    quiet: Quiet = False,
+) -> None:
+    """Build FMUs to keep, for other tools or for --swap; prints the files it wrote."""
+    wanted = [*(names or []), *(CATALOGUE if every else [])]
+    if not wanted:
+        raise ScenarioError(f"name the components to build, or --all; there is {', '.join(CATALOGUE)}")
+    written = release(
+        tuple(dict.fromkeys(wanted)),
+        build_arguments(builds),
+        output or default_directory(),
+        kind=kind.value,
+        platforms=[name.strip() for name in (platforms or "").split(",") if name.strip()],
+        checksums=every,
+        tell=(lambda line: None) if quiet else (lambda line: print(line, file=sys.stderr, flush=True)),
+    )
+    for path in written:
+        print(path)
+
+
+def pack(
+    scenario: Scenario,
+    output: Annotated[Path, typer.Option("--output", "-o", help="The FMU to write, such as platoon.fmu.")],
+    *,
+    expose: Annotated[
+        list[str] | None,
+        typer.Option(help="What to show: train[:].speed,gust.size; all outputs of the trains by default."),
+    ] = None,
+    preset: Preset = None,
+    settings: Set = None,
+    builds: With = None,
+    swaps: Swap = None,
+    stop: Stop = None,
+    step: Step = None,
+    algorithm: Algorithm = None,
+    platforms: Annotated[
+        str | None, typer.Option(help="all, or some of linux64,win64,darwin64; this machine's by default.")
+    ] = None,
+) -> None:
+    """Write one FMU that holds a whole scenario, for another tool to run as a block."""
+    system = load_system(scenario, preset, settings, builds, swaps, stop=stop, step=step, algorithm=algorithm)
+    packed = pack_system(system, output, expose=expose or (), platforms=(platforms or "").split(","))
+    out = console.console()
+    for note in console.folded(packed.notes):
+        console.say(out, f"note: {note}", "yellow")
+    shown = f"{len(packed.exposed)} variables, for {', '.join(packed.platforms)}"
+    console.say(out, f"{packed.path}: {len(system.instances)} FMUs as one, {shown}", whole=True)
+
+
+def validate(
+    fmu: Annotated[Path, typer.Argument(help="Any FMI co-simulation FMU, ours or not.")],
+    timeout: Annotated[float, typer.Option(min=0.1, help="Longest time for one probe, in s.")] = TIMEOUT,
+) -> None:
+    """Check any FMU: archive, description, and probes that cannot take this program down.
+
+    Exit codes: 0 nothing failed; 1 something did; 2 the file is no FMU that could be used.
+    """
+    report = validate_fmu(fmu, timeout=timeout)
+    show_report(console.console(), report)
+    raise typer.Exit(OK if report.passed else FAILED)
+
+
+def new(path: Annotated[Path, typer.Argument(help="The file to write, such as my_controller.py.")]) -> None:
+    """Write a commented controller to start from; it runs."""
+    name = write_skeleton(path)
+    print(f"{path} written. Try it:\n  orchestrate run comfort_cruise --swap cruise={shlex.quote(f'{path}:{name}')}")

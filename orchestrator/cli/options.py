@@ -1,0 +1,109 @@
+"""What the commands of ``orchestrate`` share: exit codes, and the options that several of them take."""
+
+from __future__ import annotations
+
+from enum import StrEnum
+from typing import Annotated, Any
+
+import typer
+
+from ..errors import ScenarioError
+from ..scenario import load, parse_value
+from ..system import System
+
+OK, FAILED, WRONG_INPUT, FMU_FAILED, INTERRUPTED = 0, 1, 2, 3, 130
+
+
+class KindName(StrEnum):
+    """`loading.KINDS`, as the command line needs them."""
+
+    auto = "auto"
+    native = "native"
+    python = "python"
+    plain = "plain"
+
+
+class PackagingName(StrEnum):
+    """The kinds of FMU that can be built, as the command line needs them."""
+
+    auto = "auto"
+    native = "native"
+    python = "python"
+
+
+class AlgorithmName(StrEnum):
+    """`system.ALGORITHMS`, as the command line needs them."""
+
+    gauss_seidel = "gauss-seidel"
+    jacobi = "jacobi"
+    iterative = "iterative"
+    adaptive = "adaptive"
+
+
+Scenario = Annotated[
+    str, typer.Argument(metavar="SCENARIO", help="A shipped scenario (see 'orchestrate list'), or a .toml file.")
+]
+Preset = Annotated[str | None, typer.Option(help="Apply a preset of the scenario.")]
+Set = Annotated[
+    list[str] | None,
+    typer.Option("--set", help="Set a parameter or start value: train[4].speed=10."),
+]
+With = Annotated[list[str] | None, typer.Option("--with", help="Give a build argument: train.carriages=8.")]
+Swap = Annotated[
+    list[str] | None,
+    typer.Option("--swap", help="Put in another model: cruise=other.fmu, or OtherComponent, or my_file.py:Class."),
+]
+Stop = Annotated[float | None, typer.Option(help="Stop time in s.")]
+Step = Annotated[float | None, typer.Option(help="Communication step in s; sample times equal to it follow.")]
+Algorithm = Annotated[AlgorithmName | None, typer.Option(help="How the instances exchange values.")]
+Kind = Annotated[
+    KindName,
+    typer.Option(
+        help="native: compiled FMUs; python: Python FMUs; plain: Python objects, to debug; auto: native if possible."
+    ),
+]
+Isolate = Annotated[
+    list[str] | None,
+    typer.Option(
+        "--isolate",
+        metavar="NAME",
+        help="Run an instance, a group such as 'train', or 'all' in processes of their own: a crash there ends no more "
+        "than the run.",
+    ),
+]
+Quiet = Annotated[bool, typer.Option("--quiet", "-q", help="Print nothing but errors.")]
+
+
+def build_arguments(builds: list[str] | None) -> dict[str, Any]:
+    """``carriages=8`` as on every command line: the value is TOML, or text."""
+    arguments: dict[str, Any] = {}
+    for text in builds or []:
+        name, equals, value = text.partition("=")
+        if not equals or not name:
+            raise ScenarioError(f"--with {text}: write NAME=VALUE, as in --with carriages=8")
+        arguments[name.strip()] = parse_value(value)
+    return arguments
+
+
+def load_system(
+    scenario: str,
+    preset: str | None,
+    settings: list[str] | None,
+    builds: list[str] | None,
+    swaps: list[str] | None,
+    *,
+    stop: float | None = None,
+    step: float | None = None,
+    algorithm: AlgorithmName | None = None,
+) -> System:
+    """The scenario as the options of a command change it."""
+    return load(
+        scenario,
+        preset=preset,
+        settings=settings or (),
+        builds=builds or (),
+        swaps=swaps or (),
+        stop_time=stop,
+        step=step,
+        algorithm=algorithm.value if algorithm else None,
+    )

@@ -1,0 +1,340 @@
+"""Named figures of merit: expressions over reducers, which turn recorded signals into one number.
+
+Every reducer is defined in `docs/metrics.md`. They see the recorded points only. Over several rows (`train[:].speed`)
+a reducer gives one number for the whole. NaN in the window gives NaN; a window the run does not cover is an error
+(`WindowError`), never a number.
+"""
+
+from collections.abc import Callable, Collection, Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..errors import ExpressionError, WindowError
+from .expressions import ELEMENTWISE, Expression, Function, Signals, parse
+from .platoon import PLATOON
+from .syntax import Call, Node, Number, Operation, Reference
+from .time_windows import Window, scalar, time_windows, window_of
+
+Array = NDArray[np.float64]
+
+COMFORT_TITLE = "quasi-static acceleration compared with the ISO 2631-1 reaction scale (as in the source)"
+# Level, lowest and highest value [m/s2], wording. ISO 2631-1:1997 Annex C as quoted by Wang et al. 2020: the bands
+# overlap on purpose. Levels 2 to 5 include both ends, 1 and 6 exclude theirs.
+COMFORT_SCALE = (
+    (1, 0.0, 0.315, "not uncomfortable"),
+    (2, 0.315, 0.63, "a little uncomfortable"),
+    (3, 0.5, 1.0, "fairly uncomfortable"),
+    (4, 0.8, 1.6, "uncomfortable"),
+    (5, 1.25, 2.5, "very uncomfortable"),
+    (6, 2.0, np.inf, "extremely uncomfortable"),
+)
+
+
+def _largest(values: Array) -> float:
+    """The value of largest magnitude with its sign: one number for rows that each have one."""
+    return float(values[np.argmax(np.abs(values))])
+
+
+def _spread(window: Window) -> float:
+    return float((window.kept.max(axis=0) - window.kept.min(axis=0)).max())
+
+
+def _duration(window: Window) -> float:
+    return float(replace(window, rows=(window.rows != 0).astype(np.float64)).integral().max())
+
+
+def _rms(window: Window) -> float:
+    return float(np.sqrt(replace(window, rows=np.square(window.rows)).mean().max()))
+
+
+def _plain(rule: Callable[[Window], Any]) -> Callable[..., float]:
+    """The common form of a reducer: one signal and the three window arguments."""
+
+    def reducer(signals: Signals, x: Any, *, after: Any = None, until: Any = None, outside: Any = None) -> float:
+        return window_of(signals, x, after, until, outside).reduce(rule)
+
+    return reducer
+
+
+def _traction_energy(
+    signals: Signals, force: Array, speed: Array, *, after: Any = None, until: Any = None, outside: Any = None
+) -> float:
+    window = window_of(signals, np.maximum(force * speed, 0.0), after, until, outside)
+    return window.reduce(lambda w: w.integral().sum())
+
+
+def _braking_energy(
+    signals: Signals, force: Array, speed: Array, *, after: Any = None, until: Any = None, outside: Any = None
+) -> float:
+    return _traction_energy(signals, -force, speed, after=after, until=until, outside=outside)
+
+
+def _at(signals: Signals, x: Any, t: Any) -> float:
+    moment, time = scalar(t, "the time of at(x, t)"), signals.time
+    slack = 1e-6 * signals.step
+    if not time.size or not time[0] - slack <= moment <= time[-1] + slack:
+        raise WindowError(f"no recorded points around t = {moment:g} s")
+    values = np.array([np.interp(moment, time, row) for row in window_of(signals, x).rows])
+    return np.nan if np.isnan(values).any() else _largest(values)
+
+
+def _settling_time(
+    signals: Signals, x: Any, band: Any, *, after: Any = None, until: Any = None, outside: Any = None
+) -> float:
+    limit = scalar(band, "the band of settling_time")
+
+    def settled(window: Window) -> float:
+        times = window.time[window.points]
+        beyond = np.flatnonzero((np.abs(window.kept) > limit).any(axis=0))
+        first = int(beyond[-1]) + 1 if beyond.size else 0
+        return float(times[first]) if first < times.size else np.inf
+
+    return window_of(signals, x, after, until, outside).reduce(settled)
+
+
+def _overshoot(
+    signals: Signals, x: Array, reference: Array, *, after: Any = None, until: Any = None, outside: Any = None
+) -> float:
+    def beyond(window: Window) -> float:
+        # the side a row starts on tells which way is "over"; from a start on the reference both are
+        side = -np.sign(window.kept[:, :1])
+        return float(np.where(side == 0, np.abs(window.kept), side * window.kept).max(initial=0.0))
+
+    return window_of(signals, x - reference, after, until, outside).reduce(beyond)
+
+
+def _mean_jerk(
+    signals: Signals, x: Any, window: Any = 1.0, *, after: Any = None, until: Any = None, outside: Any = None
+) -> float:
+    width, slack = scalar(window, "the window of mean_jerk"), 1e-6 * signals.step
+    if not width > 0:
+        raise ExpressionError("the window of mean_jerk must be longer than 0 s")
+    excluded = [] if outside is None else time_windows(outside)
+
+    def steepest(seen: Window) -> float:
+        time = seen.time
+        starts = seen.points & (time + width <= time[seen.points][-1] + slack)
+        for a, b in excluded:
+            starts &= ~((time <= b + slack) & (time + width >= a - slack))
+        if not starts.any():
+            raise WindowError(f"mean_jerk needs recorded points {width:g} s apart in the window")
+        later = np.array([np.interp(time[starts] + width, time, row) for row in seen.rows])
+        return float(np.abs(later - seen.rows[:, starts]).max() / width)
+
+    return window_of(signals, x, after, until, outside).reduce(steepest)
+
+
+def _at_sample(signals: Signals, x: Array) -> Array:
+    # A sampled block's feed-through output is recorded at t_{k+1} but was computed from the state at t_k.
+    if x.ndim == 0 or signals.time.size < 2:
+        return x
+    if not np.allclose(np.diff(signals.time), signals.step, rtol=1e-6, atol=0.0):
+        raise ExpressionError(EVERY_STEP)
+    return np.concatenate([x[..., 1:], x[..., -1:]], axis=-1)
+
+
+EVERY_STEP = "at_sample needs every communication step recorded; set record = step, or leave record out"
+_PLAIN: dict[str, tuple[str, Callable[[Window], Any]]] = {  # name: unit, rule
+    "min": ("same", lambda w: w.kept.min()),
+    "max": ("same", lambda w: w.kept.max()),
+    "peak": ("same", lambda w: np.abs(w.kept).max()),
+    "comfort": ("same", lambda w: np.abs(w.kept).max()),
+    "initial": ("same", lambda w: _largest(w.kept[:, 0])),
+    "final": ("same", lambda w: _largest(w.kept[:, -1])),
+    "mean": ("same", lambda w: w.mean().mean()),
+    "rms": ("same", _rms),
+    "spread": ("same", _spread),
+    "integral": ("", lambda w: w.integral().sum()),
+    "duration": ("s", _duration),
+    "first_time": ("s", lambda w: w.times().min(initial=np.inf)),
+    "last_time": ("s", lambda w: w.times()[-1] if w.times().size else np.inf),
+    "jerk": ("per s", lambda w: np.abs(w.slopes()).max()),
+}
+_OTHERS: dict[str, tuple[str, Callable[..., Any]]] = {
+    "at": ("same", _at),
+    "overshoot": ("same", _overshoot),
+    "settling_time": ("s", _settling_time),
+    "mean_jerk": ("per s", _mean_jerk),
+    "traction_energy": ("J", _traction_energy),
+    "braking_energy": ("J", _braking_energy),
+}
+REDUCERS: dict[str, Function] = {
+    name: Function(call, unit, takes_signals=True, reduces=True)
+    for name, (unit, call) in {
+        **{name: (unit, _plain(rule)) for name, (unit, rule) in _PLAIN.items()},
+        **_OTHERS,
+        **PLATOON,
+    }.items()
+}
+FUNCTIONS: dict[str, Function] = {
+    **ELEMENTWISE,
+    **REDUCERS,
+    "at_sample": Function(_at_sample, "same", takes_signals=True),
+}
+
+
+def comfort_levels(value: float) -> tuple[int, ...]:
+    """Every level of the reaction scale whose band holds an acceleration [m/s2]; () for NaN. The bands overlap."""
+    size = abs(value)
+    return tuple(
+        level
+        for level, low, high, _ in COMFORT_SCALE
+        if (size < high if level == 1 else size > low if level == 6 else low <= size <= high)
+    )
+
+
+def unit_of(expression: Expression, signals: Signals, index: int | None = None) -> str:
+    """The unit of an expression where a simple rule tells it, else nothing.
+
+    A signal has its own; sums and reducers keep a unit all their parts share (bare numbers go with any).
+    """
+    names = [*signals.names(), *signals.parameters]
+
+    def visit(node: Node) -> str | None:  # None: a bare number
+        match node:
+            case Reference():
+                resolved = Expression(node.text, node).resolve(names, index)[0]
+                return shared([signals.units.get(name, "") for name in resolved])
+            case Number():
+                return None
+            case Operation(operator="+" | "-" | "negative" | "positive", operands=operands):
+                return shared([visit(operand) for operand in operands])
+            case Call(name=name, arguments=arguments) if arguments:
+                unit = expression.functions[name].unit
+                first = visit(arguments[0]) or ""
+                both = name in {"minimum", "maximum", "overshoot"}
+                same = shared([visit(argument) for argument in arguments]) if both else first
+                return {"same": same, "per s": _PER_SECOND.get(first, "")}.get(unit, unit)
+        return ""
+
+    def shared(units: Sequence[str | None]) -> str | None:
+        known = {unit for unit in units if unit is not None}
+        return known.pop() if len(known) == 1 else "" if known else None
+
+    return visit(expression.tree) or ""
+
+
+_PER_SECOND = {"m": "m/s", "m/s": "m/s2", "m/s2": "m/s3"}
+
+
+@dataclass(frozen=True)
+class Metric:
+    """The value of a named figure of merit, or one value for every i. NaN with a `problem` when it has none."""
+
+    name: str
+    expression: str
+    values: dict[int | None, float]
+    unit: str = ""
+    comfort: bool = False  # to be shown with the levels of the reaction scale, under COMFORT_TITLE
+    problem: str = ""
+
+    def text(self, index: int | None = None) -> str:
+        """One value as it is printed: `138.5 s`, `never`, `1.000 m/s2 (levels 3, 4)`."""
+        value = self.values[index]
+        if value == np.inf and self.unit == "s":
+            return "never"
+        if not self.comfort or not np.isfinite(value):
+            return f"{value:.6g} {self.unit}".rstrip()
+        levels = comfort_levels(value)
+        return f"{value:.3f} {self.unit} (level{'s' * (len(levels) > 1)} {', '.join(map(str, levels))})"
+
+
+@dataclass(frozen=True)
+class MetricChange:
+    """One value of a metric from two runs, such as at the step and at half of it."""
+
+    name: str
+    index: int | None
+    value: float
+    other: float
+    unit: str
+
+    @property
+    def difference(self) -> float:
+        """`other - value`; 0 when both are the same infinity."""
+        return 0.0 if self.other == self.value else self.other - self.value
+
+
+def check_metrics(
+    table: Mapping[str, str], names: Collection[str], every_step: bool = True, parameters: Collection[str] | None = None
+) -> list[str]:
+    """Every problem of a [metrics] table that can be found before a run.
+
+    Args:
+        table: the expressions by name.
+        names: the signals to be recorded and the parameters.
+        every_step: whether each communication step is recorded.
+        parameters: which of the names are parameters; without it a forgotten reducer shows only after the run.
+    """
+    problems: list[str] = []
+    for name, text in table.items():
+        try:
+            expression = parse(text, FUNCTIONS)
+        except ExpressionError as error:
+            problems += [f"metric '{name}': {problem}" for problem in error.problems]
+            continue
+        found = expression.check(names)
+        if not found and parameters is not None and _varies(expression, expression.tree, names, parameters):
+            found = [_not_reduced(text)]
+        problems += [f"metric '{name}': {problem}" for problem in found]
+        if expression.calls("at_sample") and not every_step:
+            problems.append(f"metric '{name}': '{text}': {EVERY_STEP}")
+    return problems
+
+
+def _varies(expression: Expression, node: Node, names: Collection[str], parameters: Collection[str]) -> bool:
+    """Whether a signal stands outside every reducer."""
+    if isinstance(node, Call) and expression.functions[node.name].reduces:
+        return False
+    if isinstance(node, Reference):
+        alone = Expression(node.text, node)
+        return any(name not in parameters for k in alone.instances(names) for name in alone.resolve(names, k)[0])
+    children = node.operands if isinstance(node, Operation) else node.arguments if isinstance(node, Call) else ()
+    return any(_varies(expression, child, names, parameters) for child in children)
+
+
+def _not_reduced(text: str) -> str:
+    return f"'{text}' is a signal, not a number; reduce it, as in max({text})"
+
+
+def metric_indices(table: Mapping[str, str], names: Collection[str]) -> dict[str, tuple[int | None, ...]]:
+    """The values each metric will have: its i's, or (None,) for a single one. For tables that passed the check."""
+    return {name: parse(text, FUNCTIONS).instances(names) for name, text in table.items()}
+
+
+def evaluate_metrics(table: Mapping[str, str], signals: Signals) -> list[Metric]:
+    """All metrics of a table. One that cannot be evaluated is NaN and says why: the others are still wanted."""
+    return [_evaluate(name, text, signals) for name, text in table.items()]
+
+
+def _evaluate(name: str, text: str, signals: Signals) -> Metric:
+    values: dict[int | None, float] = {}
+    unit, comfort = "", False
+    try:
+        expression = parse(text, FUNCTIONS)
+        comfort = isinstance(expression.tree, Call) and expression.tree.name == "comfort"
+        for index in expression.instances([*signals.names(), *signals.parameters]):
+            values[index] = np.nan
+            value = expression.evaluate(signals, index)
+            if isinstance(value, np.ndarray):
+                raise ExpressionError(_not_reduced(text))
+            values[index] = float(value)
+            unit = unit_of(expression, signals, index)
+    except ExpressionError as error:
+        return Metric(name, text, values or {None: np.nan}, unit, comfort, str(error))
+    return Metric(name, text, values, unit, comfort)
+
+
+def compare_metrics(metrics: Sequence[Metric], others: Sequence[Metric]) -> list[MetricChange]:
+    """The values of two runs side by side, for those both have."""
+    second = {other.name: other for other in others}
+    return [
+        MetricChange(metric.name, index, value, second[metric.name].values[index], metric.unit)
+        for metric in metrics
+        if metric.name in second
+        for index, value in metric.values.items()
+        if index in second[metric.name].values
+    ]

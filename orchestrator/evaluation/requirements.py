@@ -1,0 +1,311 @@
+"""Requirements: `always|eventually|finally CONDITION [from T] [until T] [outside [a, b]]...`, judged after a run.
+
+A verdict is pass, fail or inconclusive, with a signed margin: the smallest slack over time and index, negative where
+the condition is violated. Only recorded points are seen. What NaN touches fails, and an unfinished run never passes.
+The grammar and its meaning stand in `docs/metrics.md`.
+"""
+
+import re
+from collections.abc import Collection, Iterator, Mapping
+from dataclasses import dataclass
+from typing import Any, Literal, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..errors import ExpressionError, WindowError, did_you_mean
+from .expressions import CONSTANTS, Expression, Scope, Signals, evaluate, evaluate_constant, parse
+from .metrics import EVERY_STEP, FUNCTIONS
+from .syntax import Call, Name, Node, Number, Operation, Reference, walk
+from .time_windows import select
+
+QUANTIFIERS = ("always", "eventually", "finally")
+CLAUSES = ("from", "until", "outside")
+COMPARISONS = ("<", "<=", ">", ">=", "==", "!=")
+_MISSING = "write always, eventually or finally, then a condition: always abs(train[i].acceleration) <= 1.0"
+
+
+@dataclass(frozen=True)
+class Verdict:
+    """How one requirement came out.
+
+    `margin` is the worst slack, in the unit of the compared quantities; None when there is none (nothing was judged,
+    or a boolean decided). `time` [s] and `index` are where the worst was seen, `points` how many recorded points were
+    judged, `reason` why it is inconclusive or what was NaN.
+    """
+
+    name: str
+    text: str
+    verdict: Literal["pass", "fail", "inconclusive"]
+    margin: float | None = None
+    time: float | None = None
+    index: int | None = None
+    points: int = 0
+    reason: str = ""
+
+
+class Slack(NamedTuple):
+    """Whether a condition holds, and by how much (negative: missed by; infinite: no measure), of one shape."""
+
+    holds: NDArray[np.bool_]
+    slack: NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class _Worst:
+    """The deciding point for one index."""
+
+    holds: bool
+    slack: float
+    time: float
+    index: int | None
+
+
+def slack_of(node: Node, scope: Scope) -> Slack:
+    """The slack of a condition: b - a for a < b, the least for `and`, the most for `or`, negated for `not`.
+
+    A bare signal is a boolean: it holds where it is not zero and has no measure. NaN never holds.
+    """
+    match node:
+        case Operation(operator="not", operands=(operand,)):
+            holds, slack = slack_of(operand, scope)
+            return Slack(~holds & ~np.isnan(slack), -slack)
+        case Operation(operator="and" | "or" as operator, operands=operands):
+            parts = [slack_of(operand, scope) for operand in operands]
+            smaller = operator == "and"
+            slack = (np.minimum if smaller else np.maximum).reduce(np.broadcast_arrays(*(part.slack for part in parts)))
+            every = np.broadcast_arrays(*(part.holds for part in parts))
+            holds = (np.logical_and if smaller else np.logical_or).reduce(every)
+            return Slack(np.asarray(holds & ~np.isnan(slack)), np.asarray(slack))
+        case Operation(operator="if", operands=(condition, then, otherwise)):
+            choice = np.asarray(evaluate(condition, scope), dtype=np.float64)
+            yes, no = slack_of(then, scope), slack_of(otherwise, scope)
+            slack = np.where(np.isnan(choice), np.nan, np.where(choice, yes.slack, no.slack))
+            return Slack(np.where(choice, yes.holds, no.holds) & ~np.isnan(slack), slack)
+        case Operation(operator=operator, operands=(left, right)) if operator in COMPARISONS:
+            return _compare(operator, evaluate(left, scope), evaluate(right, scope))
+    value = np.asarray(evaluate(node, scope), dtype=np.float64)
+    slack = np.where(np.isnan(value), np.nan, np.where(value, np.inf, -np.inf))
+    return Slack(slack > 0, slack)
+
+
+def _compare(operator: str, left: NDArray[Any], right: NDArray[Any]) -> Slack:
+    a, b = np.asarray(left, dtype=np.float64), np.asarray(right, dtype=np.float64)
+    equal = a == b  # inf - inf would be NaN
+    difference = np.where(equal, 0.0, b - a)
+    slack, holds = {
+        "<": (difference, a < b),
+        "<=": (difference, a <= b),
+        ">": (-difference, a > b),
+        ">=": (-difference, a >= b),
+        "==": (-np.abs(difference), equal),
+        "!=": (np.abs(difference), ~equal & ~np.isnan(difference)),
+    }[operator]
+    return Slack(np.asarray(holds), np.asarray(slack))
+
+
+@dataclass(frozen=True)
+class Requirement:
+    """A parsed requirement; times in seconds."""
+
+    name: str
+    text: str
+    quantifier: str
+    condition: Expression
+    start: float | None = None
+    end: float | None = None
+    outside: tuple[tuple[float, float], ...] = ()
+
+    def check(self, names: Collection[str]) -> list[str]:
+        """Every problem that can be found before a run; `names` are the signals to be recorded and the parameters."""
+        problems = self.condition.check(names)
+        shapeless = [node for node in _conditions(self.condition.tree) if not _can_be_true(node)]
+        if shapeless and not problems:
+            problems = [f"'{self.condition.text}' is a number, not a condition; compare it, as in abs(x) <= 1"]
+        return [f"requirement '{self.name}': {problem}" for problem in problems]
+
+    def evaluate(self, signals: Signals) -> Verdict:
+        """Judge a run.
+
+        Raises:
+            ExpressionError: for what `check` would have told.
+        """
+        points = select(signals, self.start, self.end, self.outside)
+        indices = self.condition.instances([*signals.names(), *signals.parameters])
+        if not points.any() or not indices:
+            reason = "no signal has such an index" if points.any() else "no recorded point lies in its window"
+            return Verdict(self.name, self.text, "inconclusive", reason=reason)
+        try:
+            worst = min((self._worst(signals, points, index) for index in indices), key=_badness)
+        except WindowError as error:
+            return Verdict(self.name, self.text, "inconclusive", reason=str(error))
+        verdict, reason = self._verdict(worst, signals)
+        margin = None if np.isinf(worst.slack) else worst.slack
+        judged = 1 if self.quantifier == "finally" else int(points.sum())
+        return Verdict(self.name, self.text, verdict, margin, worst.time, worst.index, judged, reason)
+
+    def _verdict(self, worst: _Worst, signals: Signals) -> tuple[Literal["pass", "fail", "inconclusive"], str]:
+        """The verdict and the reason for it, where it needs one."""
+        last = float(signals.time[-1])
+        reached = signals.completed if self.end is None else self.end <= last + 1e-6 * signals.step
+        # A number over the whole run (final, settling_time, ...) is not final before the run is.
+        reducers = (isinstance(x, Call) and self.condition.functions[x.name].reduces for x in walk(self.condition.tree))
+        provisional = not signals.completed and any(reducers)
+        if not worst.holds and not provisional and (reached or self.quantifier == "always"):
+            return "fail", "a value is not a number (NaN)" if np.isnan(worst.slack) else ""
+        if not signals.completed:
+            return "inconclusive", f"the run ended at {last:g} s, before its stop time {signals.stop_time:g} s"
+        if not reached:
+            return "inconclusive", f"its window lasts until {self.end:g} s, the run only until {last:g} s"
+        return "pass", ""
+
+    def _worst(self, signals: Signals, points: NDArray[np.bool_], index: int | None) -> _Worst:
+        """The point that decides for one index."""
+        holds, slack = self.condition.apply(slack_of, signals, index)
+        shape = np.broadcast_shapes(np.atleast_2d(slack).shape, (1, signals.time.size))
+        holds = np.broadcast_to(np.atleast_2d(holds), shape)[:, points]
+        slack = np.broadcast_to(np.atleast_2d(slack), shape)[:, points]
+        times = signals.time[points]
+        if self.quantifier == "finally":
+            holds, slack, times = holds[:, -1:], slack[:, -1:], times[-1:]
+        # The worst point: NaN before a violation before the smallest slack.
+        unknown = np.isnan(slack)
+        row, column = np.unravel_index(
+            int(np.lexsort((slack.ravel(), holds.ravel(), ~unknown.ravel()))[0]), slack.shape
+        )
+        met = bool(holds[row, column])
+        if self.quantifier == "eventually" and not unknown.any():
+            every = np.atleast_1d(holds.all(axis=0))  # the rows of a slice count together, at the best moment
+            column = np.lexsort((-slack.min(axis=0), ~every))[0]
+            row, met = np.argmin(slack[:, column]), bool(every[column])
+        number = index if index is not None else self._row_number(signals, int(row), slack.shape[0])
+        return _Worst(met, float(slack[row, column]), float(times[column]), number)
+
+    def _row_number(self, signals: Signals, row: int, rows: int) -> int | None:
+        """The index a row of a slice stands for: 3 for the second row of `train[2:].speed`."""
+        resolved = self.condition.resolve([*signals.names(), *signals.parameters])
+        for reference, names in zip(self.condition.references, resolved, strict=True):
+            if reference.stacked and len(names) == rows and (number := re.search(r"\[(\d+)", names[row])):
+                return int(number[1])
+        return None
+
+
+def _badness(worst: _Worst) -> tuple[bool, bool, float]:
+    return not np.isnan(worst.slack), worst.holds, worst.slack
+
+
+def _conditions(node: Node) -> Iterator[Node]:
+    """The parts that have to be true or false: below and, or, not, and both branches of if."""
+    match node:
+        case (
+            Operation(operator="and" | "or" | "not", operands=operands)
+            | Operation(operator="if", operands=(_, *operands))
+        ):
+            for operand in operands:
+                yield from _conditions(operand)
+        case _:
+            yield node
+
+
+def _can_be_true(node: Node) -> bool:
+    match node:
+        case Operation(operator=operator):
+            return operator in COMPARISONS
+        case Call(name=name):
+            return name in {"where", "at_sample"}
+        case Number(value=value):
+            return isinstance(value, bool)
+        case Name(name=name):
+            return isinstance(CONSTANTS.get(name), bool)
+    return isinstance(node, Reference)
+
+
+def _clauses(text: str) -> list[tuple[str, str]]:
+    """Split at from, until, outside where not in brackets or quotes: [("", condition), (word, argument), ...]."""
+    parts = [("", "")]
+    depth, quote, start = 0, "", 0
+    for match in re.finditer(r"[\w.]+|\S", text):
+        token = match[0]
+        if quote or token in "\"'":
+            quote = "" if token == quote else quote or token
+        elif token in CLAUSES and depth == 0:
+            parts[-1] = (parts[-1][0], text[start : match.start()].strip())
+            parts.append((token, ""))
+            start = match.end()
+        else:
+            depth += (token in "([{") - (token in ")]}")
+    parts[-1] = (parts[-1][0], text[start:].strip())
+    return parts
+
+
+def _time(word: str, text: str) -> float:
+    if not text:
+        raise ExpressionError(f"'{word}' needs a time in seconds, as in {word} 210")
+    return float(evaluate_constant(text))
+
+
+def _window(text: str) -> tuple[float, float]:
+    match = re.fullmatch(r"\[([^,]+),([^,]+)\]", text)
+    if not match:
+        raise ExpressionError(f"'outside {text}' is not a time window; write outside [210, 240]")
+    first, last = _time("outside", match[1]), _time("outside", match[2])
+    if first > last:
+        raise ExpressionError(f"'outside {text}' ends before it starts; swap the two")
+    return first, last
+
+
+def parse_requirement(name: str, text: str) -> Requirement:
+    """Read a requirement such as `always abs(train[i].acceleration) <= 1.0 outside [210, 240]`.
+
+    Raises:
+        ExpressionError: with every problem of the text.
+    """
+    text = re.sub(r"\s+", " ", text).strip()
+    quantifier, _, rest = text.partition(" ")
+    if quantifier not in QUANTIFIERS:
+        nearest = did_you_mean(quantifier, QUANTIFIERS)
+        raise ExpressionError(f"requirement '{name}': '{text}' does not say when{nearest or f'; {_MISSING}'}")
+    (_, condition), *clauses = _clauses(rest)
+    times: dict[str, float] = {}
+    outside: list[tuple[float, float]] = []
+    problems: list[str] = []
+    for word, argument in clauses:
+        try:
+            if word == "outside":
+                outside.append(_window(argument))
+            elif word in times:
+                problems.append(f"'{word}' stands twice; keep one")
+            else:
+                times[word] = _time(word, argument)
+        except ExpressionError as error:
+            problems += error.problems
+    start, end = times.get("from"), times.get("until")
+    if start is not None and end is not None and start > end:
+        problems.append(f"'from {start:g} until {end:g}' ends before it starts; swap the two")
+    try:
+        expression = parse(condition, FUNCTIONS)
+    except ExpressionError as error:
+        problems += error.problems
+    if problems:
+        raise ExpressionError([f"requirement '{name}': {problem}" for problem in problems])
+    return Requirement(name, text, quantifier, expression, start, end, tuple(outside))
+
+
+def check_requirements(table: Mapping[str, str], names: Collection[str], every_step: bool = True) -> list[str]:
+    """Every problem of a [require] table that can be found before a run, as `metrics.check_metrics` does it."""
+    problems: list[str] = []
+    for name, text in table.items():
+        try:
+            requirement = parse_requirement(name, text)
+        except ExpressionError as error:
+            problems += error.problems
+            continue
+        problems += requirement.check(names)
+        if requirement.condition.calls("at_sample") and not every_step:
+            problems.append(f"requirement '{name}': {EVERY_STEP}")
+    return problems
+
+
+def judge_requirements(table: Mapping[str, str], signals: Signals) -> list[Verdict]:
+    """The verdicts of a [require] table that passed its check, in its order."""
+    return [parse_requirement(name, text).evaluate(signals) for name, text in table.items()]

@@ -1,0 +1,262 @@
+"""The syntax of expressions: a subset of Python's, rebuilt from a whitelist into a few node types.
+
+Python's parser reads the text and nothing is ever executed, so a scenario from a stranger cannot run code. What the
+nodes mean stands in `expressions`.
+"""
+
+import ast
+import re
+import warnings
+from collections.abc import Iterator
+from dataclasses import dataclass
+from typing import TypeAlias
+
+from ..errors import ExpressionError
+
+MAX_LENGTH = 1000  # characters: Python's own parser may exhaust the C stack on monstrous input
+MAX_DEPTH = 100
+
+
+@dataclass(frozen=True)
+class Number:
+    """A number, `true` or `false`."""
+
+    value: float | bool
+
+
+@dataclass(frozen=True)
+class Name:
+    """A bare name: a constant, `i`, `count`, `time`."""
+
+    name: str
+    column: int
+
+
+@dataclass(frozen=True)
+class Span:
+    """A slice of an index: both ends included, None where open."""
+
+    first: "Node | None"
+    last: "Node | None"
+
+
+@dataclass(frozen=True)
+class Reference:
+    """A signal, or a family of signals: `parts` are its dotted names, each with the indices that follow it."""
+
+    text: str
+    column: int
+    parts: tuple[tuple[str, tuple["Node | Span", ...]], ...]
+
+    @property
+    def indices(self) -> "tuple[Node | Span, ...]":
+        """All its indices, left to right."""
+        return tuple(index for _, indices in self.parts for index in indices)
+
+    @property
+    def stacked(self) -> bool:
+        """Whether it stands for several signals, one a row."""
+        return any(isinstance(index, Span) for index in self.indices)
+
+    @property
+    def uses_index(self) -> bool:
+        """Whether the free index `i` occurs in an index."""
+        nodes = [end for x in self.indices for end in ((x.first, x.last) if isinstance(x, Span) else (x,)) if end]
+        return any(isinstance(n, Name) and n.name == "i" for node in nodes for n in walk(node))
+
+    @property
+    def array(self) -> str:
+        """The name before its first index, or nothing: `train` of `train[i].speed`."""
+        names = [name for name, _ in self.parts]
+        return next((".".join(names[: k + 1]) for k, part in enumerate(self.parts) if part[1]), "")
+
+
+@dataclass(frozen=True)
+class Group:
+    """A list; only as an argument, for time windows."""
+
+    items: tuple["Node", ...]
+
+
+@dataclass(frozen=True)
+class Operation:
+    """Arithmetic, `not`, one comparison, `and`, `or`, `if` (condition, then, else), with its operands."""
+
+    operator: str
+    operands: tuple["Node", ...]
+
+
+@dataclass(frozen=True)
+class Call:
+    """A call; the last `len(keywords)` arguments were given by name."""
+
+    name: str
+    arguments: tuple["Node", ...]
+    keywords: tuple[str, ...]
+    column: int
+
+
+Node: TypeAlias = Number | Name | Reference | Group | Operation | Call
+
+
+def walk(node: Node) -> Iterator[Node]:
+    """The node and everything below it in reading order, but not the indices of references."""
+    yield node
+    match node:
+        case Group(items=children) | Operation(operands=children) | Call(arguments=children):
+            for child in children:
+                yield from walk(child)
+
+
+_OPERATORS: dict[type[ast.AST], str] = {
+    ast.Add: "+", ast.Sub: "-", ast.Mult: "*", ast.Div: "/", ast.Pow: "**", ast.USub: "negative", ast.UAdd: "positive",
+    ast.Not: "not", ast.Lt: "<", ast.LtE: "<=", ast.Gt: ">", ast.GtE: ">=", ast.Eq: "==", ast.NotEq: "!=",
+    ast.And: "and", ast.Or: "or",
+}  # fmt: skip
+_REMEDIES: dict[type[ast.AST], str] = {
+    ast.BitAnd: "write 'and'", ast.BitOr: "write 'or'", ast.Invert: "write 'not'", ast.BitXor: "a power is '**'",
+    ast.FloorDiv: "write floor(a / b)", ast.Mod: "write a - b * floor(a / b)",
+}  # fmt: skip
+
+
+class _Reader:
+    """Rebuilds Python's syntax tree of one text as ours, refusing everything that is not on the list."""
+
+    def __init__(self, text: str) -> None:
+        self.text = text
+
+    def column(self, node: ast.expr) -> int:
+        return len(self.text.encode()[: node.col_offset].decode(errors="replace")) + 1
+
+    def error(self, node: ast.expr, message: str) -> ExpressionError:
+        return ExpressionError(f"'{self.text}', column {self.column(node)}: {message}")
+
+    def operator(self, node: ast.expr, kind: ast.AST) -> str:
+        if type(kind) not in _OPERATORS:
+            remedy = _REMEDIES.get(type(kind), "there are + - * / ** < <= > >= == != and or not")
+            raise self.error(node, f"this operator is not understood; {remedy}")
+        return _OPERATORS[type(kind)]
+
+    def read(self, node: ast.expr, depth: int = 0) -> Node:  # noqa: PLR0911 (one a kind of node)
+        if depth > MAX_DEPTH:
+            raise self.error(node, f"nested more than {MAX_DEPTH} levels deep; split the expression")
+        deeper = depth + 1
+        match node:
+            case ast.Constant(value=bool() | int() | float() as value):
+                return Number(value if isinstance(value, bool) else float(value))
+            case ast.Name(id=name):
+                return Name(name, self.column(node))
+            case ast.Attribute() | ast.Subscript():
+                return self.reference(node, deeper)
+            case ast.UnaryOp(op=kind, operand=operand):
+                return Operation(self.operator(node, kind), (self.read(operand, deeper),))
+            case ast.BinOp(left=left, op=kind, right=right):
+                return Operation(self.operator(node, kind), (self.read(left, deeper), self.read(right, deeper)))
+            case ast.BoolOp(op=kind, values=values):
+                return Operation(self.operator(node, kind), tuple(self.read(value, deeper) for value in values))
+            case ast.Compare():
+                return self.comparison(node, deeper)
+            case ast.IfExp(test=test, body=body, orelse=otherwise):
+                return Operation("if", tuple(self.read(part, deeper) for part in (test, body, otherwise)))
+            case ast.Call():
+                return self.call(node, deeper)
+            case ast.Constant(value=str()):
+                raise self.error(node, 'text is only understood in signal("...")')
+            case ast.List() | ast.Tuple():
+                raise self.error(node, "a list is only understood as an argument, as in outside = [210, 240]")
+        raise self.error(node, "write numbers, signals, + - * / **, comparisons, and/or/not, if/else and functions")
+
+    def comparison(self, node: ast.Compare, depth: int) -> Node:
+        """One comparison, or a chain as `and`: that evaluates what is inside twice, so no chain may stand there."""
+        inner = [part for end in node.comparators[:-1] for part in ast.walk(end)]
+        if any(isinstance(part, ast.Compare) and len(part.ops) > 1 for part in inner):
+            raise self.error(node, "a chain of comparisons stands inside another; part them with 'and'")
+        ends = [self.read(end, depth) for end in (node.left, *node.comparators)]
+        signs = [self.operator(node, kind) for kind in node.ops]
+        links = [Operation(sign, (a, b)) for sign, a, b in zip(signs, ends, ends[1:], strict=False)]
+        return links[0] if len(links) == 1 else Operation("and", tuple(links))
+
+    def call(self, node: ast.Call, depth: int) -> Node:
+        if not isinstance(node.func, ast.Name):
+            raise self.error(node, "a function is called by its plain name, as in max(train[1].speed)")
+        if node.func.id == "signal":
+            match node.args:
+                case [ast.Constant(value=str(name))] if not node.keywords:
+                    return Reference(name, self.column(node), ((name, ()),))
+            raise self.error(node, 'signal takes one name in quotes, exactly as recorded: signal("plant.der(x)")')
+        keywords = tuple(keyword.arg for keyword in node.keywords if keyword.arg is not None)
+        if len(keywords) < len(node.keywords) or any(isinstance(argument, ast.Starred) for argument in node.args):
+            raise self.error(node, "* and ** arguments are not understood; write the arguments out")
+        if len(set(keywords)) < len(keywords):
+            raise self.error(node, "an argument stands twice; keep one")
+        arguments = [*node.args, *(keyword.value for keyword in node.keywords)]
+        return Call(node.func.id, tuple(self.argument(x, depth) for x in arguments), keywords, self.column(node))
+
+    def argument(self, node: ast.expr, depth: int) -> Node:
+        if isinstance(node, ast.List | ast.Tuple) and depth <= MAX_DEPTH:
+            return Group(tuple(self.argument(item, depth + 1) for item in node.elts))
+        return self.read(node, depth)
+
+    def reference(self, node: ast.expr, depth: int) -> Reference:
+        parts: list[tuple[str, tuple[Node | Span, ...]]] = []
+        text, indices, inner = "", tuple[Node | Span, ...](), node
+        while True:  # from the last name to the first
+            match inner:
+                case ast.Subscript(value=value, slice=index) if not indices:
+                    indices = self.indices(index, depth)
+                    text, inner = f"[{ast.unparse(index).replace(' ', '')}]{text}", value
+                case ast.Attribute(value=value, attr=name):
+                    parts.insert(0, (name, indices))
+                    text, indices, inner = f".{name}{text}", (), value
+                case ast.Name(id=name):
+                    return Reference(f"{name}{text}", self.column(node), ((name, indices), *parts))
+                case _:
+                    raise self.error(node, "a signal is written like train[i].speed or consist[1].force[2]")
+
+    def indices(self, node: ast.expr, depth: int) -> tuple[Node | Span, ...]:
+        items = node.elts if isinstance(node, ast.Tuple) and node.elts else [node]
+        return tuple(self.span(x, depth) if isinstance(x, ast.Slice) else self.index(x, depth) for x in items)
+
+    def span(self, node: ast.Slice, depth: int) -> Span:
+        if node.step is not None:
+            raise self.error(node.step, "a slice has no step; write train[2:] or train[1:3], both ends included")
+        first, last = (self.index(end, depth) if end else None for end in (node.lower, node.upper))
+        return Span(first, last)
+
+    def index(self, node: ast.expr, depth: int) -> Node:
+        index = self.read(node, depth)
+        for part in walk(index):
+            match part:
+                case Number(value=value) if float(value).is_integer():
+                    continue
+                case Name(name="i" | "count") | Operation(operator="+" | "-" | "*" | "negative"):
+                    continue
+            raise self.error(node, "an index is a whole number, i, count or a sum of these, as in train[i-1].speed")
+        return index
+
+
+def read(text: str) -> tuple[str, Node]:
+    """The text as it will be shown, and its tree.
+
+    Raises:
+        ExpressionError: for anything that is not an expression of this language, with the column and the remedy.
+    """
+    text = re.sub(r"\s", " ", text).strip()
+    if not text:
+        raise ExpressionError("an expression is empty; write a signal or a formula, such as train[1].speed")
+    if len(text) > MAX_LENGTH:
+        raise ExpressionError(f"'{text[:40]}...': longer than {MAX_LENGTH} characters; split the expression")
+    try:
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore")
+            tree = ast.parse(text, mode="eval")
+        return text, _Reader(text).read(tree.body)
+    except ExpressionError:
+        raise
+    except SyntaxError as error:
+        remedy = 'a name with other characters or a reserved word goes into signal("...")'
+        raise ExpressionError(f"'{text}', column {error.offset or 1}: {error.msg}; {remedy}") from None
+    except (RecursionError, MemoryError):
+        raise ExpressionError(f"'{text}': nested too deeply; split the expression") from None
+    except (ValueError, OverflowError) as error:
+        raise ExpressionError(f"'{text}': {error}; write plain names and numbers") from None

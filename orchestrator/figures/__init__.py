@@ -1,0 +1,41 @@
+"""Pictures of recorded signals, as a scenario's `[[figures]]` ask for them."""
+
+from .drawing import (
+    COLOURS,
+    DASHES,
+    PANEL_KEYS,
+    STYLE,
+    Curve,
+    bands_of,
+    check_figures,
+    curves_of,
+    draw,
+    draw_band,
+    file_name,
+    level_of,
+    panels_of,
+    set_ranges,
+    texts_of,
+    x_label_of,
+    y_label_of,
+)
+
+__all__ = [
+    "COLOURS",
+    "DASHES",
+    "PANEL_KEYS",
+    "STYLE",
+    "Curve",
+    "bands_of",
+    "check_figures",
+    "curves_of",
+    "draw",
+    "draw_band",
+    "file_name",
+    "level_of",
+    "panels_of",
+    "set_ranges",
+    "texts_of",
+    "x_label_of",
+    "y_label_of",
+]

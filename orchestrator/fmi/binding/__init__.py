@@ -1,0 +1,22 @@
+"""FMUs loaded into this process: their functions, called as their version of the standard has them.
+
+Light to import: the process of an isolated FMU needs this and little else.
+"""
+
+from .channel import FmuChannel
+from .fmi2 import FmuSlave
+from .libraries import Signatures, forget_paths, library, names_of_platform
+from .loaded import LoadedSlave
+from .versions import SLAVES, call_name
+
+__all__ = [
+    "SLAVES",
+    "FmuChannel",
+    "FmuSlave",
+    "LoadedSlave",
+    "Signatures",
+    "call_name",
+    "forget_paths",
+    "library",
+    "names_of_platform",
+]

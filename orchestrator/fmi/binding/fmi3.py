@@ -1,0 +1,147 @@
+"""An FMI 3.0 co-simulation FMU behind the face of an instance: scalar variables, no event mode."""
+
+from __future__ import annotations
+
+import ctypes
+import math
+import os
+from collections.abc import Sequence
+from ctypes import c_bool, c_char_p, c_double, c_int, c_size_t, c_void_p
+from pathlib import Path
+from typing import Any
+
+from fmpy import fmi3
+
+from .libraries import Signatures
+from .loaded import DISCARD, OK, WARNING, LoadedSlave, keep_message
+
+_NUMBERS = {
+    "Float32": ctypes.c_float,
+    "Float64": ctypes.c_double,
+    "Int8": ctypes.c_int8,
+    "UInt8": ctypes.c_uint8,
+    "Int16": ctypes.c_int16,
+    "UInt16": ctypes.c_uint16,
+    "Int32": ctypes.c_int32,
+    "UInt32": ctypes.c_uint32,
+    "Int64": ctypes.c_int64,
+    "UInt64": ctypes.c_uint64,
+}
+
+
+def _log(environment: int | None, status: int, category: bytes, message: bytes) -> None:
+    keep_message((environment,), status, message)
+
+
+_LOGGER = fmi3.fmi3LogMessageCallback(_log)
+_SIGNATURES: Signatures = {
+    "fmi3InstantiateCoSimulation": (
+        c_void_p, c_char_p, c_char_p, c_char_p, c_bool, c_bool, c_bool, c_bool, c_void_p, c_size_t, c_void_p,
+        fmi3.fmi3LogMessageCallback, c_void_p
+    ),
+    "fmi3FreeInstance": (None, c_void_p),
+    "fmi3EnterInitializationMode": (c_int, c_void_p, c_bool, c_double, c_double, c_bool, c_double),
+    "fmi3ExitInitializationMode": (c_int, c_void_p),
+    "fmi3Terminate": (c_int, c_void_p),
+    "fmi3DoStep": (c_int, c_void_p, c_double, c_double, c_bool, c_void_p, c_void_p, c_void_p, c_void_p),
+    **{
+        f"fmi3{verb}{suffix}": (c_int, c_void_p, c_void_p, c_size_t, c_void_p, c_size_t)
+        for verb in ("Set", "Get")
+        for suffix in (*_NUMBERS, "Boolean", "String")
+    },
+    "fmi3GetFMUState": (c_int, c_void_p, c_void_p),
+    "fmi3SetFMUState": (c_int, c_void_p, c_void_p),
+    "fmi3FreeFMUState": (c_int, c_void_p, c_void_p),
+    "fmi3SerializedFMUStateSize": (c_int, c_void_p, c_void_p, c_void_p),
+    "fmi3SerializeFMUState": (c_int, c_void_p, c_void_p, c_void_p, c_size_t),
+    "fmi3DeserializeFMUState": (c_int, c_void_p, c_void_p, c_size_t, c_void_p),
+    "fmi3GetDirectionalDerivative": (
+        c_int, c_void_p, c_void_p, c_size_t, c_void_p, c_size_t, c_void_p, c_size_t, c_void_p, c_size_t
+    ),
+}  # fmt: skip
+_TYPES: dict[str, tuple[str, Any]] = {
+    **{name: (name, c_type) for name, c_type in _NUMBERS.items()},
+    "Enumeration": ("Int64", ctypes.c_int64),
+    "Boolean": ("Boolean", c_bool),
+    "String": ("String", c_char_p),
+}
+
+
+class Fmi3Slave(LoadedSlave):
+    """An FMI 3.0 FMU loaded into this process."""
+
+    SIGNATURES, TYPES = _SIGNATURES, _TYPES
+    SET, GET, DO_STEP = "fmi3Set", "fmi3Get", "fmi3DoStep"
+    TERMINATE, FREE = "fmi3Terminate", "fmi3FreeInstance"
+    STATE = (
+        "fmi3GetFMUState",
+        "fmi3SetFMUState",
+        "fmi3FreeFMUState",
+        "fmi3SerializedFMUStateSize",
+        "fmi3SerializeFMUState",
+        "fmi3DeserializeFMUState",
+    )
+    COUNTS_VALUES = True
+
+    def _instantiate(self, folder: Path) -> int | None:
+        # What fmi3DoStep tells beside its status; the first, that an event waits to be handled, is for the event mode.
+        self._told = c_bool(), c_bool(), c_bool(), c_double()
+        _, self._ends, self._is_early, self._came_to = self._told
+        self._telling = tuple(ctypes.byref(each) for each in self._told)
+        resources = folder / "resources"
+        place = f"{resources}{os.sep}".encode() if resources.is_dir() else None
+        name, token = self.name.encode(), self.interface.guid.encode()
+        options = (False, self._talks, False, False)  # visible, logging, event mode, early return
+        found: int | None = self.function("fmi3InstantiateCoSimulation")(
+            name, token, place, *options, None, 0, id(self), _LOGGER, None
+        )
+        return found
+
+    def enter_initialization(self) -> None:
+        """Enter initialization mode."""
+        self.call("fmi3EnterInitializationMode", False, 0.0, self._span[0], *self._end())
+
+    def exit_initialization(self) -> None:
+        """Leave initialization mode: without an event mode, the first step may follow."""
+        self.call("fmi3ExitInitializationMode")
+
+    def step(self, time: float, length: float, *, final: bool = True) -> None:
+        """Advance from ``time`` by ``length``, both in s; not ``final`` where an older state may be restored."""
+        self.time = time
+        status = self._attempt(time, length, final, again=False)
+        if status or self._ends.value or self._is_early.value:
+            self.resume(time, length, status, final)
+        self.time = time + length
+
+    def _attempt(self, time: float, part: float, final: bool, *, again: bool) -> int:
+        self._ends.value = self._is_early.value = False
+        self._came_to.value = math.nan
+        return int(self._do_step(self.pointer, time, part, final, *self._telling))
+
+    def _reached(self, end: float, status: int) -> float | None:
+        stopped = self._ends.value or self._is_early.value
+        if status in (OK, WARNING) and stopped and math.isfinite(self._came_to.value):
+            return self._came_to.value
+        return super()._reached(end, status)
+
+    def _last_successful_time(self) -> float | None:
+        return self._came_to.value if math.isfinite(self._came_to.value) else None
+
+    def _stops(self, status: int) -> bool:
+        return status in (OK, WARNING, DISCARD) and self._ends.value
+
+    def directional_derivatives(
+        self, unknowns: Sequence[str], knowns: Sequence[str], seed: Sequence[float]
+    ) -> list[float]:
+        """How the unknowns change when the knowns change by ``seed``; all are Real variables."""
+        rows, columns = self.references(unknowns), self.references(knowns)
+        found = (c_double * len(unknowns))()
+        given = (c_double * len(knowns))(*seed)
+        self.call(
+            "fmi3GetDirectionalDerivative", rows, len(rows), columns, len(columns), given, len(given), found, len(found)
+        )
+        return list(found)
+
+    def interpolate(self, names: Sequence[str], orders: Sequence[int], values: Sequence[float]) -> None:
+        """The standard has no call for that: it has intermediate updates instead."""
+        raise self.refuse("FMI 3.0 takes no derivatives of inputs")

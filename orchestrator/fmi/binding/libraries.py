@@ -1,0 +1,130 @@
+"""The shared library of an FMU: where it stands, and its functions, loaded once for all its instances."""
+
+from __future__ import annotations
+
+import ctypes
+import os
+import sys
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+import fmpy
+
+from ...errors import FmuFileError
+from ..interface import Interface
+
+Signatures = Mapping[str, tuple[Any, ...]]
+"""By a function's name: the types of its result and of its arguments."""
+
+
+class Library:
+    """A loaded library with its functions bound, those that it has.
+
+    FMPy binds an FMU's functions anew for every instance, demands all of them even where the standard does not (an FMI
+    3.0 FMU for co-simulation needs none of model exchange), looks for FMI 3.0 libraries under one name only, and takes
+    statuses of FMI 1.0 for texts: a failed fmiInitializeSlave would end the process.
+    """
+
+    def __init__(self, path: Path, signatures: Signatures, prefix: str) -> None:
+        here = os.getcwd()
+        os.chdir(path.parent)  # where some libraries look for others
+        try:
+            self._dll = ctypes.cdll.LoadLibrary(str(path))
+        except OSError as error:
+            raise OSError(f"Failed to load shared library {path}. {error}") from error
+        finally:
+            os.chdir(here)
+        self.path = path
+        self.users = 0
+        bound = {name: self._bind(prefix + name, types) for name, types in signatures.items()}
+        self.functions = {name: function for name, function in bound.items() if function is not None}
+        self.addresses = {name: address(function) for name, function in self.functions.items()}
+
+    def _bind(self, name: str, types: tuple[Any, ...]) -> Any:
+        try:
+            function = self._dll[name]
+        except AttributeError:
+            return None
+        function.restype, *function.argtypes = types
+        return function
+
+    def unload(self) -> None:
+        """Take it out of memory: no function may be called any more."""
+        fmpy.freeLibrary(self._dll._handle)
+
+
+_LIBRARIES: dict[Path, Library] = {}
+"""The libraries in use, by path."""
+
+
+def open_library(path: Path, signatures: Signatures, prefix: str = "") -> Library:
+    """A library, loaded if it is not in use yet.
+
+    Args:
+        path: the file.
+        signatures: the functions that are wanted; what the library lacks is missing from its ``functions``.
+        prefix: what stands before the names of the functions in the library.
+
+    Raises:
+        OSError: it cannot be loaded.
+    """
+    if path not in _LIBRARIES:
+        _LIBRARIES[path] = Library(path, signatures, prefix)
+    _LIBRARIES[path].users += 1
+    return _LIBRARIES[path]
+
+
+def close_library(it: Library) -> None:
+    """Give a library back; the last to do so unloads it."""
+    it.users -= 1
+    if not it.users:
+        del _LIBRARIES[it.path]
+        it.unload()
+
+
+def address(function: Any) -> int:
+    """Where a function of a loaded library stands in memory."""
+    return ctypes.cast(function, ctypes.c_void_p).value or 0
+
+
+def names_of_platform(version: str) -> tuple[str, str]:
+    """This platform's folder of binaries by the names of FMI 2.0 and 3.0, the right one for the version first."""
+    names = (fmpy.platform, fmpy.platform_tuple)
+    return names if version < "3" else names[::-1]
+
+
+def library(folder: Path, interface: Interface, name: str) -> Path:
+    """The shared library of an unpacked FMU for this platform, even if it is not named after the model.
+
+    Where it is not, it is the only one there, or the only one among several that can step: others are what it needs.
+
+    Args:
+        folder: where the FMU was unpacked.
+        interface: its interface.
+        name: the file as the user knows it, for messages.
+
+    Raises:
+        FmuFileError: there is none, or no telling which; the message says for which platforms there are some.
+    """
+    binaries = folder / "binaries"
+    named = f"{Path(interface.identifier).name}{fmpy.sharedLibraryExtension}"  # never one outside the archive
+    for platform in names_of_platform(interface.version):
+        place = binaries / platform
+        if (place / named).is_file():
+            return place / named
+        others = sorted(place.glob(f"*{fmpy.sharedLibraryExtension}")) if place.is_dir() else []
+        usable = [path for path in others if len(others) == 1 or b"DoStep" in path.read_bytes()]
+        if len(usable) == 1:
+            return usable[0]
+        if others:
+            names = ", ".join(path.name for path in usable or others)
+            raise FmuFileError(f"{name} has several libraries for {platform} ({names}) and none called {named}")
+    found = sorted(p.name for p in binaries.iterdir() if p.is_dir() and any(p.iterdir())) if binaries.is_dir() else []
+    wanted = names_of_platform(interface.version)[0]
+    raise FmuFileError(f"{name} has no binary for {wanted}; it brings {', '.join(found) or 'none at all'}")
+
+
+def forget_paths(folder: Path) -> None:
+    """Take an unpack folder's entries off ``sys.path``, where Python FMUs put them at every instantiation."""
+    sys.path[:] = [entry for entry in sys.path if not entry.startswith(str(folder))]

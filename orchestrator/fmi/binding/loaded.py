@@ -1,0 +1,377 @@
+"""What FMUs of every version of FMI share when they are loaded into this process: log, statuses, steps in parts.
+
+The versions differ in names and arguments of their functions: see `fmu`, `fmi1` and `fmi3`.
+"""
+
+from __future__ import annotations
+
+import ctypes
+import math
+import os
+import struct
+from abc import ABC, abstractmethod
+from collections import deque
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any, ClassVar
+
+from fmpy import fmi2
+from fmpy.fmi1 import printLogMessage
+
+from ...errors import FmuError, StoppedError
+from ..interface import Interface, Type
+from ..slave import STATUS, Channel
+from .channel import FmuChannel, MixedChannel
+from .libraries import Signatures, close_library, library, open_library
+
+OK, WARNING, DISCARD, FATAL, PENDING = 0, 1, 2, 4, 5
+_SHORTEST_PART = 1e-6
+"""The smallest part of a communication step in which an FMU that discards it is asked to take it."""
+_MOST_PARTS = 10_000
+_LOG_LINES = 50
+_NO_INSTANCE = ", and says nothing; the library may belong to another modelDescription.xml, or miss a file or a licence"
+_TIME = struct.Struct("=d")
+STATE_HEAD = _TIME.size
+"""Bytes of ours before the FMU's own in a serialized state: the time."""
+
+_LOGS: dict[int | bytes, deque[str]] = {}
+"""What living FMUs said, by the keys that each may hand back with its messages."""
+
+
+def keep_message(keys: Sequence[int | bytes | None], status: int, message: bytes | None) -> bool:
+    """Put a message into the log of the first key that is known; False if none is."""
+    for key in keys:
+        log = None if key is None else _LOGS.get(key)
+        if log is not None:
+            label = STATUS[status] if 0 <= status < len(STATUS) else str(status)
+            log.extend(f"[{label}] {line}" for line in (message or b"").decode(errors="replace").splitlines())
+            return True
+    return False
+
+
+def _log(environment: int | None, instance: bytes | None, status: int, category: bytes, message: bytes) -> None:
+    if not keep_message((environment, instance), status, message):  # an FMU that FMPy runs beside us
+        printLogMessage(environment, instance, status, category, message)  # type: ignore[arg-type]
+
+
+LOGGER = fmi2.fmi2CallbackLoggerTYPE(_log)
+"""One for all FMUs of FMI 1.0 and 2.0: FMPy's proxy, which fills a message's arguments in, knows only the logger it was
+given last. They pass the same arguments, but for the first: the environment in 2.0, the instance's address in 1.0."""
+
+
+class LoadedSlave(ABC):
+    """An FMU loaded into this process.
+
+    Args:
+        name: the instance's name in the system.
+        interface: its interface.
+        folder: where the FMU was unpacked.
+        log: where what it says is kept; the last lines by default.
+
+    Raises:
+        FmuError: it cannot be loaded or instantiated.
+    """
+
+    SIGNATURES: ClassVar[Signatures]
+    TYPES: ClassVar[Mapping[str, tuple[str, Any]]]
+    """By type of variable: the end of the names of its functions, and what it is in C."""
+    SET: ClassVar[str]
+    GET: ClassVar[str]
+    DO_STEP: ClassVar[str]
+    TERMINATE: ClassVar[str]
+    FREE: ClassVar[str]
+    CANCEL: ClassVar[str] = ""
+    INTERPOLATE: ClassVar[str] = ""
+    STATE: ClassVar[tuple[str, str, str, str, str, str]]
+    """The functions that get, set, free, measure, serialize and deserialize a saved state."""
+    COUNTS_VALUES = False
+    """Whether functions that set and get want to know the number of values, too."""
+
+    def __init__(self, name: str, interface: Interface, folder: Path, log: deque[str] | None = None) -> None:
+        self.name = name
+        self.interface = interface
+        self.time = 0.0
+        self.log: deque[str] = deque(maxlen=_LOG_LINES) if log is None else log
+        self._dead = False
+        self._span = (0.0, 0.0)
+        self._keys: list[int | bytes] = []
+        self._library = None
+        self.hear_as(id(self), name.encode())
+        # pythonfmu passes even its errors on only while debug logging is on; others then flood us with details.
+        self._talks = bool(interface.vendor) or "pythonfmu" in interface.generator.lower()
+        try:
+            self._library = open_library(library(folder, interface, interface.model), self.SIGNATURES, self._prefix())
+            self.functions, self._addresses = self._library.functions, self._library.addresses
+            self.pointer = self._instantiate(folder) or self._ask_why(folder)
+            if not self.pointer:
+                raise RuntimeError("it gives no instance" + ("" if self.log else _NO_INSTANCE))
+            self._do_step = self.function(self.DO_STEP)
+        except Exception as error:
+            self._release()
+            what = _without_head(error).replace(f"{folder}{os.sep}", "")
+            raise FmuError(f"cannot be instantiated: {what}", instance=name, log=self.log) from error
+
+    def _ask_why(self, folder: Path) -> int:
+        """Once more, with debug logging: what the matter is, many say only then."""
+        talks, self._talks = self._talks, True
+        return 0 if talks or self.log else self._instantiate(folder) or 0
+
+    def _prefix(self) -> str:
+        """What stands before the names of its functions."""
+        return ""
+
+    @abstractmethod
+    def _instantiate(self, folder: Path) -> int | None:
+        """The address of a new instance."""
+
+    # ---------------------------------------------------------------- calls and what they say
+
+    def hear_as(self, *keys: int | bytes) -> None:
+        """Messages that come with one of these keys are this instance's."""
+        self._keys += keys
+        _LOGS.update(dict.fromkeys(keys, self.log))
+
+    def function(self, name: str) -> Any:
+        """A function of the library.
+
+        Raises:
+            FmuError: the library has none of that name.
+        """
+        try:
+            return self.functions[name]
+        except KeyError:
+            raise FmuError(f"its library has no function {name}", instance=self.name, time=self.time) from None
+
+    def addresses(self, call: str) -> tuple[int, int]:
+        """Where a function and the instance stand in memory, for the kernel."""
+        return self._addresses[call], self.pointer
+
+    def call(self, name: str, *arguments: Any) -> None:
+        """Make a call that has to succeed."""
+        status = self.function(name)(self.pointer, *arguments)
+        if status:
+            self.check(name, status)
+
+    def check(self, call: str, status: int) -> None:
+        """Raise unless the status of a call is ok or warning."""
+        if 0 <= status <= WARNING:
+            return
+        self._dead = status == FATAL
+        what = f"{call} failed"
+        if status == PENDING:
+            self._cancel()
+            what = f"{call} is pending: asynchronous FMUs are not supported"
+        raise self._failure(what, status)
+
+    def _failure(self, what: str, status: int) -> FmuError:
+        label = STATUS[status] if 0 <= status < len(STATUS) else f"{status} (unknown)"
+        return FmuError(what, instance=self.name, time=self.time, status=label, log=self.log)
+
+    def _cancel(self) -> None:
+        """Stop a step under way, without which an FMU must not be freed; where that fails, it is left alone."""
+        cancel = self.functions.get(self.CANCEL)
+        self._dead = cancel is None or cancel(self.pointer) not in (OK, WARNING)
+
+    def refuse(self, what: str) -> FmuError:
+        """An error about something that this FMU does not do."""
+        return FmuError(what, instance=self.name, time=self.time)
+
+    # ---------------------------------------------------------------- values
+
+    def references(self, names: Sequence[str]) -> Any:
+        """The value references of variables, for C."""
+        return (ctypes.c_uint * len(names))(*(self.interface.variables[name].reference for name in names))
+
+    def channel(self, kind: Type, names: Sequence[str]) -> Channel:
+        """Prepare variables of one type for being set or read together."""
+        parts: dict[str, list[int]] = {}
+        for place, name in enumerate(names):
+            parts.setdefault(self.interface.variables[name].fmi_type or kind, []).append(place)
+        if len(parts) == 1:
+            return FmuChannel(self, next(iter(parts)), names)
+        return MixedChannel(
+            [(FmuChannel(self, each, [names[k] for k in places]), places) for each, places in parts.items()], len(names)
+        )
+
+    # ---------------------------------------------------------------- initialization
+
+    def setup(self, start_time: float, stop_time: float) -> None:
+        """Announce the experiment; of one that may go on beyond its end, the stop time is infinite.
+
+        The stop time is a trifle late: the last step may end after it by a rounding error, and some FMUs refuse that.
+        """
+        self.time = start_time
+        self._span = (start_time, stop_time + 8.0 * math.ulp(max(abs(start_time), abs(stop_time))))
+
+    def _end(self) -> tuple[bool, float]:
+        """Whether an end of the experiment was announced, and which, in s."""
+        stop = self._span[1]
+        return math.isfinite(stop), stop if math.isfinite(stop) else 0.0
+
+    @abstractmethod
+    def enter_initialization(self) -> None:
+        """Enter initialization mode."""
+
+    @abstractmethod
+    def exit_initialization(self) -> None:
+        """Leave initialization mode."""
+
+    # ---------------------------------------------------------------- steps
+
+    def step(self, time: float, length: float, *, final: bool = True) -> None:
+        """Advance from ``time`` by ``length``, both in s; not ``final`` where an older state may be restored."""
+        self.time = time
+        status = self._do_step(self.pointer, time, length, final)
+        if status:
+            self.resume(time, length, status, final)
+        self.time = time + length
+
+    def resume(self, time: float, length: float, status: int, final: bool) -> None:
+        """Go on after a step returned something else than ok: an FMU that discarded it may take it in parts.
+
+        The standard (FMI 2.0, 4.2.2) lets an FMU stop early, at its last successful time, or refuse a step that is too
+        long for it. The rest, or half of it, is then tried with the inputs held.
+
+        Raises:
+            StoppedError: it asks for the end of the simulation.
+            FmuError: it failed, or does not get on.
+        """
+        self.time, end, part, shortest = time, time + length, length, _SHORTEST_PART * length
+        for _ in range(_MOST_PARTS):
+            reached = self._reached(time + part, status)
+            if self._stops(status):
+                when = time if reached is None else reached
+                raise StoppedError("asks for the end of the simulation", instance=self.name, time=when)
+            if reached is None:
+                break
+            if reached > end + shortest:
+                raise self._failure(f"says that it got to t = {reached:g} s in the step to t = {end:g} s", status)
+            on = reached > time + shortest
+            time, part = (reached, end - reached) if on else (time, 0.5 * part)
+            self.time = time
+            if time >= end - shortest:
+                return
+            if part < shortest or not self.interface.variable_step:
+                break
+            status = self._attempt(time, part, final, again=not on)
+        if status in (OK, WARNING, DISCARD):
+            raise self._failure(f"discarded the step{self._why(reached, part)}", DISCARD)
+        self.check(self.DO_STEP, status)
+
+    def _why(self, reached: float | None, part: float) -> str:
+        """Why what is left of a discarded step is not taken in parts, and what a user can do."""
+        if reached is None:
+            return " and does not say how far it got, so that nothing else can be tried"
+        if not self.interface.variable_step:
+            return ", and takes steps of one length only: choose another step"
+        return f", and takes none from there on, not even one of {part:.2g} s"
+
+    def _attempt(self, time: float, part: float, final: bool, *, again: bool) -> int:
+        """Try a part of a step; ``again`` where a longer one from the same point was discarded."""
+        return int(self._do_step(self.pointer, time, part, final))
+
+    def _reached(self, end: float, status: int) -> float | None:
+        """How far a step that was to reach ``end`` came; None if it failed."""
+        if status in (OK, WARNING):
+            return end
+        return self._last_successful_time() if status == DISCARD else None
+
+    @abstractmethod
+    def _last_successful_time(self) -> float | None:
+        """How far a discarded step came; None if the FMU does not say."""
+
+    def _stops(self, status: int) -> bool:
+        """Whether the FMU asks for the end of the simulation."""
+        return False
+
+    # ---------------------------------------------------------------- saved states
+
+    def save(self) -> Any:
+        """The present state: a handle of the FMU's, and the time.
+
+        Raises:
+            FmuError: it cannot.
+        """
+        handle = ctypes.c_void_p()
+        self._state_call(0, ctypes.byref(handle))
+        return self.time, handle
+
+    def _state_call(self, which: int, *arguments: Any) -> None:
+        interface = self.interface
+        if not (interface.can_save_state if which < 3 else interface.can_serialize_state):
+            what = "save its state" if which < 3 else "write its state down"
+            raise self.refuse(f"it cannot {what} (FMI {interface.version})")
+        self.call(self.STATE[which], *arguments)
+
+    def restore(self, state: Any) -> None:
+        """Come back to a saved state; it stays saved."""
+        self._state_call(1, state[1])
+        self.time = state[0]
+
+    def forget(self, state: Any) -> None:
+        """Give a saved state back."""
+        if not self._dead and self._library is not None:
+            self._state_call(2, ctypes.byref(state[1]))
+
+    def serialize(self, state: Any) -> bytes:
+        """A saved state as bytes: the time, and what the FMU makes of its own."""
+        size = ctypes.c_size_t()
+        self._state_call(3, state[1], ctypes.byref(size))
+        content = ctypes.create_string_buffer(size.value)
+        self._state_call(4, state[1], content, size.value)
+        return _TIME.pack(state[0]) + content.raw
+
+    def deserialize(self, content: bytes) -> Any:
+        """A saved state, out of its bytes."""
+        if len(content) < STATE_HEAD:
+            raise self.refuse("these bytes are no saved state")
+        (time,) = _TIME.unpack_from(content)
+        own = content[STATE_HEAD:]
+        handle = ctypes.c_void_p()
+        self._state_call(5, ctypes.create_string_buffer(own, len(own)), len(own), ctypes.byref(handle))
+        return time, handle
+
+    # ---------------------------------------------------------------- derivatives
+
+    @abstractmethod
+    def directional_derivatives(
+        self, unknowns: Sequence[str], knowns: Sequence[str], seed: Sequence[float]
+    ) -> list[float]:
+        """How the unknowns change when the knowns change by ``seed``; all are Real variables."""
+
+    def interpolate(self, names: Sequence[str], orders: Sequence[int], values: Sequence[float]) -> None:
+        """Time derivatives of inputs over the coming step: one name, order (from 1) and value each."""
+        if not self.interface.interpolates_inputs:
+            raise self.refuse("it does not interpolate its inputs")
+        count = len(names)
+        given = (ctypes.c_int * count)(*orders), (ctypes.c_double * count)(*values)
+        self.call(self.INTERPOLATE, self.references(names), count, *given)
+
+    # ---------------------------------------------------------------- the end
+
+    def terminate(self) -> None:
+        """End the run."""
+        self.call(self.TERMINATE)
+
+    def free(self) -> None:
+        """Give the instance and its library back; after a fatal status neither, as FMI 2.0 (2.1.3) has it.
+
+        An FMU made with pythonfmu 0.7 has dropped its Python objects by then, and drops them again when freed: the
+        process would crash.
+        """
+        if not self._dead and self._library is not None:
+            self.function(self.FREE)(self.pointer)
+        self._release()
+
+    def _release(self) -> None:
+        if not self._dead and self._library is not None:
+            close_library(self._library)
+            self._library = None
+        for key in self._keys:
+            if _LOGS.get(key) is self.log:
+                del _LOGS[key]
+
+
+def _without_head(error: Exception) -> str:
+    """What went wrong; of an error of ours without instance and time, which are said once."""
+    return Exception.__str__(error) if isinstance(error, FmuError) else str(error)

@@ -1,0 +1,116 @@
+"""From the instances of a system to models that can be instantiated: FMU files read, components built."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Literal
+
+from ...fmus.build import Plain, build, plain
+from ...fmus.release import package
+from ..errors import FmuFileError, ScenarioError
+from ..system import Instance, System
+from .archive import Workspace
+from .binding.libraries import library
+from .binding.versions import SLAVES
+from .interface import Interface
+from .plain import PlainSlave
+from .reader import read_interface
+from .slave import Slave
+
+Kind = Literal["auto", "native", "python", "plain"]
+KINDS: tuple[Kind, ...] = ("auto", "native", "python", "plain")
+
+
+@dataclass(frozen=True)
+class Model:
+    """What an instance is made of.
+
+    Attributes:
+        interface: what it shows.
+        kind: ``"fmu"`` for a file of the user's, ``"native"`` or ``"python"`` for a component packaged here,
+            ``"plain"`` for one in this process.
+        path: the FMU file; None for a plain component.
+        digest: SHA-256 of the file, or the component's own digest.
+        note: why it is not of the kind a user would expect; empty mostly.
+    """
+
+    interface: Interface
+    kind: str
+    folder: Path
+    path: Path | None
+    digest: str
+    plain: Plain | None = None
+    note: str = ""
+
+    def instantiate(self, name: str) -> Slave:
+        """One instance.
+
+        Raises:
+            FmuError: it cannot be loaded or instantiated.
+        """
+        if self.plain is not None:
+            return PlainSlave(name, self.interface, self.plain.instantiate())
+        return SLAVES[self.interface.version](name, self.interface, self.folder)
+
+
+def load_models(system: System, workspace: Workspace, kind: Kind = "auto") -> dict[str, Model]:
+    """The model of every instance; instances of the same file or component share one.
+
+    Raises:
+        ScenarioError: all instances whose model is missing or unusable, together.
+    """
+    shared: dict[str, Model] = {}
+    models: dict[str, Model] = {}
+    problems: dict[str, None] = {}
+    for instance in system.instances.values():
+        key = f"{instance.model} {sorted(instance.build.items())}"
+        try:
+            if key not in shared:
+                shared[key] = _load(instance, workspace, kind)
+            models[instance.name] = shared[key]
+        except (ValueError, OSError) as error:  # ComponentError and FmuFileError among them
+            family = instance.name.partition("[")[0]
+            problems[f"{instance.origin + ': ' if instance.origin else ''}instance {family!r}: {error}"] = None
+    if problems:
+        raise ScenarioError(list(problems))
+    return models
+
+
+def _load(instance: Instance, workspace: Workspace, kind: Kind) -> Model:
+    if instance.model.endswith(".fmu"):
+        if instance.build:
+            raise FmuFileError(
+                f"{instance.model} is built already; it takes no build arguments {sorted(instance.build)}"
+            )
+        model = load_fmu(Path(instance.model), workspace, "fmu")
+        found = library(model.folder, model.interface, instance.model)  # said now, not when the run has begun
+        if found.stem == model.interface.identifier:
+            return model
+        what = f"is not named after its model identifier {model.interface.identifier!r}"
+        return replace(model, note=f"{instance.model}: its library {found.name} {what}")
+    if kind == "plain":
+        component = plain(instance.model, instance.build)
+        folder = workspace.write_description(component.description)
+        interface = read_interface(folder, instance.model)
+        return Model(interface, kind, folder, None, str(interface.vendor.get("digest", "")), component)
+    if kind == "auto":
+        return _load_best(instance, workspace)
+    return load_fmu(build(instance.model, instance.build, kind=kind), workspace, kind)
+
+
+def _load_best(instance: Instance, workspace: Workspace) -> Model:
+    """A native FMU where one can be made here, a Python FMU with a note that says why not elsewhere."""
+    path, kind, problem = package(instance.model, instance.build, "auto")
+    model = load_fmu(path, workspace, kind)
+    return replace(model, note=f"running Python FMUs, not native ones: {problem}") if problem else model
+
+
+def load_fmu(path: Path, workspace: Workspace, kind: str = "fmu") -> Model:
+    """Unpack and read one FMU file.
+
+    Raises:
+        FmuFileError: missing, hostile or unusable.
+    """
+    folder, digest = workspace.unpack(path)
+    return Model(read_interface(folder, str(path)), kind, folder, path, digest)

@@ -1,0 +1,102 @@
+"""Which instances of a system run in processes of their own, and what is wrong with saying so."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Mapping
+from dataclasses import replace
+
+from ..errors import ScenarioError, did_you_mean
+from ..fmi import Interface, Model, Slave
+from ..system import Instance, System
+from .proxy import IsolatedSlave
+
+ALL = "all"
+
+
+def is_isolated(model: Model, instance: Instance) -> bool:
+    """Whether it runs in a process of its own; a component as Python objects is in this process by its nature."""
+    return instance.isolate and model.plain is None
+
+
+def instantiate(model: Model, instance: Instance) -> Slave:
+    """One instance, in a process of its own if it asks for that.
+
+    Raises:
+        FmuError: it cannot be loaded or instantiated; of an isolated one, its first call says so.
+    """
+    if not is_isolated(model, instance):
+        return model.instantiate(instance.name)
+    return IsolatedSlave(
+        instance.name,
+        model.interface,
+        model.folder,
+        step_timeout=instance.step_timeout,
+        memory_limit=instance.memory_limit,
+    )
+
+
+def isolate(system: System, names: Iterable[str]) -> System:
+    """The system with some instances isolated.
+
+    Args:
+        system: it is not changed.
+        names: of instances, or of groups of them (``"train"`` for all of ``"train[1]"`` and so on); ``"all"`` for all.
+
+    Raises:
+        ScenarioError: there is no such instance.
+    """
+    groups: dict[str, list[str]] = {ALL: list(system.instances)}
+    for name in system.instances:
+        groups.setdefault(name.partition("[")[0], []).append(name)
+    groups |= {name: [name] for name in system.instances}
+    wanted = list(names)
+    unknown = [name for name in wanted if name not in groups]
+    if unknown:
+        raise ScenarioError(
+            [f"isolate {name!r}: the system has no such instance{did_you_mean(name, groups)}" for name in unknown]
+        )
+    chosen = {member for name in wanted for member in groups[name]}
+    instances = {name: replace(x, isolate=x.isolate or name in chosen) for name, x in system.instances.items()}
+    return replace(system, instances=instances)
+
+
+def check_isolation(system: System) -> list[str]:
+    """What is wrong with how instances are to be isolated."""
+    useless: dict[tuple[str, str], list[str]] = {}
+    problems = []
+    for instance in system.instances.values():
+        for key in ("step_timeout", "memory_limit"):
+            value = getattr(instance, key)
+            origin = system.origins.get(f"instances.{instance.name}.{key}", instance.origin)
+            if value is not None and not instance.isolate:
+                useless.setdefault((f"{origin}: " if origin else "", key), []).append(instance.name)
+            elif value is not None and not 0.0 < value < math.inf:
+                problems.append(f"{instance.name}: {key} takes a number greater than 0, not {value!r}")
+    for (origin, key), names in useless.items():
+        family = names[0].partition("[")[0]
+        problems.append(
+            f"{origin}{', '.join(names)}: {key} is for an instance in a process of its own; set isolate = true, or run "
+            f"with --isolate {family}"
+        )
+    return problems
+
+
+def check_once_per_process(system: System, interfaces: Mapping[str, Interface]) -> list[str]:
+    """FMUs of which several instances share this process though they say that they cannot."""
+    users: dict[str, list[str]] = {}
+    for name, interface in interfaces.items():
+        if interface.single_instance and not system.instances[name].isolate:
+            users.setdefault(interface.guid, []).append(name)
+    return [
+        f"{', '.join(names)}: this FMU can be instantiated only once per process; give all but one of them a process "
+        "of its own by isolate = true"
+        for names in users.values()
+        if len(names) > 1
+    ]
+
+
+def isolation_notes(system: System, models: Mapping[str, Model]) -> list[str]:
+    """What a user should know of it."""
+    plain = [name for name, x in system.instances.items() if x.isolate and not is_isolated(models[name], x)]
+    return [f"not isolated, because plain components run in this process: {', '.join(plain)}"] if plain else []

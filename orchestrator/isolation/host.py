@@ -1,0 +1,354 @@
+"""The process of an isolated instance: it loads the FMU and does what the master asks for, until told to end.
+
+It is started without the rest of the package (see `process`), so what is imported here at the top is little.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import ctypes
+import mmap
+import os
+import pickle
+import signal
+import socket
+import sys
+import threading
+import time
+from collections import deque
+from collections.abc import Callable, Iterable, Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from . import messages
+from .messages import NOTE_CALL, NOTE_MEMORY, Cells, Door, note
+
+if TYPE_CHECKING:
+    from ..fmi import Channel, Slave
+
+_LOG_LINES = 50
+_LOOK_SECONDS = 0.25
+"""How often the caretaker looks after the process."""
+_MOST_OUTPUT = 4 << 20
+"""Bytes of output kept in the file: an FMU that prints at every step must not fill the disk."""
+_KILL_WITH_PARENT = 1
+"""PR_SET_PDEATHSIG of Linux's prctl."""
+
+
+class _Heard(deque[str]):
+    """What the FMU says, kept as ever and written into the file of its output, where it outlives a crash."""
+
+    def extend(self, lines: Iterable[str]) -> None:
+        for line in lines:
+            self.append(line)
+
+    def append(self, line: str) -> None:
+        super().append(line)
+        with contextlib.suppress(OSError):
+            os.write(1, f"{line}\n".encode(errors="replace"))
+
+
+class Host:
+    """Does what the frames of the master say.
+
+    Args:
+        door: to the master.
+        memory: shared with it.
+        notes: the head of that memory, as whole numbers.
+        before: what the process had allocated before there was an FMU, in KiB.
+        limit: what it may allocate beyond that, in KiB; None for no limit.
+    """
+
+    def __init__(self, door: Door, memory: mmap.mmap, notes: memoryview, before: int, limit: int | None) -> None:
+        self._door = door
+        self._memory = memory
+        self._notes = notes
+        self._before = before
+        self._limit = limit
+        self._slave: Slave | None = None
+        self._channels: list[tuple[Channel, Cells | None]] = []
+        self._texts: dict[int, Sequence[Any]] = {}
+        self._watched: list[int] = []
+        self._states: dict[int, Any] = {}
+        self._problem: Exception | None = None
+        """What went wrong since the last answer."""
+
+    def instantiate(self, make: Callable[[deque[str]], Slave]) -> None:
+        """Make the instance, whose messages go where they outlive a crash, and tell how it went."""
+        self._notes[NOTE_CALL] = note("instantiate")
+        try:
+            self._slave = make(_Heard(maxlen=_LOG_LINES))
+            self._report({})
+        except Exception as error:
+            self._report({"error": self._describe(error)})
+
+    def serve(self) -> None:
+        """Obey until the master leaves."""
+        quiet: dict[int, Callable[[Any], None]] = {
+            messages.CHANNEL: self._add_channel,
+            messages.WATCH: self._watch,
+            messages.VALUES: self._keep_values,
+            messages.RESTORE: self._restore,
+            messages.FORGET: self._forget,
+        }
+        while True:
+            kind, body = self._door.receive()
+            if kind == messages.STEP:
+                self._step(body)
+            elif kind == messages.CALL:
+                self._call(*messages.content(body))
+            else:
+                try:
+                    quiet[kind](messages.content(body))
+                except Exception as error:
+                    self._problem = self._problem or error
+                self._notes[NOTE_CALL] = 0
+
+    # ---------------------------------------------------------------- answered
+
+    def _step(self, body: bytes) -> None:
+        length = messages.STEP_BODY.size
+        time, step, final = messages.STEP_BODY.unpack_from(body)
+        try:
+            self._set(memoryview(body)[length:].cast("I") if len(body) > length else ())
+            self._notes[NOTE_CALL] = _STEPPING
+            self._instance.step(time, step, final=bool(final))
+        except Exception as error:
+            self._report({"error": self._describe(error)})
+            return
+        told = self._read(self._watched)
+        if told:
+            self._report(told)
+        else:
+            self._notes[NOTE_CALL] = 0
+            self._door.send(messages.ANSWER)
+
+    def _call(self, dirty: Sequence[int], operation: str, arguments: tuple[Any, ...]) -> None:
+        """Set what waits to be set, then do what has a name."""
+        if operation == "free":
+            self._free()
+        try:
+            self._set(dirty)
+            told = self._read(arguments[0]) if operation == "get" else {"result": self._do(operation, arguments)}
+        except Exception as error:
+            told = {"error": self._describe(error)}
+        self._report(told)
+
+    def _do(self, operation: str, arguments: tuple[Any, ...]) -> Any:
+        if not operation:
+            return None
+        self._notes[NOTE_CALL] = note(operation)
+        own: dict[str, Callable[..., Any]] = {
+            "save": self._save,
+            "serialize": self._serialize,
+            "deserialize": self._deserialize,
+        }
+        call = own[operation] if operation in own else getattr(self._instance, operation)
+        return call(*arguments)
+
+    def _free(self) -> None:
+        self._notes[NOTE_CALL] = note("free")
+        if self._slave is not None:
+            self._slave.free()
+        self._door.send(messages.ANSWER)
+        # Not by the usual way: some FMUs crash when their libraries are torn down, and all has been given back.
+        os._exit(0)
+
+    def _report(self, told: dict[str, Any]) -> None:
+        self._notes[NOTE_CALL] = 0
+        self._door.send(messages.frame(messages.REPORT, told | {"time": self._slave.time if self._slave else 0.0}))
+
+    @property
+    def _instance(self) -> Slave:
+        assert self._slave is not None
+        return self._slave
+
+    def _describe(self, error: Exception) -> dict[str, Any]:
+        told = messages.describe(error)
+        used = _memory_in_use() - self._before
+        if isinstance(error, MemoryError) and self._limit is not None:
+            used = self._limit
+        told["message"] += messages.memory_hint(used, self._limit)
+        return told
+
+    # ---------------------------------------------------------------- values
+
+    def _set(self, dirty: Iterable[int]) -> None:
+        if self._problem is not None:
+            problem, self._problem = self._problem, None
+            raise problem
+        for k in dirty:
+            channel, cells = self._channels[k]
+            self._notes[NOTE_CALL] = note("set", k)
+            if k in self._texts:
+                channel.set(self._texts.pop(k))
+            elif cells is not None:
+                channel.set(cells.read())
+
+    def _read(self, wanted: Iterable[int]) -> dict[str, Any]:
+        """Read channels into the shared memory; what does not fit there, and the first that fails, is told."""
+        told: dict[str, Any] = {}
+        for k in wanted:
+            channel, cells = self._channels[k]
+            self._notes[NOTE_CALL] = note("get", k)
+            try:
+                values = channel.get()
+            except Exception as error:
+                told["failed"] = k, self._describe(error)
+                break
+            if cells is None or not cells.write(values):
+                told.setdefault("texts", {})[k] = values
+        return told
+
+    def _add_channel(self, content: tuple[Any, Sequence[str], int | None]) -> None:
+        kind, names, offset = content
+        cells = None if offset is None else Cells(self._memory, offset, kind, len(names))
+        self._channels.append((self._instance.channel(kind, names), cells))
+
+    def _watch(self, channels: list[int]) -> None:
+        self._watched = channels
+
+    def _keep_values(self, content: tuple[int, Sequence[Any]]) -> None:
+        self._texts[content[0]] = content[1]
+
+    # ---------------------------------------------------------------- saved states
+
+    def _save(self, number: int) -> None:
+        self._states[number] = self._instance.save()
+
+    def _serialize(self, number: int) -> bytes:
+        return self._instance.serialize(self._states[number])
+
+    def _deserialize(self, number: int, content: bytes) -> float:
+        self._states[number] = self._instance.deserialize(content)
+        time: float = self._states[number][0]
+        return time
+
+    def _restore(self, number: int) -> None:
+        self._notes[NOTE_CALL] = note("restore")
+        self._instance.restore(self._states[number])
+
+    def _forget(self, number: int) -> None:
+        self._notes[NOTE_CALL] = note("forget")
+        self._instance.forget(self._states.pop(number))
+
+
+_STEPPING = note("step")
+
+
+# -------------------------------------------------------------------- the process
+
+
+def main(folder: str, door: str) -> None:
+    """Serve one instance; called by the few lines that `process` starts.
+
+    Args:
+        folder: of the files that are shared with the master.
+        door: the number of the inherited socket, or ``"host:port"`` of one to connect to.
+    """
+    end = _connect(door)
+    start: dict[str, Any] = pickle.loads((Path(folder) / "start").read_bytes())
+    with contextlib.suppress(ValueError):  # a Ctrl-C is for the master, which ends the run properly
+        signal.signal(signal.SIGINT, signal.SIG_IGN)
+    sys.path[:] = start["path"]
+    _stay_with_parent(start["of_main_thread"])
+    _print_by_lines()
+    with (Path(folder) / "memory").open("r+b") as stream:
+        memory = mmap.mmap(stream.fileno(), 0)
+    notes = memoryview(memory)[: messages.HEAD].cast("q")
+    from ..fmi.binding import SLAVES  # noqa: PLC0415 (after the path is set; and what it needs is not the FMU's memory)
+
+    name, folder_of_fmu, interface = start["name"], Path(start["folder"]), pickle.loads(start["interface"])
+    before = _memory_in_use()
+    limit = _limit_memory(before, start["memory_limit"])
+    host = Host(end, memory, notes, before, limit)
+    threading.Thread(target=_take_care, args=(start["parent"], notes, before), daemon=True).start()
+    try:
+        end.send(messages.frame(messages.READY, limit))
+        host.instantiate(lambda log: SLAVES[interface.version](name, interface, folder_of_fmu, log))
+        host.serve()
+    except (EOFError, OSError):  # the master is gone
+        os._exit(1)
+
+
+def _connect(door: str) -> Door:
+    if door.isdigit():
+        os.set_inheritable(int(door), False)  # for no process that the FMU starts
+        return Door(socket.socket(fileno=int(door)))
+    address, _, port = door.rpartition(":")
+    end = socket.create_connection((address, int(port)))
+    end.sendall(sys.stdin.buffer.readline().strip())
+    return Door(end)
+
+
+def _print_by_lines() -> None:
+    """What an FMU prints is on disk at the end of each line, so that it can be had after a crash."""
+    with contextlib.suppress(Exception):
+        library = ctypes.CDLL(None)
+        stdout = ctypes.c_void_p.in_dll(library, "stdout")
+        library.setvbuf(stdout, None, _LINES, ctypes.c_size_t(1 << 12))
+
+
+_LINES = 1
+"""_IOLBF, on Linux and on macOS."""
+
+
+def _stay_with_parent(of_main_thread: bool) -> None:
+    """Let Linux end this process with the master, and choose it, not the master, when memory runs out.
+
+    The signal comes when the *thread* ends that has started us: it is asked for where that is the master's main thread.
+    """
+    if not sys.platform.startswith("linux"):
+        return
+    if of_main_thread:
+        ctypes.CDLL(None).prctl(_KILL_WITH_PARENT, signal.SIGKILL, 0, 0, 0)
+    with contextlib.suppress(OSError):
+        Path("/proc/self/oom_score_adj").write_text("1000")
+
+
+def _limit_memory(before: int, mebibytes: float | None) -> int | None:
+    """Limit what may be allocated beyond ``before`` KiB; the limit in KiB, or None where the platform has none."""
+    if mebibytes is None or not before:
+        return None
+    import resource  # noqa: PLC0415 (not on Windows)
+
+    limit = int(mebibytes * 1024)
+    resource.setrlimit(resource.RLIMIT_DATA, ((before + limit) * 1024,) * 2)
+    return limit
+
+
+def _memory_in_use() -> int:
+    """What this process has allocated, in KiB; 0 where nobody tells."""
+    try:
+        with open("/proc/self/statm", encoding="ascii") as stream:
+            return int(stream.read().split()[5]) * mmap.PAGESIZE // 1024
+    except OSError:
+        return 0
+
+
+def _take_care(parent: int, notes: memoryview, before: int) -> None:
+    """End the process with its master, even inside a long step; watch its memory and the size of its output."""
+    while not _is_gone(parent, _LOOK_SECONDS):
+        notes[NOTE_MEMORY] = max(notes[NOTE_MEMORY], _memory_in_use() - before)
+        with contextlib.suppress(OSError):
+            if os.fstat(1).st_size > _MOST_OUTPUT:
+                os.ftruncate(1, 0)
+    os._exit(1)
+
+
+def _is_gone(parent: int, seconds: float) -> bool:
+    """Whether the master ends within some time."""
+    if sys.platform == "win32":
+        import _winapi  # noqa: PLC0415
+
+        synchronize, milliseconds = 0x100000, int(1000 * seconds)
+        try:
+            handle = _winapi.OpenProcess(synchronize, False, parent)
+        except OSError:
+            return True
+        try:
+            return bool(_winapi.WaitForSingleObject(handle, milliseconds) == 0)
+        finally:
+            _winapi.CloseHandle(handle)
+    time.sleep(seconds)
+    return os.getppid() != parent

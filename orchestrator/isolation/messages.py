@@ -1,0 +1,166 @@
+"""What the master and the process of an isolated instance say to each other.
+
+Numbers stand in a file that both map into their memory; calls and answers go as frames over a socket. The one who has
+rung leaves the memory alone until the other has answered.
+"""
+
+from __future__ import annotations
+
+import mmap
+import pickle
+import socket
+import struct
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, Any
+
+from ..errors import FmuError, StoppedError
+
+if TYPE_CHECKING:
+    from ..fmi import Type
+
+STEP, CALL, CHANNEL, WATCH, VALUES, RESTORE, FORGET = range(7)
+"""Frames to the host. The first two are answered; what went wrong with one of the others comes with the next answer."""
+READY, DONE, REPORT = range(16, 19)
+"""Frames from the host: it has started; all went as asked; what there is to tell."""
+
+FRAME = struct.Struct("<BI")
+"""A frame's kind, and the length of what follows."""
+STEP_FRAME = struct.Struct("<BIddB")
+STEP_BODY = struct.Struct("<ddB")
+"""Time and length in s and whether it is final; the channels to be set before follow."""
+ANSWER = FRAME.pack(DONE, 0)
+
+HEAD = 64
+"""Bytes before the values: notes of the host as whole numbers of 64 bits, which outlive it."""
+NOTE_CALL, NOTE_MEMORY = range(2)
+"""What it is doing (see `note`), and the most memory it has been seen to use, in KiB."""
+CALLS = ("", "instantiate", "setup", "enter_initialization", "exit_initialization", "set", "step", "get", "save",
+         "restore", "forget", "serialize", "deserialize", "directional_derivatives", "interpolate", "terminate",
+         "free")  # fmt: skip
+"""What an FMU is asked to do, by number in `NOTE_CALL`."""
+NUMBERS = {name: number for number, name in enumerate(CALLS)}
+_CHUNK = 1 << 16
+_SUSPICIOUS = 0.5
+"""The part of the memory limit in use from which on it is named as a likely reason of a failure."""
+
+
+def note(call: str, channel: int = 0) -> int:
+    """What stands in `NOTE_CALL` during a call."""
+    return NUMBERS[call] | channel << 8
+
+
+def frame(kind: int, content: Any) -> bytes:
+    """A frame of Python objects."""
+    body = pickle.dumps(content, pickle.HIGHEST_PROTOCOL)
+    return FRAME.pack(kind, len(body)) + body
+
+
+def content(body: bytes) -> Any:
+    """What a frame of Python objects holds."""
+    return pickle.loads(body)
+
+
+class Door:
+    """One end of the socket."""
+
+    def __init__(self, end: socket.socket) -> None:
+        self._end = end
+        self._rest = b""
+        if end.family != getattr(socket, "AF_UNIX", None):
+            end.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
+
+    def send(self, frames: bytes) -> None:
+        """Ring."""
+        self._end.sendall(frames)
+
+    def receive(self) -> tuple[int, bytes]:
+        """The next frame.
+
+        Raises:
+            EOFError: the other is gone.
+            OSError: so it is, or it does not answer in time.
+        """
+        while len(self._rest) < FRAME.size:
+            self._more()
+        kind, length = FRAME.unpack_from(self._rest)
+        if length > _CHUNK:
+            self._rest = self._collect(FRAME.size + length)
+        while len(self._rest) < FRAME.size + length:
+            self._more()
+        body = self._rest[FRAME.size : FRAME.size + length]
+        self._rest = self._rest[FRAME.size + length :]
+        return kind, body
+
+    def _more(self) -> None:
+        chunk = self._end.recv(_CHUNK)
+        if not chunk:
+            raise EOFError
+        self._rest += chunk
+
+    def _collect(self, size: int) -> bytes:
+        """As many bytes as a long frame has, without copying them again for each chunk."""
+        whole = bytearray(size)
+        whole[: len(self._rest)] = self._rest
+        view, have = memoryview(whole), len(self._rest)
+        while have < size:
+            count = self._end.recv_into(view[have:])
+            if not count:
+                raise EOFError
+            have += count
+        return bytes(whole)
+
+    def wait_at_most(self, seconds: float | None) -> None:
+        """How long `send` and `receive` wait for the other."""
+        self._end.settimeout(seconds)
+
+    def close(self) -> None:
+        """Leave."""
+        self._end.close()
+
+
+class Cells:
+    """The values of one channel in the shared memory.
+
+    Args:
+        memory: the shared memory.
+        offset: where they stand in it, in bytes.
+        kind: their type: real numbers, or whole ones of 64 bits.
+        count: how many there are.
+    """
+
+    def __init__(self, memory: mmap.mmap, offset: int, kind: Type, count: int) -> None:
+        self._memory = memory
+        self._offset = offset
+        self._layout = struct.Struct(f"={count}{'d' if kind == 'Real' else 'q'}")
+
+    def write(self, values: Sequence[Any]) -> bool:
+        """Put values there; False if they do not fit, and must go another way."""
+        try:
+            self._layout.pack_into(self._memory, self._offset, *values)
+        except (struct.error, OverflowError):
+            return False
+        return True
+
+    def read(self) -> list[Any]:
+        """The values that stand there."""
+        return list(self._layout.unpack_from(self._memory, self._offset))
+
+
+def memory_hint(used: float, limit: float | None) -> str:
+    """A clause to append to an error when much of the memory that an FMU may use (both in KiB) is used, or nothing."""
+    if limit is None or used <= _SUSPICIOUS * limit:
+        return ""
+    return f"; it had {used / 1024:.0f} of the {limit / 1024:.0f} MiB that memory_limit allows: a likely reason"
+
+
+def describe(error: Exception) -> dict[str, Any]:
+    """An error as plain values, for `as_error`."""
+    if isinstance(error, FmuError):
+        told = {"instance": error.instance, "time": error.time, "status": error.status, "log": error.log}
+        return {"stops": isinstance(error, StoppedError), "message": str(error.args[0]), **told}
+    return {"stops": False, "message": f"{type(error).__name__}: {error}", "log": []}
+
+
+def as_error(stops: bool, message: str, **told: Any) -> FmuError:
+    """The error that `describe` described."""
+    return (StoppedError if stops else FmuError)(message, **told)

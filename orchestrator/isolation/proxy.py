@@ -1,0 +1,390 @@
+"""An instance in a process of its own behind the same face: its crash, hang or leak is an `FmuError`, not our end.
+
+What is set is written into shared memory and waits there; a step takes it along, and brings back what was read after
+the step before: one round trip per communication step. A step whose outputs will be read is not waited for until they
+are: instances that step one after the other in ``jacobi`` compute at the same time.
+"""
+
+from __future__ import annotations
+
+import logging
+import struct
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from ..errors import FmuError, LostError
+from ..fmi import Interface, Type
+from ..fmi.binding import call_name
+from . import messages
+from .messages import Cells, frame
+from .process import HostLostError, HostProcess
+
+_SPARE_CELLS = 4096
+_CELLS_PER_VARIABLE = 4
+"""Room in the shared memory; channels that find none send their values in messages."""
+_LOG = logging.getLogger(__name__)
+
+
+@dataclass(frozen=True, eq=False)
+class _Saved:
+    """A saved state, which lives in the process: its number there, and its time in s."""
+
+    number: int
+    time: float
+
+
+class IsolatedSlave:
+    """An FMU in a process of its own.
+
+    The process is started at once and awaited when it is first needed, so that many start at the same time: an FMU that
+    cannot be instantiated is an error of the first call.
+
+    Args:
+        name: the instance's name in the system.
+        interface: its interface.
+        folder: where the FMU was unpacked.
+        step_timeout: wall time in s after which a call counts as hanging; None for a minute.
+        memory_limit: what it may allocate, in MiB; None for half of the machine's memory.
+
+    Raises:
+        FmuError: no process can be started.
+    """
+
+    def __init__(
+        self,
+        name: str,
+        interface: Interface,
+        folder: Path,
+        *,
+        step_timeout: float | None = None,
+        memory_limit: float | None = None,
+    ) -> None:
+        self.name = name
+        self.interface = interface
+        self.time = 0.0
+        self.log: list[str] = []
+        self._room = _SPARE_CELLS + _CELLS_PER_VARIABLE * len(interface.variables)
+        self._used = 0
+        try:
+            self._process = HostProcess(
+                name,
+                interface,
+                folder,
+                cells=self._room,
+                name_call=self._name_call,
+                patience=step_timeout,
+                memory_limit=memory_limit,
+            )
+        except OSError as error:
+            raise FmuError(f"its process cannot be started: {error}", instance=name) from error
+        self._is_made = self._is_gone = False
+        self._lost: FmuError | None = None
+        self._channels: list[IsolatedChannel] = []
+        self._known: dict[tuple[Type, tuple[str, ...]], IsolatedChannel] = {}
+        self._saved = 0
+        self._queue = b""
+        """Frames that need no answer and go with the next that does."""
+        self._dirty: list[int] = []
+        """Channels that were set, in that order, and not yet sent."""
+        self.end: float | None = None
+        """The end in s of a step that is under way and was not waited for."""
+        self.moment = 0
+        """Counts what makes values that were read old."""
+        self._after_step = False
+        self.reads: dict[IsolatedChannel, None] = {}
+        """Channels read at this moment."""
+        self._habits: dict[bool, tuple[IsolatedChannel, ...]] = {False: (), True: ()}
+        """Those read the last time when there had been no step, or one: they are fetched together."""
+        self._watched: tuple[IsolatedChannel, ...] = ()
+        """Those that the process reads after a step."""
+
+    @property
+    def pid(self) -> int:
+        """The number by which the system knows its process."""
+        return self._process.pid
+
+    # ---------------------------------------------------------------- the face of an instance
+
+    def setup(self, start_time: float, stop_time: float) -> None:
+        """Announce the experiment."""
+        self._ask("setup", start_time, stop_time)
+
+    def enter_initialization(self) -> None:
+        """Enter initialization mode."""
+        self._ask("enter_initialization")
+
+    def exit_initialization(self) -> None:
+        """Leave initialization mode."""
+        self._ask("exit_initialization")
+
+    def channel(self, kind: Type, names: Sequence[str]) -> IsolatedChannel:
+        """Prepare variables of one type for being set or read together."""
+        key = kind, tuple(names)
+        if key not in self._known:
+            for name in names:
+                self.interface.variables[name]  # a KeyError here, as without isolation
+            offset = None
+            if kind != "String" and self._used + len(names) <= self._room:
+                offset = messages.HEAD + 8 * self._used
+                self._used += len(names)
+            self._queue += frame(messages.CHANNEL, (kind, key[1], offset))
+            cells = None if offset is None else Cells(self._process.memory, offset, kind, len(names))
+            self._known[key] = IsolatedChannel(self, len(self._channels), cells)
+            self._channels.append(self._known[key])
+        return self._known[key]
+
+    def step(self, time: float, length: float, *, final: bool = True) -> None:
+        """Advance from ``time`` by ``length``, both in s; not ``final`` where an older state may be restored."""
+        if self.end is not None:
+            self._finish()
+        self.outdate()
+        watched = self._habits[True]
+        if watched != self._watched:
+            self._queue += frame(messages.WATCH, [channel.index for channel in watched])
+            self._watched = watched
+        dirty = self._dirty
+        size = messages.STEP_BODY.size + 4 * len(dirty)
+        ring = messages.STEP_FRAME.pack(messages.STEP, size, time, length, final)
+        self.time = time
+        self._send(ring + struct.pack(f"={len(dirty)}I", *dirty))
+        self.end, self._after_step = time + length, True
+        if not (final and watched):
+            self._finish()
+
+    def save(self) -> _Saved:
+        """The present state: a handle of the process's."""
+        self._saved += 1
+        self._ask("save", self._saved)
+        return _Saved(self._saved, self.time)
+
+    def restore(self, state: _Saved) -> None:
+        """Come back to a saved state; it stays saved."""
+        if self._dirty or self.end is not None:
+            self._ask("")  # what was set before must not come after
+        self.outdate()
+        self._queue += frame(messages.RESTORE, state.number)
+        self.time = state.time
+
+    def forget(self, state: _Saved) -> None:
+        """Give a saved state back."""
+        if self._lost is None and not self._is_gone:
+            self._queue += frame(messages.FORGET, state.number)
+
+    def serialize(self, state: _Saved) -> bytes:
+        """A saved state as bytes, as they are without isolation."""
+        content: bytes = self._ask("serialize", state.number)
+        return content
+
+    def deserialize(self, content: bytes) -> _Saved:
+        """A saved state, out of its bytes."""
+        self._saved += 1
+        time: float = self._ask("deserialize", self._saved, content)
+        return _Saved(self._saved, time)
+
+    def directional_derivatives(
+        self, unknowns: Sequence[str], knowns: Sequence[str], seed: Sequence[float]
+    ) -> list[float]:
+        """How the unknowns change when the knowns change by ``seed``; all are Real variables."""
+        found: list[float] = self._ask("directional_derivatives", list(unknowns), list(knowns), list(seed))
+        return found
+
+    def interpolate(self, names: Sequence[str], orders: Sequence[int], values: Sequence[float]) -> None:
+        """Time derivatives of inputs over the coming step: one name, order (from 1) and value each."""
+        self._ask("interpolate", list(names), list(orders), list(values))
+
+    def terminate(self) -> None:
+        """End the run."""
+        self._ask("terminate")
+
+    def free(self) -> None:
+        """Give everything back, the process included. Never raises: what goes wrong now is no more than logged."""
+        if self._is_gone:
+            return
+        self._is_gone = True
+        try:
+            if self._lost is None and self._is_made:
+                if self.end is not None:
+                    self.end = None
+                    self._process.receive()
+                self._process.send(frame(messages.CALL, (self._dirty, "free", ())))
+                self._process.receive()
+                self._process.wait()
+        except HostLostError as lost:
+            _LOG.warning("%s: %s", self.name, lost)
+        finally:
+            self._process.kill()
+
+    # ---------------------------------------------------------------- for the channels
+
+    def outdate(self) -> None:
+        """Values that were read are old from now on; what was read together will be fetched together."""
+        self.moment += 1
+        if self.reads or self._after_step:
+            self._habits[self._after_step] = tuple(self.reads)
+            self.reads = {}
+            self._after_step = False
+
+    def set_later(self, channel: IsolatedChannel, values: Sequence[Any]) -> None:
+        """Keep values for the next call."""
+        if self._lost is not None:
+            raise self._lost
+        if self.end is not None:
+            self._finish()
+        if channel.index in self._dirty:
+            self._ask("")
+        self.outdate()
+        if channel.cells is None or not channel.cells.write(values):
+            self._queue += frame(messages.VALUES, (channel.index, list(values)))
+        self._dirty.append(channel.index)
+
+    def refresh(self, channel: IsolatedChannel) -> None:
+        """See to it that what a channel shows is of this moment."""
+        if self.end is not None:
+            self._finish()
+        if channel.moment == self.moment:
+            return
+        if channel.problem is None or channel.problem[0] != self.moment:
+            habit = (x for x in self._habits[self._after_step] if x is not channel and x.moment != self.moment)
+            wanted = [channel, *habit]
+            self._take(wanted, self._call("get", [x.index for x in wanted]))
+        if channel.problem is not None and channel.problem[0] == self.moment:
+            raise self._error(channel.problem[1])
+
+    # ---------------------------------------------------------------- talk
+
+    def _finish(self) -> None:
+        """Wait for a step that is under way."""
+        report = self._receive()
+        end, self.end = self.end, None
+        if report is None:
+            assert end is not None
+            self.time = end
+            for channel in self._watched:
+                channel.moment, channel.texts = self.moment, None
+        else:
+            self._take(self._watched, self._checked(report))
+
+    def _ask(self, operation: str, *arguments: Any) -> Any:
+        """Let the process do something that may change every value, as all but a few do."""
+        if self.end is not None:
+            self._finish()
+        if operation not in ("save", "serialize"):
+            self.outdate()
+        return self._call(operation, *arguments).get("result")
+
+    def _call(self, operation: str, *arguments: Any) -> dict[str, Any]:
+        # The queue first: what waits to be set may stand in it.
+        self._send(frame(messages.CALL, (self._dirty, operation, arguments)))
+        return self._checked(self._receive() or {})
+
+    def _send(self, ring: bytes) -> None:
+        if self._lost is not None:
+            raise self._lost
+        if not self._is_made:
+            self._await()
+        ring, self._queue, self._dirty = self._queue + ring, b"", []
+        try:
+            self._process.send(ring)
+        except HostLostError as lost:
+            raise self._mourn(lost) from lost
+
+    def _await(self) -> None:
+        """Wait for the process and for the instance in it."""
+        try:
+            self._process.wait_until_ready()
+            self._checked(self._receive() or {})
+        except HostLostError as lost:
+            raise self._mourn(lost) from lost
+        except FmuError as error:
+            self._lost = error
+            raise
+        self._is_made = True
+
+    def _receive(self) -> dict[str, Any] | None:
+        """What the process tells; None if there is nothing to tell."""
+        if self._lost is not None:
+            raise self._lost
+        try:
+            kind, body = self._process.receive()
+            return messages.content(body) if kind == messages.REPORT else None
+        except HostLostError as lost:
+            raise self._mourn(lost) from lost
+        except Exception as error:  # of reading what an FMU has overwritten
+            message = f"its process sends what cannot be read ({type(error).__name__}: {error}) and was ended"
+            self._process.kill()
+            raise self._mourn(HostLostError(message, [])) from error
+        except BaseException:  # a second Ctrl-C: it is not waited for
+            self._process.kill()
+            self._lost = FmuError("was interrupted", instance=self.name, time=self.time)
+            raise
+
+    def _mourn(self, lost: HostLostError) -> FmuError:
+        if self.end is not None and self._process.last_call()[0] == "get":
+            self.time = self.end
+        self.log = lost.log
+        self.moment += 1
+        time = self.time if self._is_made else None
+        self._lost = LostError(str(lost), instance=self.name, time=time, log=lost.log)
+        return self._lost
+
+    def _checked(self, report: dict[str, Any]) -> dict[str, Any]:
+        """A report of something that went well; anything else is raised."""
+        self.time = report.get("time", self.time)
+        if "error" in report:
+            raise self._error(report["error"])
+        return report
+
+    def _error(self, told: dict[str, Any]) -> FmuError:
+        self.log = told["log"]
+        whole: dict[str, Any] = {"instance": self.name, "time": self.time} | told
+        return messages.as_error(**whole)
+
+    def _take(self, channels: Iterable[IsolatedChannel], report: dict[str, Any]) -> None:
+        """Note what was read."""
+        texts = report.get("texts", {})
+        failed, error = report.get("failed", (None, {}))
+        for channel in channels:
+            if channel.index == failed:
+                channel.problem = self.moment, error
+                break
+            channel.moment, channel.texts = self.moment, texts.get(channel.index)
+
+    def _name_call(self, call: str, channel: int) -> str:
+        known = list(self._known)
+        kind, names = known[channel] if call in ("set", "get") and 0 <= channel < len(known) else ("Real", ())
+        return call_name(self.interface, call, kind, names)
+
+
+class IsolatedChannel:
+    """Some variables of one type of an isolated instance.
+
+    Attributes:
+        index: its number in the process. cells: its place in the shared memory, if it has one.
+        moment: when it was read. texts: what was read then, where that came in a message.
+        problem: when it could not be read, and why.
+    """
+
+    def __init__(self, slave: IsolatedSlave, index: int, cells: Cells | None) -> None:
+        self._slave = slave
+        self.index = index
+        self.cells = cells
+        self.moment = -1
+        self.texts: list[Any] | None = None
+        self.problem: tuple[int, dict[str, Any]] | None = None
+
+    def set(self, values: Sequence[Any]) -> None:
+        """Set all of them; what is wrong with it may be said by a later call."""
+        self._slave.set_later(self, values)
+
+    def get(self) -> list[Any]:
+        """Read all of them."""
+        slave = self._slave
+        if slave.end is not None or self.moment != slave.moment:
+            slave.refresh(self)
+        slave.reads[self] = None
+        if self.texts is None:
+            assert self.cells is not None
+            return self.cells.read()
+        return list(self.texts)

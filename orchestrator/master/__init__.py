@@ -1,0 +1,24 @@
+"""How time advances: initialization, then communication steps by one of the `algorithms`.
+
+`loop` is the loop over communication points, `exchange` the values between instances; `events`, `extrapolation` and
+`algebraic_loops` are what may happen at a point, in a step and within an instant. `compiled` hands steps to the C
+kernel.
+"""
+
+from .algebraic_loops import find_loops
+from .coupling import check_coupling, describe_coupling
+from .event_check import check_events
+from .initialization import settle
+from .loop import Master, Rows
+from .settings import Settings
+
+__all__ = [
+    "Master",
+    "Rows",
+    "Settings",
+    "check_coupling",
+    "check_events",
+    "describe_coupling",
+    "find_loops",
+    "settle",
+]

@@ -1,0 +1,232 @@
+"""The bridge to the compiled step loop: a `Master`'s plan as flat arrays, and blocks of steps with it.
+
+The kernel is an optional extension: without it, or for what it does not do (components as Python objects, text
+signals), `Master` steps in Python with identical results.
+"""
+
+from __future__ import annotations
+
+import time as clock
+from collections.abc import Sequence
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..fmi.binding import FmuChannel, FmuSlave
+from .exchange import Change
+
+try:
+    from . import kernel
+except ImportError:  # installed without a C compiler
+    kernel = None  # type: ignore[assignment]
+
+if TYPE_CHECKING:
+    from .loop import Master, Observer
+
+_SET, _STEP, _GET, _CHANGE = 0, 1, 2, 3
+_DISCARD = 2
+_BLOCK_SECONDS = 0.05
+"""Wall time a block is meant to take: short enough for Ctrl-C and a progress bar, long enough to cost nothing."""
+_GROWTH = 256
+"""How many times longer than the last a block may be: the first is a single step, of which nothing is known."""
+_MOST_VALUES = 4_000_000
+"""Numbers a block may record, so that its buffer stays small."""
+
+_CHANNEL = np.dtype([("function", "u8"), ("component", "u8"), ("begin", "i8"), ("count", "i8"), ("is_real", "i8")])
+_INSTANCE = np.dtype([("function", "u8"), ("component", "u8")])
+_ENTRY = np.dtype([("place", "i8"), ("age", "i8"), ("change", "i8"), ("scale", "f8"), ("offset", "f8")])
+_CHANGES = np.dtype(
+    [("active", "i8"), ("place", "i8"), ("is_real", "i8"), *((n, "f8") for n in ("scale", "offset", "slope", "since"))]
+)
+_OPERATION = np.dtype([(name, "i4") for name in ("kind", "index", "period", "phase", "rank", "unused")])
+
+
+def can_run(master: Master) -> bool:
+    """Whether the kernel is there and can do what this master's plan asks for."""
+    if kernel is None or not all(isinstance(slave, FmuSlave) for slave in master.slaves.values()):
+        return False
+    settings = master.settings
+    if master.algorithm not in ("gauss-seidel", "jacobi") or settings.extrapolation or master.loops is not None:
+        return False
+    return "String" not in master.kinds
+
+
+class CompiledLoop:
+    """A master's plan for the kernel."""
+
+    def __init__(self, master: Master) -> None:
+        self._master = master
+        self._exchange = master.exchange
+        self._channels: list[tuple[int, int, int, int, int]] = []
+        self._entries: list[tuple[int, int, int, float, float]] = []
+        self._references: list[int] = []
+        self._operations: list[tuple[int, int, int, int]] = []
+        self._culprits: list[tuple[FmuSlave | None, str]] = []
+        self._instances: list[tuple[int, int]] = []
+        self._changes: list[tuple[Change, int, bool]] = []
+        self._slaves = {name: slave for name, slave in master.slaves.items() if isinstance(slave, FmuSlave)}
+        is_shared = kernel.HAS_THREADS and master.algorithm == "jacobi"
+        self.threads = min(master.settings.threads, len(self._slaves)) if is_shared else 1
+        ends: list[int] = []
+        if master.algorithm == "gauss-seidel":  # instance by instance
+            for slave in master.sequence:
+                self._add([slave.name], (_SET, _STEP, _GET))
+        elif self.threads <= 1:  # all of one operation before the first of the next
+            self._add(list(self._slaves), (_SET, _STEP, _GET))
+        else:  # those of each thread; what all have set and stepped is read only then
+            shares = [list(share) for share in np.array_split(list(self._slaves), self.threads)]
+            for kinds in ((_SET, _STEP), (_GET,)):
+                for share in shares:
+                    self._add(share, kinds)
+                    ends.append(len(self._operations))
+        self._plan = (
+            np.array([(*o, rank, 0) for o, rank in zip(self._operations, self._ranks(), strict=True)], _OPERATION),
+            np.array(ends or [len(self._operations)], dtype=np.int64),
+            np.array(self._channels, dtype=_CHANNEL),
+            np.array(self._instances, dtype=_INSTANCE),
+            np.array(self._entries, dtype=_ENTRY),
+            np.array(self._references, dtype=np.uint32),
+        )
+
+    def _add(self, names: Sequence[str], kinds: Sequence[int]) -> None:
+        add = {_SET: self._add_sets, _STEP: self._add_step, _GET: self._add_gets}
+        for kind in kinds:
+            for name in names:
+                add[kind](self._slaves[name], self._master.settings.rates.get(name, 1))
+
+    def _ranks(self) -> list[int]:
+        """Where each operation would stand without threads, so that of two that fail the first is told."""
+        stage = {_SET: 0, _STEP: 1, _GET: 2, _CHANGE: 2}
+        numbers = range(len(self._operations))
+        if self.threads > 1:
+            order = sorted(numbers, key=lambda n: (stage[self._operations[n][0]], n))
+            return [rank for rank, _ in sorted(enumerate(order), key=lambda pair: pair[1])]
+        return list(numbers)
+
+    def _add_operation(self, kind: int, index: int, culprit: tuple[FmuSlave | None, str], due: tuple[int, int]) -> None:
+        self._operations.append((kind, index, *due))
+        self._culprits.append(culprit)
+
+    def _add_sets(self, slave: FmuSlave, rate: int) -> None:
+        for feed in self._exchange.feeds[slave.name]:
+            entries = []
+            for k, source in enumerate(feed.sources):
+                age, slot = feed.ages[k], feed.changes[k] if feed.changes else None
+                # What is no real number is never scaled.
+                scale, offset = (feed.scales[k], feed.offsets[k]) if feed.is_real else (1.0, 0.0)
+                change = -1 if slot is None else self._add_change(slot, -1, feed.is_real)
+                entries.append((source, -1 if age is None else age, change, scale, offset))
+            assert isinstance(feed.channel, FmuChannel)
+            self._add_channel(_SET, slave, feed.channel, entries, feed.is_real, due=(rate, 0))
+
+    def _add_gets(self, slave: FmuSlave, rate: int) -> None:
+        for part in self._exchange.yields[slave.name]:
+            due = (rate, 0 if part.direct else rate - 1)
+            entries = [(place, -1, -1, 1.0, 0.0) for place in range(part.begin, part.end)]
+            assert isinstance(part.channel, FmuChannel)
+            self._add_channel(_GET, slave, part.channel, entries, part.is_real, due=due)
+            for place, change in self._exchange.output_changes.items():
+                if part.begin <= place < part.end:
+                    index = self._add_change(change, place, part.is_real)
+                    self._add_operation(_CHANGE, index, (None, "an event"), due)
+
+    def _add_change(self, change: Change, place: int, is_real: bool) -> int:
+        self._changes.append((change, place, is_real))
+        return len(self._changes) - 1
+
+    def _add_channel(
+        self,
+        kind: int,
+        slave: FmuSlave,
+        channel: FmuChannel,
+        entries: list[tuple[int, int, int, float, float]],
+        is_real: bool,
+        *,
+        due: tuple[int, int],
+    ) -> None:
+        call = channel.calls[kind == _GET]
+        self._add_operation(kind, len(self._channels), (slave, call), due)
+        self._channels.append((*slave.addresses(call), len(self._entries), len(entries), int(is_real)))
+        self._entries += entries
+        self._references += channel.references
+
+    def _add_step(self, slave: FmuSlave, rate: int) -> None:
+        self._add_operation(_STEP, len(self._instances), (slave, "fmi2DoStep"), (rate, 0))
+        self._instances.append(slave.addresses("fmi2DoStep"))
+
+    def run(self, start_time: float, step: float, points: tuple[int, int, int], every: int, observe: Observer) -> bool:
+        """Take communication steps in blocks; True unless the observer stopped the run.
+
+        Args:
+            start_time: in s.
+            step: in s.
+            points: numbers of the communication points to begin at, to stop at, and of the run's last.
+            every: a row is due after every so many steps, and after the last.
+            observe: given the rows.
+
+        Raises:
+            FmuError: a model failed, or a value is not finite.
+        """
+        master, exchange = self._master, self._exchange
+        done, stop, count = points
+        values = np.array(exchange.values, dtype=np.float64)
+        history, newest = self._unrolled(len(values))
+        changes = np.array(
+            [
+                (slot.active, place, is_real, slot.scale, slot.offset, slot.slope, slot.since)
+                for slot, place, is_real in self._changes
+            ],
+            dtype=_CHANGES,
+        )
+        width, goes_on, block, begin = len(values) + 1, True, 1, 0
+        while done < stop and goes_on:
+            block = min(block, stop - done, max(1, _MOST_VALUES // width) * every)
+            rows = np.empty((_rows_due(done, block, every, count), width))
+            clock_begin = clock.perf_counter()
+            taken, written, failed, status, newest = kernel.run(
+                *self._plan, changes, values, history, newest, rows, every, start_time, step, done, block, count, begin
+            )
+            seconds = clock.perf_counter() - clock_begin
+            begin = 0
+            done += taken
+            master.steps, master.time = done, start_time + done * step
+            exchange.values[:] = values.tolist()
+            if taken:
+                self._roll(history, newest)
+                goes_on = observe(done, rows[:written])
+            if failed >= 0:
+                self._recover(failed, status, start_time + done * step, step)
+                begin = failed + 1  # the step goes on where it was left
+            block = max(1, int(taken * min(_BLOCK_SECONDS / max(seconds, 1e-9), _GROWTH)))
+        for slave in master.slaves.values():
+            slave.time = start_time + done * step
+        return goes_on
+
+    def _unrolled(self, width: int) -> tuple[NDArray[np.float64], int]:
+        """The recorded points that delayed connections look back on, as the kernel's ring, and its newest row."""
+        kept = list(self._exchange.history)
+        rows = [*[kept[0]] * (self._exchange.depth - len(kept)), *kept] if kept else []
+        return np.array(rows, dtype=np.float64).reshape(len(rows), width), max(0, len(rows) - 1)
+
+    def _roll(self, history: NDArray[np.float64], newest: int) -> None:
+        if len(history):
+            self._exchange.history.extend(np.roll(history, -newest - 1, axis=0).tolist())
+
+    def _recover(self, failed: int, status: int, time: float, step: float) -> None:
+        """Go on where an FMU discarded a step that it takes in parts; raise what `Master` does otherwise."""
+        slave, call = self._culprits[failed]
+        assert slave is not None
+        period, phase = self._operations[failed][2:]
+        if call == "fmi2DoStep" and status == _DISCARD and self.threads <= 1:
+            slave.resume(time, period * step, status, final=True)
+            return
+        slave.time = time + (period - phase) * step if call.startswith("fmi2Get") else time
+        slave.check(call, status)
+        self._exchange.check_finite(slave)
+
+
+def _rows_due(done: int, block: int, every: int, count: int) -> int:
+    """How many of the next steps are recorded: every so many, and the last."""
+    end = done + block
+    return end // every - done // every + int(end == count and count % every != 0)

@@ -1,0 +1,134 @@
+"""Inputs that go on during a step: polynomials through former values, for FMUs that interpolate their inputs.
+
+A held input makes any coupling of first order in the step. An FMU that takes time derivatives of its inputs is given
+those of the polynomial of order 1 or 2 through the last values, each at the time that it belongs to.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+from ..wiring import Link
+from .exchange import Exchange, Feed
+
+_ROUNDING = 1e-6
+"""Part of a step within which two times are one."""
+
+
+@dataclass(frozen=True)
+class _Course:
+    """The inputs of one instance that are continued, all of one feed: their places in it, and their names."""
+
+    feed: Feed
+    members: tuple[int, ...]
+    names: tuple[str, ...]
+
+
+class Extrapolator:
+    """Continues inputs over a step.
+
+    Args:
+        exchange: whose inputs they are.
+        links: scalar connections. Delayed ones are held, and so is what a sampled component gives or what is discrete.
+        order: of the polynomial: 1 or 2.
+        ended: whether the values are always those of the end of the step, as in an iteration; what a source has not
+            reached yet is a guess then.
+    """
+
+    def __init__(self, exchange: Exchange, links: Sequence[Link], order: int, *, ended: bool = False) -> None:
+        self._order = order
+        self._exchange = exchange
+        self._ended = ended
+        exchange.stamps = [0.0] * len(exchange.values)
+        smooth = {link.target for link in links if _is_smooth(exchange, link)}
+        self._courses: dict[str, _Course] = {}
+        for name, feeds in exchange.feeds.items():
+            for feed in feeds:
+                members = tuple(k for k, target in enumerate(feed.targets) if (name, target) in smooth)
+                if members:
+                    self._courses[name] = _Course(feed, members, tuple(feed.targets[k] for k in members))
+        self.past: dict[str, list[list[tuple[float, float]]]] = {}
+        """For each continued input of an instance, the last values and the times they belong to, newest last."""
+
+    def begin(self, time: float) -> None:
+        """Note the values at the start, in s."""
+        for name, course in self._courses.items():
+            values = self._exchange.inputs(course.feed, time)
+            self.past[name] = [[(time, values[k])] for k in course.members]
+
+    def write(self, name: str, time: float, length: float, *, ended: bool = False) -> None:
+        """Set the inputs of an instance for a step from ``time`` of ``length``, both in s, with their derivatives.
+
+        ``ended``: the values are those of the end of the step.
+        """
+        course = self._courses.get(name)
+        if course is None:
+            self._exchange.write(name, time)
+            return
+        for feed in self._exchange.feeds[name]:
+            values = self._exchange.inputs(feed, time)
+            derivatives: list[float] = []
+            if feed is course.feed:
+                for past, k in zip(self.past[name], course.members, strict=True):
+                    is_end = ended or self._ended
+                    at = time + length if is_end else self._exchange.stamps[feed.sources[k]]
+                    former = [point for point in past if point[0] < at - _ROUNDING * length][-self._order :]
+                    past[:] = [*former, (at, values[k])]
+                    values[k], *slopes = polynomial(past, time, self._order)
+                    derivatives += slopes
+            feed.channel.set(values)
+            if derivatives:
+                names = [n for n in course.names for _ in range(self._order)]
+                orders = [*range(1, self._order + 1)] * len(course.names)
+                self._exchange.slaves[name].interpolate(names, orders, derivatives)
+
+    def restart(self) -> None:
+        """Forget the past, after something has jumped: a polynomial through a jump would overshoot."""
+        for past in self.past.values():
+            for points in past:
+                points.clear()
+
+    def save(self) -> Any:
+        """What it remembers."""
+        past = {name: [list(points) for points in past] for name, past in self.past.items()}
+        return {"past": past, "stamps": list(self._exchange.stamps)}
+
+    def restore(self, saved: Mapping[str, Any]) -> None:
+        """Remember what was saved."""
+        self._exchange.stamps[:] = saved["stamps"]
+        self.past = {
+            name: [[(float(t), float(v)) for t, v in points] for points in past] for name, past in saved["past"].items()
+        }
+
+
+def _is_smooth(exchange: Exchange, link: Link) -> bool:
+    source, target = exchange.slaves[link.source[0]].interface, exchange.slaves[link.target[0]].interface
+    output, given = source.variables[link.source[1]], target.variables[link.target[1]]
+    return (
+        target.interpolates_inputs
+        and not link.delay
+        and output.type == given.type == "Real"
+        and "continuous" == output.variability == given.variability
+        and not source.vendor.get("sampled")
+        and not target.vendor.get("sampled")
+    )
+
+
+def polynomial(points: Sequence[tuple[float, float]], time: float, order: int) -> list[float]:
+    """Value and the first ``order`` derivatives (at most 2) at ``time`` of the polynomial through 1 to 3 points.
+
+    Newton's form: as many points as there are give as high an order as they can.
+    """
+    (t0, a), *rest = points
+    if not rest:
+        return [a] + [0.0] * order
+    t1, b = rest[0]
+    slope = (b - a) / (t1 - t0)
+    if len(rest) == 1:
+        return [a + slope * (time - t0), slope, 0.0][: order + 1]
+    t2, c = rest[1]
+    bend = ((c - b) / (t2 - t1) - slope) / (t2 - t0)
+    value = a + slope * (time - t0) + bend * (time - t0) * (time - t1)
+    return [value, slope + bend * ((time - t0) + (time - t1)), 2.0 * bend][: order + 1]

@@ -1,0 +1,27 @@
+"""One run: checked, simulated, recorded, judged, and written to a directory from which it can go on."""
+
+from .checking import Checked, check, describe_stepping
+from .checkpoint import CHECKPOINT_FILE, read_checkpoint
+from .execution import at_half_the_step, execute, go_on, resume, run
+from .outcome import Run
+from .results import Results
+from .rows import ROWS_FILE, recover_rows
+from .session import Progress
+
+__all__ = [
+    "CHECKPOINT_FILE",
+    "ROWS_FILE",
+    "Checked",
+    "Progress",
+    "Results",
+    "Run",
+    "at_half_the_step",
+    "check",
+    "describe_stepping",
+    "execute",
+    "go_on",
+    "read_checkpoint",
+    "recover_rows",
+    "resume",
+    "run",
+]

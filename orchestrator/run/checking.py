@@ -1,0 +1,196 @@
+"""Everything that can be known to be wrong, or worth knowing, before a step is taken."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+
+from ..errors import ScenarioError, did_you_mean
+from ..evaluation import check_metrics, check_published, check_requirements, metric_indices, split_metric
+from ..figures import check_figures
+from ..fmi import Interface, Kind, Model, Workspace, load_models
+from ..isolation import check_isolation, check_once_per_process, isolation_notes
+from ..master import check_coupling, check_events, describe_coupling
+from ..master.algorithms import find_blocks
+from ..system import ALGORITHMS, SWEEPING, System, split
+from ..wiring import Order, Wiring, derive_order, wire
+
+_MOST_STEPS = 1e15
+"""So many points in time are not told apart, let alone run through."""
+
+
+@dataclass(frozen=True)
+class Checked:
+    """A system found fit to run.
+
+    Attributes:
+        system: as it will run: after a swap, without the tables that speak of what the new model does not have.
+        models: by instance name. wiring: start values and scalar connections. order: how a sweep steps.
+        notes: what a user should know though it is not an error.
+    """
+
+    system: System
+    models: Mapping[str, Model]
+    wiring: Wiring
+    order: Order
+    notes: tuple[str, ...]
+
+
+def check(system: System, workspace: Workspace, kind: Kind = "auto") -> Checked:
+    """Check a system as a whole.
+
+    Raises:
+        ScenarioError: with every problem found, each naming its place and the remedy.
+    """
+    problems = _check_simulation(system)
+    try:
+        models = load_models(system, workspace, kind)
+    except ScenarioError as error:
+        raise ScenarioError([*problems, *error.problems]) from error
+    interfaces = {name: model.interface for name, model in models.items()}
+    wiring = wire(system, interfaces)
+    problems += wiring.problems
+    problems += check_isolation(system) + check_once_per_process(system, interfaces)
+    names = signal_names(interfaces, wiring)
+    every_step = system.record is None or abs(system.record - system.step) < 1e-9 * system.step
+    every_step &= system.algorithm != "adaptive"
+    system, left_out = _without_the_missing(system, interfaces, names, every_step)
+    problems += check_events(system, interfaces, wiring)
+    problems += check_coupling(system, interfaces, wiring)
+    problems += check_requirements(system.requirements, names, every_step)
+    found = check_metrics(system.metrics, names, every_step)
+    problems += found
+    if not found:
+        problems += check_published(system.published, metric_indices(system.metrics, names), system.presets)
+    problems += check_figures(system.figures, names, every_step)
+    if problems:
+        raise ScenarioError(problems)
+    order = derive_order(list(system.instances), wiring.links, system.order)
+    return Checked(system, models, wiring, order, (*left_out, *_notes(system, models, wiring, order)))
+
+
+def _without_the_missing(
+    system: System, interfaces: Mapping[str, Interface], names: list[str], every_step: bool
+) -> tuple[System, list[str]]:
+    """After a swap, a system without the tables that speak of variables the new model does not have, and what they are.
+
+    A controller of one's own need not have every output that the scenario's own figures draw.
+    """
+    if not any(instance.swapped for instance in system.instances.values()):
+        return system, []
+    requirements = {k: v for k, v in system.requirements.items() if not check_requirements({k: v}, names, every_step)}
+    metrics = {k: v for k, v in system.metrics.items() if not check_metrics({k: v}, names, every_step)}
+    figures = [figure for figure in system.figures if not check_figures([figure], names, every_step)]
+    published = [entry for entry in system.published if split_metric(str(entry.get("metric")))[0] in metrics]
+    lost = {event.signal for event in system.events} | set(system.tolerances)
+    lost -= {signal for signal in lost if _is_there(signal, interfaces)}
+    gone = [f"requirement {name!r}" for name in system.requirements if name not in requirements]
+    gone += [f"metric {name!r}" for name in system.metrics if name not in metrics]
+    gone += [f"figure {figure.get('title')!r}" for figure in system.figures if figure not in figures]
+    gone += [f"event or tolerance of {signal!r}" for signal in sorted(lost)]
+    notes = [f"left out, because the swapped model lacks what they speak of: {', '.join(gone)}"] if gone else []
+    kept = replace(
+        system,
+        requirements=requirements,
+        metrics=metrics,
+        figures=figures,
+        published=published,
+        events=[event for event in system.events if event.signal not in lost],
+        tolerances={signal: value for signal, value in system.tolerances.items() if signal not in lost},
+    )
+    return kept, notes
+
+
+def _is_there(signal: str, interfaces: Mapping[str, Interface]) -> bool:
+    instance, name = split(signal)
+    return instance in interfaces and interfaces[instance].scalars(name) is not None
+
+
+def signal_names(interfaces: Mapping[str, Interface], wiring: Wiring) -> list[str]:
+    """What expressions may speak of: everything that will be recorded, and every parameter."""
+    sources = {link.source for link in wiring.links}
+    return [
+        f"{instance}.{variable.name}"
+        for instance, interface in interfaces.items()
+        for variable in interface.variables.values()
+        if variable.causality in ("output", "parameter") or (instance, variable.name) in sources
+    ]
+
+
+def _check_simulation(system: System) -> list[str]:
+    problems = []
+    if not system.instances:
+        problems.append("the system has no instances")
+    if system.algorithm not in ALGORITHMS:
+        problems.append(f"algorithm {system.algorithm!r} is unknown{did_you_mean(system.algorithm, ALGORITHMS)}")
+    problems += _check_times(system)
+    if system.order:
+        missing = [name for name in system.instances if name not in system.order]
+        unknown = [name for name in system.order if name not in system.instances]
+        problems += [f"order: there is no instance {n!r}{did_you_mean(n, system.instances)}" for n in unknown]
+        problems += [f"order: {n!r} is missing" for n in missing]
+        problems += [f"order: {n!r} stands twice" for n in dict.fromkeys(system.order) if system.order.count(n) > 1]
+    return problems
+
+
+def _check_times(system: System) -> list[str]:
+    if not 0.0 < system.step < math.inf:
+        return [f"step must be a positive number, not {system.step!r} s"]
+    if not 0.0 < system.stop_time - system.start_time < math.inf:
+        return [f"stop_time {system.stop_time!r} s must lie after start_time {system.start_time!r} s"]
+    if system.algorithm == "adaptive":  # which lands wherever it is told to
+        wrong = system.record is not None and not 0.0 < system.record < math.inf
+        return [f"record must be a positive number, not {system.record!r} s"] if wrong else []
+    record = system.step if system.record is None else system.record
+    duration = "stop_time - start_time" if system.start_time else "stop_time"
+    problems = []
+    for name, length in ((duration, system.stop_time - system.start_time), ("record", record)):
+        count = length / system.step
+        if count >= _MOST_STEPS:
+            problems.append(f"{name} = {length:g} s is {count:.3g} steps of {system.step:g} s: too many to count")
+        elif not count > 0.5 or abs(count - round(count)) > 1e-6:
+            problems.append(f"{name} = {length:g} s is not a whole multiple of step = {system.step:g} s")
+    return problems
+
+
+def describe_stepping(checked: Checked) -> list[str]:
+    """How a run would step, a line each."""
+    system = checked.system
+    lines = []
+    if system.algorithm in SWEEPING:
+        lines.append(f"{system.algorithm} steps in the order: {', '.join(checked.order.sequence)}")
+    elif system.algorithm == "jacobi":
+        lines.append("jacobi: all instances step in parallel; a feed-through output acts one step late")
+    else:
+        blocks = find_blocks({name: model.interface for name, model in checked.models.items()}, checked.wiring.links)
+        if blocks.sampled:
+            lines.append(f"iterative steps first, at the values of the step's begin: {', '.join(blocks.sampled)}")
+        for group in blocks.continuous:
+            repeated = not blocks.cyclic.isdisjoint(group)
+            lines.append(f"iterative {'repeats until they agree' if repeated else 'steps once'}: {', '.join(group)}")
+    for instance in system.instances.values():
+        if instance.step is not None:
+            lines.append(f"{instance.name} steps every {instance.step:g} s")
+    return lines
+
+
+def _notes(system: System, models: Mapping[str, Model], wiring: Wiring, order: Order) -> list[str]:
+    notes: dict[str, None] = dict.fromkeys([model.note for model in models.values() if model.note] + wiring.notes)
+    interfaces = {name: model.interface for name, model in models.items()}
+    for interface in {id(interface): interface for interface in interfaces.values()}.values():
+        model = interface.model
+        notes.update(dict.fromkeys(interface.warnings))
+        silent = [v.name for v in interface.of("output") if v.dependencies is None]
+        if silent and interface.of("input"):
+            taken = "all" if interface.vendor else "no"
+            notes[
+                f"{model} lists no dependencies of {', '.join(silent[:4])}; {taken} direct feed-through is assumed"
+            ] = None
+        if interface.needs_tool and not interface.vendor:
+            notes[f"{model} says that it needs the tool it was made with ({interface.generator or 'unnamed'})"] = None
+    notes.update(dict.fromkeys(isolation_notes(system, models)))
+    notes.update(dict.fromkeys(describe_coupling(system, interfaces, wiring)))
+    if system.algorithm in SWEEPING:
+        notes.update(dict.fromkeys(order.late))
+    return list(notes)

@@ -1,0 +1,214 @@
+"""Checkpoints: everything a run needs to go on, to the bit, in one file beside its results.
+
+`checkpoint.zip` holds `checkpoint.json` (the system, how far it got, the values under way) and each FMU's serialized
+state. It is replaced as a whole, so that there is always a complete one.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import json
+import math
+import os
+import zipfile
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from ..errors import RailcosimError, ScenarioError
+from ..fmi import Kind, Model
+from ..master import Master
+from ..system import Connection, Event, Instance, System
+
+CHECKPOINT_FILE = "checkpoint.zip"
+_FORMAT = 1
+
+
+@dataclass(frozen=True)
+class Checkpoint:
+    """A point at which a run can be taken up.
+
+    Attributes:
+        system: what is simulated. kind: how components became models.
+        rows: how many rows had been recorded.
+        digests: of the models, by instance.
+        progress: what the master carries between steps, from `Master.save`.
+        states: the FMUs' serialized states, by instance.
+        every: distance of checkpoints in s.
+    """
+
+    system: System
+    kind: Kind
+    rows: int
+    digests: Mapping[str, str]
+    progress: Mapping[str, Any]
+    states: Mapping[str, bytes]
+    every: float | None
+
+    @property
+    def time(self) -> float:
+        """How far the run had got, in s."""
+        return float(self.progress["time"])
+
+    @property
+    def width(self) -> int:
+        """How many signals are recorded."""
+        return len(self.progress["values"])
+
+    @classmethod
+    def take(
+        cls,
+        system: System,
+        models: Mapping[str, Model],
+        master: Master,
+        *,
+        kind: Kind,
+        rows: int,
+        every: float | None,
+    ) -> Checkpoint:
+        """That of a master between two steps.
+
+        Raises:
+            FmuError: an FMU does not give its state.
+        """
+        states = {}
+        for name, slave in master.slaves.items():
+            state = slave.save()
+            try:
+                states[name] = slave.serialize(state)
+            finally:
+                slave.forget(state)
+        digests = {name: model.digest for name, model in models.items()}
+        return cls(system, kind, rows, digests, master.save(), states, every)
+
+    def write(self, directory: Path) -> None:
+        """Put it in the place of the one before.
+
+        Raises:
+            RailcosimError: the file cannot be written.
+        """
+        content = {
+            "format": _FORMAT,
+            "system": dataclasses.asdict(self.system),
+            "kind": self.kind,
+            "rows": self.rows,
+            "every": self.every,
+            "digests": self.digests,
+            "progress": self.progress,
+        }
+        part = directory / f"{CHECKPOINT_FILE}.part"
+        try:
+            with part.open("wb") as stream:
+                with zipfile.ZipFile(stream, "w") as archive:
+                    archive.writestr("checkpoint.json", json.dumps(content, default=_plain))
+                    for number, name in enumerate(self.digests):
+                        archive.writestr(f"states/{number}", self.states[name])
+                stream.flush()
+                os.fsync(stream.fileno())
+            os.replace(part, directory / CHECKPOINT_FILE)
+        except OSError as error:
+            raise RailcosimError(f"{part} cannot be written: {error.strerror or error}") from error
+
+    def restore(self, master: Master) -> None:
+        """Bring an initialized master to this point.
+
+        Raises:
+            FmuError: an FMU does not take its state back.
+            ScenarioError: it is of another system.
+        """
+        for name, slave in master.slaves.items():
+            state = slave.deserialize(self.states[name])
+            slave.restore(state)
+            slave.forget(state)
+        try:
+            master.restore(self.progress)
+        except (LookupError, TypeError, ValueError) as error:
+            what = f"{type(error).__name__}: {error}"
+            raise ScenarioError(
+                f"{CHECKPOINT_FILE} does not fit its system ({what}); run the scenario from the start"
+            ) from error
+
+    def check(self, models: Mapping[str, Model], directory: Path) -> None:
+        """Refuse to go on with other models than the run began with.
+
+        Raises:
+            ScenarioError: naming the instances.
+        """
+        other = [name for name, model in models.items() if model.digest != self.digests.get(name)]
+        if other:
+            raise ScenarioError(
+                f"{directory} cannot be resumed: {', '.join(other[:6])} {'is' if len(other) == 1 else 'are'} not the "
+                "model the run began with (its file, or this version of railcosim, has changed); run it from the start"
+            )
+
+
+def check_serializable(models: Mapping[str, Model]) -> None:
+    """Refuse checkpoints where an FMU cannot give its state away.
+
+    Raises:
+        ScenarioError: naming the instances.
+    """
+    unable = [name for name, model in models.items() if not model.interface.can_serialize_state]
+    if unable:
+        raise ScenarioError(
+            f"no checkpoints: {', '.join(unable[:6])}{' and more' if len(unable) > 6 else ''} cannot serialize "
+            f"{'its' if len(unable) == 1 else 'their'} state (canSerializeFMUstate is false); leave "
+            "--checkpoint-every out, or put another model in by --swap"
+        )
+
+
+def _plain(value: Any) -> Any:
+    if isinstance(value, np.ndarray | np.generic):
+        return value.tolist()
+    if isinstance(value, tuple | set | frozenset):
+        return list(value)
+    return str(value)
+
+
+def read_checkpoint(directory: Path) -> Checkpoint:
+    """The checkpoint of a run.
+
+    Raises:
+        ScenarioError: there is none that can be read.
+    """
+    path = directory / CHECKPOINT_FILE
+    if not path.is_file():
+        raise ScenarioError(
+            f"{directory} has no {CHECKPOINT_FILE}: only a run with --checkpoint-every can be resumed, "
+            "once it has written one"
+        )
+    try:
+        with zipfile.ZipFile(path) as archive:
+            content = json.loads(archive.read("checkpoint.json"))
+            if content["format"] != _FORMAT:
+                raise ScenarioError(f"{path} is of another version of railcosim; run the scenario from the start")
+            names = list(content["digests"])
+            states = {name: archive.read(f"states/{number}") for number, name in enumerate(names)}
+        point = Checkpoint(
+            system=_system(content["system"]),
+            kind=content["kind"],
+            rows=int(content["rows"]),
+            digests=content["digests"],
+            progress=content["progress"],
+            states=states,
+            every=content["every"],
+        )
+        if point.rows < 1 or point.width < 0 or not math.isfinite(point.time):
+            raise ValueError(f"{point.rows} rows up to {point.time} s")
+    except ScenarioError:
+        raise
+    except Exception as error:  # whatever may be in it
+        what = f"{type(error).__name__}: {error}" if str(error) else type(error).__name__
+        raise ScenarioError(f"{path} cannot be read ({what}); run the scenario from the start") from error
+    return point
+
+
+def _system(data: dict[str, Any]) -> System:
+    instances = {name: Instance(**entry) for name, entry in data.pop("instances").items()}
+    connections = [Connection(**entry) for entry in data.pop("connections")]
+    events = [Event(**entry) for entry in data.pop("events")]
+    data["presets"] = tuple(data["presets"])
+    return System(**data, instances=instances, connections=connections, events=events)

@@ -1,0 +1,175 @@
+"""Couplings that diverge: signals that go round between instances and grow geometrically from step to step.
+
+Explicit algorithms lose a stiff coupling without a word: the numbers grow until one is infinite, or until the run ends.
+That is told from physical growth by its pace: what an unstable plant or an accelerating train does between two
+communication points is a small part of its value, or the step is too long for it anyway.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
+
+import networkx as nx
+import numpy as np
+from numpy.typing import NDArray
+
+from ..errors import FmuError
+from ..fmi import Interface
+from ..master import find_loops
+from ..system import System
+from ..wiring import Link
+from .results import Results
+
+Array = NDArray[np.float64]
+
+_FACTOR = 1.2
+"""Growth in each communication step above which it is not taken for physical; less where the sign alternates."""
+_PACE = 1.1
+"""The same over a few rows, to find where it began: an oscillation that grows does not do so evenly."""
+_ALL = 1e6
+"""Growth in all, from the variable's nominal value or what it was before."""
+_STEPS, _FAILED_STEPS = 10, 3
+"""Communication steps over which it must grow; fewer where an FMU failed of it."""
+_WINDOW = 8
+"""Rows in which an oscillation is taken to reach its next peak."""
+_ASTRONOMIC = 1e30
+"""What no quantity in SI units is: then a slower growth is told, too."""
+_STEADY = 1e3
+"""A factor that is no property of a linear coupling: it changes from step to step."""
+_SHOWN = 4
+
+
+@dataclass(frozen=True)
+class Growth:
+    """How a signal grows: by which factor in each communication step, and since when in s."""
+
+    factor: float
+    since: float
+
+
+def explain_divergence(
+    system: System, interfaces: Mapping[str, Interface], links: Sequence[Link], results: Results, error: object = None
+) -> str:
+    """One sentence on the coupling that diverges and what to do, or nothing.
+
+    Args:
+        system: what was simulated.
+        interfaces: of its instances.
+        links: its scalar connections.
+        results: what was recorded.
+        error: what the run failed of, if it did.
+    """
+    if system.algorithm == "adaptive":  # it holds the error or fails, and its rows are of uneven length
+        return ""
+    failed = isinstance(error, FmuError)
+    for group in _cycles(links):
+        signals = dict.fromkeys(".".join(link.source) for link in links if {link.source[0], link.target[0]} <= group)
+        found = dict(_growing(signals, interfaces, results, failed=failed))
+        if found:
+            names = ", ".join(list(found)[:_SHOWN]) + (", ..." if len(found) > _SHOWN else "")
+            factor = float(np.median([growth.factor for growth in found.values()]))
+            pace = f"by a factor of {factor:.3g}" if factor < _STEADY else "more than a thousandfold"
+            since = min(growth.since for growth in found.values())
+            inner = [link for link in links if {link.source[0], link.target[0]} <= group]
+            return (
+                f"the coupling through {names} diverges: it grows {pace} per communication step since t = {since:.6g} "
+                f"s; {_advice(system, {name: interfaces[name] for name in group}, inner)}"
+            )
+    return ""
+
+
+def _cycles(links: Iterable[Link]) -> Iterator[set[str]]:
+    """The groups of instances that act on each other, or on themselves."""
+    graph = nx.DiGraph((link.source[0], link.target[0]) for link in links)
+    for members in nx.strongly_connected_components(graph):
+        if len(members) > 1 or graph.has_edge(*[next(iter(members))] * 2):
+            yield members
+
+
+def _growing(
+    signals: Iterable[str], interfaces: Mapping[str, Interface], results: Results, *, failed: bool
+) -> Iterator[tuple[str, Growth]]:
+    for signal in signals:
+        instance, _, name = signal.partition(".")
+        variable = interfaces[instance].variables[name]
+        if variable.type == "Real" and signal in results.names():
+            size = abs(variable.nominal or 1.0)
+            growth = find_growth(results.time, results[signal], results.step, size=size, failed=failed)
+            if growth is not None:
+                yield signal, growth
+
+
+def find_growth(time: Array, values: Array, step: float, *, size: float = 1.0, failed: bool = False) -> Growth | None:
+    """How a signal grows at the end of a run, if it does so geometrically and beyond measure.
+
+    Args:
+        time: shape (T,), s.
+        values: shape (T,).
+        step: the communication step, s.
+        size: what is a usual size of it.
+        failed: whether an FMU failed afterwards, so that less of it needs to be seen.
+    """
+    finite = np.isfinite(values)
+    time, values = time[finite], values[finite]
+    peaks = np.maximum.accumulate(np.abs(values))
+    if len(values) < 3 or not peaks[-1] > _ALL * size:
+        return None
+    visible = int(np.searchsorted(peaks, 1e-3 * size))  # what happens to rounding errors is not worth a word
+    for onset, fastest in ((_swing(values), 1.0), (_onset(time, peaks, step), _FACTOR), (_slow_onset(peaks), 1.0)):
+        if onset is None:
+            continue
+        begin = max(onset, visible)
+        steps = (time[-1] - time[begin]) / step
+        grown = peaks[-1] / max(peaks[begin], size)
+        if grown > _ALL and steps > (_FAILED_STEPS if failed else _STEPS) - 0.5:
+            middle = (begin + len(peaks) - 1) // 2  # at the begin, what grows is hidden in what was there
+            factor = math.exp(math.log(peaks[-1] / peaks[middle]) * step / (time[-1] - time[middle]))
+            if factor > fastest:
+                return Growth(factor, float(time[begin]))
+    return None
+
+
+def _swing(values: Array) -> int | None:
+    """Where values begin that have another sign than the one before, and are larger, up to the last."""
+    signs, sizes = np.sign(values), np.abs(values)
+    other = (signs[1:] * signs[:-1] < 0.0) & (sizes[1:] > sizes[:-1])
+    calm = np.flatnonzero(~other)
+    begin = int(calm[-1]) + 1 if calm.size else 0
+    return begin if len(values) - begin > _STEPS else None
+
+
+def _onset(time: Array, peaks: Array, step: float) -> int | None:
+    """Where peaks begin to grow at `_PACE` at least in every few rows, up to the last."""
+    width = min(_WINDOW, (len(peaks) - 1) // 2)
+    with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
+        growth = np.log(peaks[width:]) - np.log(peaks[:-width])
+    slow = np.flatnonzero(~(growth >= math.log(_PACE) * (time[width:] - time[:-width]) / step))
+    if not slow.size:
+        return 0
+    begin = int(slow[-1]) + 1
+    return begin if begin < len(peaks) - width else None
+
+
+def _slow_onset(peaks: Array) -> int | None:
+    """Where peaks that end beyond all measure left a usual size, if they grew in each quarter of the time since."""
+    if peaks[-1] < _ASTRONOMIC:
+        return None
+    begin = int(np.searchsorted(peaks, 1e-20 * peaks[-1]))
+    quarters = np.log(peaks[np.linspace(begin, len(peaks) - 1, 5).astype(int)])
+    return begin if (np.diff(quarters) > 0.1 * (quarters[-1] - quarters[0])).all() else None
+
+
+def _advice(system: System, interfaces: Mapping[str, Interface], links: Sequence[Link]) -> str:
+    """What to do about a cycle of instances."""
+    members = interfaces.values()
+    moving = any(interface.interpolates_inputs for interface in members)
+    ways = ["take a smaller step"]
+    if system.algorithm == "iterative":
+        ways += ["let inputs move over it by extrapolation = 1"] if moving and not system.extrapolation else []
+    elif system.algebraic_loops == "delay" and find_loops(interfaces, links, doubtful=True):
+        ways = ['let its algebraic loop be solved at each communication point by algebraic_loops = "solve"']
+    elif all(interface.can_save_state or interface.vendor.get("sampled") for interface in members):
+        ways += ['algorithm = "iterative"' + (" with extrapolation = 1" if moving else "")]
+    return f"{', or '.join(ways)}; if it grows alike with any, the system itself is unstable"

@@ -1,0 +1,249 @@
+"""One run, from a system to results, metrics, verdicts and files."""
+
+from __future__ import annotations
+
+import math
+import time as clock
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+from ..errors import RailcosimError, ScenarioError
+from ..evaluation import evaluate_metrics, judge_published, judge_requirements
+from ..figures import draw
+from ..fmi import Kind, Workspace
+from ..fmi.binding import forget_paths
+from ..system import Algorithm, Instance, System
+from . import checkpoint
+from . import record as record_file
+from .checking import Checked, check
+from .checkpoint import check_serializable
+from .divergence import explain_divergence
+from .outcome import Run
+from .session import Job, Progress, Session, rows_before
+
+
+def run(
+    system: System,
+    *,
+    stop_time: float | None = None,
+    step: float | None = None,
+    algorithm: Algorithm | None = None,
+    kind: Kind = "auto",
+    output: str | Path | None = None,
+    figures: bool = True,
+    threads: int = 1,
+    checkpoint_every: float | None = None,
+    progress: Progress | None = None,
+) -> Run:
+    """Run a system.
+
+    Args:
+        system: from `load`, or built by hand.
+        stop_time: overrides the system's, in s.
+        step: overrides the system's, in s.
+        algorithm: overrides the system's.
+        kind: how components become models: ``"native"`` or ``"python"`` FMUs, ``"plain"`` Python objects in this
+            process; ``"auto"`` takes native where it can.
+        output: directory for results, metrics and figures; without one everything stays in memory.
+        figures: whether to draw the system's figures (only with an output directory).
+        threads: how many threads step the instances in parallel, with ``jacobi`` and compiled FMUs; results are the
+            same to the bit.
+        checkpoint_every: distance in s of the points from which `resume` can go on; needs an output directory.
+        progress: called at every per cent of the run and at least ten times a second.
+
+    Raises:
+        ScenarioError: the system cannot run; all problems are listed.
+        FmuError: a model failed. What was computed until then is on disk, and in the error's ``run``.
+        CouplingError: what the models exchange does not settle; as above.
+    """
+    system = _override(system, stop_time, step, algorithm)
+    outcome = execute(
+        system,
+        kind=kind,
+        output=output,
+        figures=figures,
+        threads=threads,
+        checkpoint_every=checkpoint_every,
+        progress=progress,
+    )
+    return _raised(outcome)
+
+
+def _raised(outcome: Run) -> Run:
+    """The outcome of a run, unless that is a failure."""
+    if outcome.error is not None and outcome.status == "failed":
+        outcome.error.run = outcome  # type: ignore[attr-defined]
+        raise outcome.error
+    return outcome
+
+
+def execute(
+    system: System,
+    *,
+    kind: Kind = "auto",
+    output: str | Path | None = None,
+    figures: bool = True,
+    threads: int = 1,
+    checkpoint_every: float | None = None,
+    progress: Progress | None = None,
+) -> Run:
+    """As `run`, but a model that fails ends the run with ``status = "failed"`` instead of raising."""
+    directory = Path(output) if output is not None else None
+    _check_distance(checkpoint_every)
+    if checkpoint_every is not None and directory is None:
+        raise ScenarioError("checkpoints are files: name an output directory for them")
+    return _execute(system, Job(kind, directory, threads, checkpoint_every, None, progress), figures)
+
+
+def resume(
+    directory: str | Path,
+    *,
+    stop_time: float | None = None,
+    figures: bool = True,
+    threads: int = 1,
+    checkpoint_every: float | None = None,
+    progress: Progress | None = None,
+) -> Run:
+    """Go on with a run from its last checkpoint, bit-identically with one that was never interrupted.
+
+    Args:
+        directory: of the run, which was given ``checkpoint_every``.
+        stop_time: another end in s, later than the checkpoint.
+        figures: whether to draw the system's figures.
+        threads: how many threads step the instances in parallel.
+        checkpoint_every: distance of further checkpoints in s; as before by default.
+        progress: as `run` has it.
+
+    Raises:
+        ScenarioError: there is no checkpoint that fits.
+        FmuError, CouplingError: as `run` has it.
+    """
+    outcome = go_on(
+        directory,
+        stop_time=stop_time,
+        figures=figures,
+        threads=threads,
+        checkpoint_every=checkpoint_every,
+        progress=progress,
+    )
+    return _raised(outcome)
+
+
+def go_on(
+    directory: str | Path,
+    *,
+    stop_time: float | None = None,
+    figures: bool = True,
+    threads: int = 1,
+    checkpoint_every: float | None = None,
+    progress: Progress | None = None,
+) -> Run:
+    """As `resume`, but a model that fails ends the run with ``status = "failed"`` instead of raising."""
+    directory = Path(directory)
+    _check_distance(checkpoint_every)
+    point = checkpoint.read_checkpoint(directory)
+    system = _override(point.system, stop_time, None, None)
+    if not system.stop_time > point.time:
+        raise ScenarioError(
+            f"{directory}: its checkpoint is at t = {point.time:g} s; it cannot go on to an earlier stop time, "
+            f"{system.stop_time:g} s"
+        )
+    every = checkpoint_every if checkpoint_every is not None else point.every
+    return _execute(system, Job(point.kind, directory, threads, every, point, progress), figures)
+
+
+def _check_distance(checkpoint_every: float | None) -> None:
+    if checkpoint_every is not None and not 0.0 < checkpoint_every < math.inf:
+        raise ScenarioError(f"checkpoints: their distance must be a positive number of s, not {checkpoint_every!r}")
+
+
+def _execute(system: System, job: Job, figures: bool) -> Run:
+    directory = job.directory
+    begin = clock.perf_counter()
+    with Workspace() as workspace:
+        try:
+            checked = check(system, workspace, job.kind)
+            if job.begin is not None and directory is not None:
+                job.begin.check(checked.models, directory)
+            if job.checkpoint_every is not None:
+                check_serializable(checked.models)
+            session = Session(checked, job, rows_before(job))
+            if directory is not None:
+                _open_directory(directory, checked, job)
+            session.run(begin)
+        finally:
+            forget_paths(workspace.folder)
+    outcome = Run(checked.system, session.results(), session.status, checked, error=session.error, directory=directory)
+    outcome.coupling, outcome.seconds = session.coupling, session.seconds
+    _tell_divergence(outcome)
+    evaluate(outcome)
+    if directory is not None:
+        if figures and len(outcome.results):
+            outcome.figures = draw(checked.system.figures, outcome.results, directory)
+        record_file.finish(directory, outcome, job.kind)
+    return outcome
+
+
+def _tell_divergence(outcome: Run) -> None:
+    """In the error of what failed of it, or else as a note."""
+    checked, error = outcome.checked, outcome.error
+    interfaces = {name: model.interface for name, model in checked.models.items()}
+    found = explain_divergence(checked.system, interfaces, checked.wiring.links, outcome.results, error)
+    if found and error is not None and outcome.status == "failed":
+        error.explain(found)
+    elif found:
+        outcome.notes.append(found)
+
+
+def evaluate(outcome: Run) -> None:
+    """Fill in metrics, verdicts and published values from what was recorded."""
+    system, results = outcome.system, outcome.results
+    if not len(results):
+        return
+    outcome.metrics = evaluate_metrics(system.metrics, results)
+    outcome.requirements = judge_requirements(system.requirements, results)
+    outcome.published = judge_published(
+        system.published,
+        outcome.metrics,
+        system.preset,
+        system.modified,
+        default_preset=system.default_preset,
+        completed=outcome.status == "completed",
+    )
+
+
+def at_half_the_step(system: System) -> System:
+    """The same at half the step, recorded at the same points; longer steps of instances' own stay."""
+    return _override(replace(system, record=system.record or system.step), None, 0.5 * system.step, None)
+
+
+def _override(system: System, stop_time: float | None, step: float | None, algorithm: Algorithm | None) -> System:
+    changes: dict[str, Any] = {}
+    if stop_time is not None and stop_time != system.stop_time:
+        changes["stop_time"] = stop_time
+    if step is not None and step != system.step:
+        changes.update(step=step, rescaled_from=system.rescaled_from or system.step)
+        changes["instances"] = {name: _rescaled(x, system.step, step) for name, x in system.instances.items()}
+        if system.record is not None and system.record < step:
+            changes["record"] = None
+    if algorithm is not None and algorithm != system.algorithm:
+        changes["algorithm"] = algorithm
+    return replace(system, **changes, modified=True) if changes else system
+
+
+def _rescaled(instance: Instance, before: float, step: float) -> Instance:
+    """A step and a sample time that were given as the old step follow the new one."""
+    if instance.step == before:
+        instance = replace(instance, step=step)
+    if instance.start.get("sample_time") == before:
+        instance = replace(instance, start={**instance.start, "sample_time": step})
+    return instance
+
+
+def _open_directory(directory: Path, checked: Checked, job: Job) -> None:
+    try:
+        directory.mkdir(parents=True, exist_ok=True)
+        record_file.write(directory, checked, job.kind, anew=job.begin is None)
+    except OSError as error:
+        raise RailcosimError(f"the output directory {directory} cannot be used: {error.strerror or error}") from error

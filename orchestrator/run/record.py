@@ -1,0 +1,171 @@
+"""The record of a run: ``run.json``, ``metrics.json`` and ``units.json`` beside the results."""
+
+from __future__ import annotations
+
+import dataclasses
+import importlib.metadata
+import json
+import math
+import os
+import platform
+from pathlib import Path
+from typing import Any
+
+from ..isolation import is_isolated
+from ..system import SWEEPING, System
+from . import rows
+from .checking import Checked
+from .checkpoint import CHECKPOINT_FILE
+from .outcome import Run
+
+_PACKAGES = ("railcosim", "fmpy", "pythonfmu", "numpy", "scipy")
+
+
+def write(directory: Path, checked: Checked, kind: str, *, anew: bool = True) -> None:
+    """Write what is known before the first step, so that a run that is killed can be read.
+
+    Args:
+        directory: where.
+        checked: what runs.
+        kind: as which kind of model.
+        anew: whether what an earlier run left there goes, so that it is not taken for this one's.
+    """
+    if anew:
+        for name in (rows.CSV_FILE, rows.ROWS_FILE, "metrics.json", CHECKPOINT_FILE):
+            (directory / name).unlink(missing_ok=True)
+    _dump(directory / "run.json", _describe(checked.system, checked, kind) | {"status": "running"})
+    _dump(directory / "units.json", {"time": "s"} | _units(checked))
+
+
+def abandon(directory: Path, error: BaseException) -> None:
+    """Let the record of a run that never began not say "running" for ever."""
+    path = directory / "run.json"
+    _dump(path, json.loads(path.read_text(encoding="utf-8")) | {"status": "failed", "error": str(error)})
+
+
+def finish(directory: Path, outcome: Run, kind: str) -> None:
+    """Write the end of the run, and what was evaluated."""
+    record = _describe(outcome.system, outcome.checked, kind)
+    record["status"] = outcome.status
+    record["error"] = None if outcome.error is None else str(outcome.error)
+    record["time_reached"] = float(outcome.time[-1]) if len(outcome.time) else None
+    record["seconds"] = outcome.seconds
+    record["coupling"] = outcome.coupling
+    record["notes"] += outcome.notes
+    record["figures"] = [path.name for path in outcome.figures]
+    _dump(directory / "run.json", record)
+    _dump(
+        directory / "metrics.json",
+        {
+            "scenario": outcome.system.name,
+            "preset": outcome.system.preset,
+            "modified": outcome.system.modified,
+            "status": outcome.status,
+            "metrics": {
+                m.name: {
+                    "values": {"" if i is None else str(i): v for i, v in m.values.items()},
+                    "unit": m.unit,
+                    "expression": m.expression,
+                    "problem": m.problem,
+                }
+                for m in outcome.metrics
+            },
+            "requirements": [dataclasses.asdict(verdict) for verdict in outcome.requirements],
+            "published": [dataclasses.asdict(row) for row in outcome.published],
+        },
+    )
+
+
+def _describe(system: System, checked: Checked, kind: str) -> dict[str, Any]:
+    starts = checked.wiring.starts
+    return {
+        "scenario": system.name,
+        "path": system.path,
+        "title": system.title,
+        "preset": system.preset,
+        "modified": system.modified,
+        "start_time": system.start_time,
+        "stop_time": system.stop_time,
+        "step": system.step,
+        "record": system.record or system.step,
+        "seed": system.seed,
+        "algorithm": system.algorithm,
+        "order": list(checked.order.sequence) if system.algorithm in SWEEPING else None,
+        "late": list(checked.order.late) if system.algorithm in SWEEPING else None,
+        "extrapolation": system.extrapolation,
+        "algebraic_loops": system.algebraic_loops,
+        "steps": {name: instance.step for name, instance in system.instances.items() if instance.step is not None},
+        "events": [dataclasses.asdict(event) for event in system.events],
+        "delays": {c.target: c.delay for c in system.connections if c.delay},
+        "kind": kind,
+        "notes": list(checked.notes),
+        "versions": {package: importlib.metadata.version(package) for package in _PACKAGES},
+        "python": platform.python_version(),
+        "platform": platform.platform(),
+        "instances": {
+            name: {
+                "model": system.instances[name].model,
+                "build": system.instances[name].build,
+                "kind": model.kind,
+                "isolated": is_isolated(model, system.instances[name]),
+                "digest": model.digest,
+                "guid": model.interface.guid,
+                "generator": model.interface.generator,
+                "start": starts[name],
+            }
+            for name, model in checked.models.items()
+        },
+        "connections": [dataclasses.asdict(connection) for connection in system.connections],
+        "units": _units(checked),
+        "texts": _texts(checked),
+        "parameters": {
+            f"{name}.{v.name}": starts[name].get(v.name, v.start)
+            for name, model in checked.models.items()
+            for v in model.interface.of("parameter")
+        },
+        "requirements": system.requirements,
+        "metrics": system.metrics,
+        "published": system.published,
+        "figures_wanted": system.figures,
+        "scenario_text": system.text,
+    }
+
+
+def _units(checked: Checked) -> dict[str, str]:
+    return {
+        f"{name}.{v.name}": v.unit
+        for name, model in checked.models.items()
+        for v in model.interface.of("output", "parameter")
+        if v.unit is not None
+    }
+
+
+def _texts(checked: Checked) -> list[str]:
+    """Signals that are texts, even where every text looks like a number."""
+    return [
+        f"{name}.{v.name}"
+        for name, model in checked.models.items()
+        for v in model.interface.variables.values()
+        if v.type == "String"
+    ]
+
+
+def _dump(path: Path, content: dict[str, Any]) -> None:
+    part = path.with_name(path.name + ".part")
+    text = json.dumps(_plain(content), indent=1, ensure_ascii=False) + "\n"
+    # What stands for the bytes of a file name that is not UTF-8 becomes the escape that JSON has for it.
+    part.write_text(text, encoding="utf-8", errors="backslashreplace")
+    os.replace(part, path)
+
+
+def _plain(value: Any) -> Any:
+    """JSON has no infinity, no NaN and no dates: they become text."""
+    if isinstance(value, dict):
+        return {str(k): _plain(v) for k, v in value.items()}
+    if isinstance(value, list | tuple | set | frozenset):
+        return [_plain(v) for v in value]
+    if hasattr(value, "item") and not isinstance(value, str):
+        value = value.item()
+    if isinstance(value, float) and not math.isfinite(value):
+        return repr(value)
+    return value if value is None or isinstance(value, str | int | float) else str(value)

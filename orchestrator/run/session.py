@@ -1,0 +1,250 @@
+"""One simulation of a checked system: instances, master and recorder from the first to the last communication point."""
+
+from __future__ import annotations
+
+import math
+import signal
+import threading
+import time as clock
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..errors import RunError, ScenarioError, StoppedError
+from ..fmi import Kind, Slave
+from ..isolation import instantiate
+from ..master import Master, Rows, Settings
+from . import record as record_file
+from .checking import Checked
+from .checkpoint import Checkpoint
+from .outcome import Status
+from .results import Recorder, Results
+
+Progress = Callable[[float, float], None]
+"""Called now and then with the time reached and the stop time, both in s."""
+
+
+@dataclass(frozen=True)
+class Job:
+    """How a system is to be run.
+
+    Attributes:
+        kind: how components become models.
+        directory: where the files go; None keeps everything in memory.
+        threads: that step instances in parallel.
+        checkpoint_every: distance of checkpoints in s, if there are any.
+        begin: the checkpoint to begin at, if the run goes on.
+        progress: told of how far it has got.
+    """
+
+    kind: Kind
+    directory: Path | None = None
+    threads: int = 1
+    checkpoint_every: float | None = None
+    begin: Checkpoint | None = None
+    progress: Progress | None = None
+
+
+class Session:
+    """Simulates.
+
+    Args:
+        checked: the system, found fit to run.
+        job: how to run it.
+        past: rows that were recorded before, if the run goes on.
+
+    Attributes:
+        status: how it ended; error: why it failed or ended early.
+        seconds: wall time of ``setup`` and ``stepping``, and the number of communication ``steps``.
+        coupling: how the master's iterations, step sizes, loops and events went.
+    """
+
+    def __init__(self, checked: Checked, job: Job, past: NDArray[Any] | None = None) -> None:
+        self.checked, self.job = checked, job
+        self.system = checked.system
+        self.status: Status = "failed"
+        self.error: RunError | None = None
+        self.seconds: dict[str, float] = {"setup": 0.0, "stepping": 0.0, "steps": 0}
+        self.coupling: dict[str, Any] = {}
+        self._past = past
+        self._slaves: dict[str, Slave] = {}
+        self._recorder: Recorder | None = None
+        self._stopped = threading.Event()
+
+    def run(self, begin: float) -> None:
+        """Run from the first to the last point; a failing model is no exception here but a status.
+
+        Args:
+            begin: when the set-up began, by the performance counter.
+
+        Raises:
+            ScenarioError: initial values do not settle.
+        """
+        with _interruptible(self._stopped):
+            try:
+                master = self._begin()
+                self.seconds["setup"] = clock.perf_counter() - begin
+                try:
+                    self.status = "completed" if self._step(master) else "interrupted"
+                    master.terminate()
+                finally:
+                    self.coupling = master.report()
+            except StoppedError as error:
+                self.status, self.error = "terminated", error
+            except RunError as error:
+                self.status, self.error = "failed", error
+            except KeyboardInterrupt:  # a second Ctrl-C
+                self.status = "interrupted"
+            except BaseException as error:  # initial values that do not settle
+                if self.job.directory is not None:
+                    record_file.abandon(self.job.directory, error)
+                raise
+            finally:
+                if self._recorder is not None:
+                    self._recorder.close()
+                for slave in self._slaves.values():
+                    slave.free()
+
+    def _begin(self) -> Master:
+        """Instances in their initial state, or that of the checkpoint, with the rows up to there."""
+        system, checked, wiring = self.system, self.checked, self.checked.wiring
+        for name, model in checked.models.items():
+            self._slaves[name] = instantiate(model, system.instances[name])
+        settings = Settings.of(system, self.job.threads)
+        sequence = checked.order.sequence
+        master = Master(self._slaves, sequence, wiring.links, wiring.starts, system.algorithm, settings=settings)
+        master.initialize(system.start_time, system.stop_time, may_go_on=self.job.checkpoint_every is not None)
+        if self.job.begin is None or self._past is None:
+            self._recorder = Recorder(master.signals, master.kinds, self.job.directory)
+            self._recorder.extend([[system.start_time, *master.values]])
+        else:
+            self.job.begin.restore(master)
+            past, there = self._past[: self.job.begin.rows], len(self._past)
+            self._recorder = Recorder(master.signals, master.kinds, self.job.directory, past, there)
+        return master
+
+    def _step(self, master: Master) -> bool:
+        """The communication steps, with checkpoints between them; True unless they were interrupted."""
+        system, every = self.system, self.job.checkpoint_every
+        count = round((system.stop_time - system.start_time) / system.step)
+        row_every: float = int(system.algorithm != "adaptive")
+        if system.record is not None:
+            row_every = system.record / system.step
+            row_every = row_every if system.algorithm == "adaptive" else round(row_every)
+        stride = count if every is None else max(1, round(every / system.step))
+        observe = self._observer(master)
+        begin, before = clock.perf_counter(), master.steps
+        try:
+            while True:
+                passed = math.floor((master.time - system.start_time) / system.step + 1e-6)
+                until = min(count, (passed // stride + 1) * stride)
+                points = {"first": master.steps, "until": until}
+                if not master.run(system.start_time, system.step, count, row_every, observe, **points):
+                    return False
+                if until == count:
+                    return True
+                self._keep(master)
+        finally:
+            self.seconds.update(stepping=clock.perf_counter() - begin, steps=master.steps - before)
+
+    def _observer(self, master: Master) -> Callable[[int, Rows], bool]:
+        assert self._recorder is not None
+        system, recorder, stopped, progress = self.system, self._recorder, self._stopped, self.job.progress
+        last = system.stop_time - 0.5 * system.step
+        percent = 0.01 * (system.stop_time - system.start_time)
+        shown, told = clock.monotonic(), 0
+
+        def observe(_: int, rows: Rows) -> bool:
+            nonlocal shown, told
+            recorder.extend(rows)
+            time = master.time
+            reached = int((time - system.start_time) / percent + 1e-9)
+            if progress is not None and (reached > told or clock.monotonic() - shown > 0.1 or time >= last):
+                shown, told = clock.monotonic(), reached
+                progress(time, system.stop_time)
+            if not stopped.is_set():
+                return True
+            if time < last and not (len(rows) and rows[-1][0] == time):
+                recorder.extend([[time, *master.values]])  # the point at which the run was stopped
+            return False
+
+        return observe
+
+    def _keep(self, master: Master) -> None:
+        """Write a checkpoint of the present point, and first the rows up to it."""
+        job, recorder = self.job, self._recorder
+        assert job.directory is not None
+        assert recorder is not None
+        recorder.flush(sync=True)
+        point = Checkpoint.take(
+            self.system, self.checked.models, master, kind=job.kind, rows=recorder.count, every=job.checkpoint_every
+        )
+        point.write(job.directory)
+
+    def results(self) -> Results:
+        """What was recorded."""
+        recorder = self._recorder
+        time, columns = (np.empty(0), {}) if recorder is None else recorder.columns()
+        units, parameters = {}, {}
+        for instance, model in self.checked.models.items():
+            starts = self.checked.wiring.starts[instance]
+            for variable in model.interface.variables.values():
+                name = f"{instance}.{variable.name}"
+                if variable.unit is not None:
+                    units[name] = variable.unit
+                if variable.causality == "parameter":
+                    parameters[name] = starts.get(variable.name, variable.start)
+        return Results(
+            columns,
+            time,
+            units=units,
+            parameters=parameters,
+            step=self.system.step,
+            stop_time=self.system.stop_time,
+            completed=self.status == "completed",
+            figures=self.system.figures,
+        )
+
+
+def rows_before(job: Job) -> NDArray[Any] | None:
+    """What a run that goes on has recorded, beyond its checkpoint too.
+
+    Raises:
+        ScenarioError: the results are not those of the checkpoint.
+    """
+    if job.begin is None or job.directory is None:
+        return None
+    before, rows = Results.load(job.directory), job.begin.rows
+    if len(before) < rows:
+        raise ScenarioError(
+            f"{job.directory} cannot be resumed: its results have {len(before)} rows, fewer than the {rows} of its "
+            "checkpoint"
+        )
+    if len(before.names()) != job.begin.width or not before.time[rows - 1] <= job.begin.time:
+        raise ScenarioError(f"{job.directory} cannot be resumed: its results and its checkpoint are of different runs")
+    columns = [before.time, *(before[name] for name in before.names())]
+    return np.array(columns, dtype=np.result_type(*columns)).T
+
+
+@contextmanager
+def _interruptible(stopped: threading.Event) -> Iterator[None]:
+    """Turn Ctrl-C into an event that is looked at between steps: never inside an FMU, and nothing is lost."""
+    if threading.current_thread() is not threading.main_thread():
+        yield
+        return
+    before = signal.getsignal(signal.SIGINT)
+
+    def stop(*_: Any) -> None:
+        stopped.set()
+        signal.signal(signal.SIGINT, before)  # a second Ctrl-C does not wait
+
+    signal.signal(signal.SIGINT, stop)
+    try:
+        yield
+    finally:
+        signal.signal(signal.SIGINT, before)

@@ -1,0 +1,211 @@
+"""What is changed in a scenario without editing it: presets, `--set`, `--with` and `--swap`."""
+
+from __future__ import annotations
+
+import os
+import re
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+from ..errors import ScenarioError, did_you_mean
+from .groups import OPTION_KEYS, Draft, Entry, Group, Member, build_argument, is_plain, resolve_model, shown
+from .patterns import NAME, check_instance
+from .reader import check_count, flatten, place_of
+from .simulation import SIMULATION_KEYS, set_tolerance
+from .toml_source import Source, parse_value
+
+_TARGET = re.compile(rf"({NAME})(?:\[([^\[\]]*)\])?(?:\.(.+))?", re.DOTALL)
+_BUILD = re.compile(r"[A-Za-z_]\w*(?:\[[^\[\]]*\])?\.build\.[^.]+")
+
+
+@dataclass(frozen=True)
+class Target:
+    """What a key such as `train[4].speed` means: a group, one of its members or all, and what to change there."""
+
+    group: Group
+    index: int | None
+    rest: str
+
+
+def read_target(text: str, draft: Draft) -> Target:
+    """Read `NAME`, `NAME.what` or `NAME[2].what`.
+
+    Raises:
+        ScenarioError: there is no such instance.
+    """
+    match = _TARGET.fullmatch(text.strip())
+    counts = draft.counts
+    if not match:
+        near = did_you_mean(text, counts) or f"; instances are {', '.join(counts) or 'none yet'}"
+        raise ScenarioError(f"'{text}' is not of the form instance.variable, as in train[4].speed or train.speed{near}")
+    name, index, rest = match.groups()
+    if name not in counts or index is not None:
+        read = check_instance(name, index, counts)
+        if read and read.free:
+            raise ScenarioError(f"'{text}': i has no meaning here; write {name} for all or {name}[1] for one")
+        return Target(draft.groups[name], read.offset if read else None, rest or "")
+    return Target(draft.groups[name], None, rest or "")
+
+
+def change(draft: Draft, key: str, entry: Entry, folder: str, problems: list[str]) -> None:
+    """Apply one line of a preset or one `--set`; what is wrong with it is added to `problems`.
+
+    Args:
+        draft: what is changed.
+        key: `simulation.step`, `cruise.alpha`, `train[4].speed`, `cruise.component`, `train.build.carriages`,
+            `cruise.isolate`, ...
+        entry: the new value.
+        folder: what relative paths are relative to.
+        problems: where problems go.
+    """
+    try:
+        if key.startswith("simulation."):
+            _change_simulation(draft, key.removeprefix("simulation."), entry)
+        else:
+            _change_instance(read_target(key, draft), entry, folder, problems)
+    except ScenarioError as error:
+        problems += [entry.problem(problem) for problem in error.problems]
+
+
+def _change_simulation(draft: Draft, key: str, entry: Entry) -> None:
+    word, _, signal = key.partition(".")
+    if word == "tolerances":
+        _change_tolerances(draft, signal, entry)
+        return
+    if key not in SIMULATION_KEYS:
+        near = did_you_mean(key, SIMULATION_KEYS) or f"; valid here: {', '.join(SIMULATION_KEYS)}"
+        raise ScenarioError(f"unknown key 'simulation.{key}'{near}")
+    draft.simulation[key] = entry
+
+
+def _change_tolerances(draft: Draft, signal: str, entry: Entry) -> None:
+    if signal:
+        set_tolerance(draft.simulation, signal, entry, draft.counts)
+    elif isinstance(entry.value, dict):
+        for keys, value in flatten(entry.value):
+            set_tolerance(draft.simulation, ".".join(keys), Entry(value, entry.origin, entry.place), draft.counts)
+    else:
+        raise ScenarioError(
+            f"is a table, not {shown(entry.value)}; "
+            "write simulation.tolerances.INSTANCE.VARIABLE = [relative, absolute]"
+        )
+
+
+def _change_instance(target: Target, entry: Entry, folder: str, problems: list[str]) -> None:
+    group, (word, _, rest) = target.group, target.rest.partition(".")
+    if not word:
+        raise ScenarioError(
+            f"names an instance but not what to change; write {group.name}.VARIABLE or {group.name}.component"
+        )
+    if word in ("component", "fmu") and not rest:
+        group.swap(resolve_model(entry.value, folder, word), target.index)
+    elif word == "count" and not rest:
+        if target.index is not None:
+            raise ScenarioError(f"a count belongs to all; write {group.name}.count")
+        if group.count is None:
+            raise ScenarioError(f"'{group.name}' has no count to change; give it one in [instances.{group.name}]")
+        group.count = check_count(entry, problems)
+        group.members = {k: one for k, one in group.members.items() if k <= group.count}
+        if not group.model and len(group.members) < group.count:
+            raise ScenarioError(
+                f"the instances of '{group.name}' are listed singly; there are only {len(group.members)}"
+            )
+    elif word in OPTION_KEYS and not rest:
+        group.set_option(word, entry, target.index)
+    elif word == "build" and rest:
+        group.set_build(rest, build_argument(entry.value, folder), target.index)
+    else:
+        if not is_plain(entry.value):
+            raise ScenarioError(f"takes numbers, texts, true or false, or lists of these, not {shown(entry.value)}")
+        name = rest if word == "start" and rest else target.rest
+        group.set_start(name, entry, target.index)
+
+
+def apply_preset(draft: Draft, source: Source, name: str, folder: str, problems: list[str]) -> None:
+    """Apply a preset of the file: models first, so that what else it says is meant for them."""
+    table = source.data["presets"][name]
+    if not isinstance(table, dict):
+        problems.append(
+            f"{source.origin('presets', name)}: {place_of(('presets', name))}: is a table, not {shown(table)}"
+        )
+        return
+    lines = list(_preset_lines(table))
+    lines.sort(key=lambda line: ".".join(line[0]).rpartition(".")[2] not in ("component", "fmu", "count"))
+    for keys, value in lines:
+        path = ("presets", name, *keys)
+        change(draft, ".".join(keys), Entry(value, source.origin(*path), place_of(path)), folder, problems)
+
+
+def _preset_lines(table: Mapping[str, Any], path: tuple[str, ...] = ()) -> Iterator[tuple[tuple[str, ...], Any]]:
+    """The lines of a preset; tables are opened, except a build argument's own value."""
+    for key, value in table.items():
+        keys = (*path, key)
+        if isinstance(value, dict) and not _BUILD.fullmatch(".".join(keys)):
+            yield from _preset_lines(value, keys)
+        else:
+            yield keys, value
+
+
+def apply_settings(draft: Draft, settings: Sequence[str], problems: list[str], option: str = "--set") -> None:
+    """Apply `--set train[4].speed=10` (or `--with train.carriages=8`); values are TOML, or the text as it is."""
+    for text in settings:
+        key, equals, value = text.partition("=")
+        entry = Entry(parse_value(value.strip()), f"{option} {text}")
+        if not equals or not key.strip() or not value.strip():
+            example = "train[4].speed=10" if option == "--set" else "train.carriages=8"
+            problems.append(entry.problem(f"is not of the form name=value, as in {option} {example}"))
+            continue
+        if not is_plain(entry.value, tables=option == "--with" or key.strip() == "simulation.tolerances"):
+            entry = Entry(value.strip(), entry.origin)
+        change(draft, key.strip() if option == "--set" else _build_key(key.strip()), entry, os.getcwd(), problems)
+
+
+def _build_key(key: str) -> str:
+    name, _, argument = key.partition(".")
+    return f"{name}.build.{argument.removeprefix('build.')}" if argument else key
+
+
+def apply_swaps(draft: Draft, swaps: Sequence[str], problems: list[str]) -> None:
+    """Apply `--swap cruise=PATH.fmu|Component|file.py:Class`; paths are relative to the current directory."""
+    for text in swaps:
+        key, equals, model = text.partition("=")
+        where = f"--swap {text}"
+        if not equals or not model.strip():
+            problems.append(
+                f"{where}: is not of the form instance=model, as in --swap cruise=my_controller.py:MyController"
+            )
+            continue
+        try:
+            target = read_target(key.strip(), draft)
+            if target.rest:
+                raise ScenarioError(f"a swap replaces a whole instance; write --swap {target.group.name}=...")
+            target.group.swap(resolve_model(os.path.expanduser(model.strip()), os.getcwd(), ""), target.index)
+        except ScenarioError as error:
+            problems += [f"{where}: {problem}" for problem in error.problems]
+
+
+def apply_step(draft: Draft, entry: Entry) -> float | None:
+    """Set the communication step, and every sample time and step of an instance's own that equals the old one.
+
+    Returns:
+        the old step, where it differs; the sample times that components have by default follow later.
+    """
+    from_step = draft.simulation.get("step", Entry(0.1, ""))
+    draft.simulation["step"] = entry
+    old, new = from_step.value, entry.value
+    if old == new or not isinstance(old, int | float) or not isinstance(new, int | float) or isinstance(new, bool):
+        return None
+    for group in draft.groups.values():
+        parts: list[Group | Member] = [group, *group.members.values()]
+        for key, entries in [("sample_time", p.start) for p in parts] + [("step", p.options) for p in parts]:
+            if key in entries:
+                known = entries[key]
+                entries[key] = Entry(_follow(known.value, old, new), known.origin, known.place)
+    return float(old)
+
+
+def _follow(value: Any, old: float, new: float) -> Any:
+    if isinstance(value, list):
+        return [_follow(item, old, new) for item in value]
+    return new if not isinstance(value, bool | str) and value == old else value

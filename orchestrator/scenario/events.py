@@ -1,0 +1,150 @@
+"""`[[events]]`: what happens to which signal, and when."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import Any
+
+from ..errors import ScenarioError
+from ..system import ACTIONS, Event
+from .groups import Entry, choice, number, positive, shown
+from .patterns import Counts, read_signal
+from .reader import Reader
+
+EVENT_KEYS = ("signal", "action", "at", "value", "rate", "duration", "every")
+
+_NEEDED = {
+    "set": ("value", "say what is set: value = 1.5"),
+    "override": ("value", "say what takes the signal's place: value = 1.5"),
+    "bias": ("value", "say what is added: value = 1.5"),
+    "ramp": ("rate", "say what is added in each second: rate = 0.1"),
+}
+_NOT_TAKEN = {
+    ("freeze", "value"): "it keeps the value of the beginning; take 'override' for another one",
+    ("ramp", "value"): "say what is added in each second: rate = 0.1",
+    ("set", "duration"): "what is set stays; take 'override' for a value that lasts a while",
+}
+
+
+@dataclass(frozen=True)
+class EventRule:
+    """One entry of `[[events]]`: its signals as written, and what all events that it stands for have in common."""
+
+    signals: tuple[Entry, ...]
+    event: Event
+
+
+def read_events(reader: Reader) -> list[EventRule]:
+    """The entries in the order they are written; what is wrong with them goes to the reader's problems."""
+    rules = []
+    for k, table in enumerate(reader.tables("events")):
+        reader.check_keys(table, EVENT_KEYS, "events", k)
+        entries = {key: reader.entry(table[key], "events", k, key) for key in EVENT_KEYS if key in table}
+        whole, problems = reader.entry(None, "events", k), reader.problems
+        event = Event("", _action(entries, whole, problems), _begin(entries, whole, problems), origin=whole.origin)
+        if event.action:
+            problems += _misfits(event.action, entries, whole)
+        event.value = _value(event.action, entries["value"], problems) if "value" in entries else None
+        event.rate = number(entries["rate"], problems) if "rate" in entries else None
+        before = len(problems)
+        event.duration = positive(entries["duration"], problems) if "duration" in entries else None
+        event.every = positive(entries["every"], problems) if "every" in entries else None
+        if len(problems) == before:
+            problems += _repetition(event, entries)
+        rules.append(EventRule(tuple(_signals(table, reader, k)), event))
+    return rules
+
+
+def _signals(table: Mapping[str, Any], reader: Reader, k: int) -> list[Entry]:
+    if "signal" not in table:
+        reader.problem('signal is missing; name what it happens to: signal = "instance.variable"', "events", k)
+        return []
+    texts = table["signal"]
+    if isinstance(texts, str):
+        return [reader.entry(texts, "events", k, "signal")]
+    if isinstance(texts, list) and texts and all(isinstance(text, str) for text in texts):
+        return [reader.entry(text, "events", k, "signal", j) for j, text in enumerate(texts)]
+    reader.problem(f'takes "instance.variable", or a list of such texts, not {shown(texts)}', "events", k, "signal")
+    return []
+
+
+def _action(entries: Mapping[str, Entry], whole: Entry, problems: list[str]) -> str:
+    """The action; empty, with a problem noted, where there is none."""
+    if "action" not in entries:
+        problems.append(whole.problem(f"action is missing; say what happens: {', '.join(ACTIONS)}"))
+        return ""
+    before = len(problems)
+    action = choice(entries["action"], problems, ACTIONS, "action")
+    return action if len(problems) == before else ""
+
+
+def _begin(entries: Mapping[str, Entry], whole: Entry, problems: list[str]) -> float:
+    if "at" in entries:
+        return number(entries["at"], problems)
+    problems.append(whole.problem("at is missing; say when it begins, in s: at = 60.0"))
+    return 0.0
+
+
+def _misfits(action: str, entries: Mapping[str, Entry], whole: Entry) -> list[str]:
+    """What the action needs and is not given, and what it is given and does not take."""
+    needed, remedy = _NEEDED.get(action, ("", ""))
+    problems = []
+    if needed and needed not in entries:
+        problems.append(whole.problem(f"{needed} is missing; {remedy}"))
+    excluded = [key for key in ("value", "rate") if key != needed] + ["duration"] * (action == "set")
+    for key in excluded:
+        if key in entries:
+            why = _NOT_TAKEN.get((action, key), "take 'ramp' for an added value that grows")
+            problems.append(entries[key].problem(f"'{action}' takes no {key}; {why}"))
+    return problems
+
+
+def _value(action: str, entry: Entry, problems: list[str]) -> Any:
+    value = entry.value
+    if action == "bias":
+        return number(entry, problems)
+    if isinstance(value, bool | str):
+        return value
+    if isinstance(value, int | float):
+        number(entry, problems)
+        return value
+    each = "; write an event for each element" if isinstance(value, list) else ""
+    problems.append(entry.problem(f"takes a number, true or false, or a text, not {shown(value)}{each}"))
+    return None
+
+
+def _repetition(event: Event, entries: Mapping[str, Entry]) -> list[str]:
+    """What is wrong with the period."""
+    if event.every is None or event.action in ("", "set"):
+        return []
+    if event.duration is None:
+        return [entries["every"].problem("what begins again must end before; give a duration, in s: duration = 5.0")]
+    if event.every < event.duration:
+        return [
+            entries["every"].problem(
+                f"the period, {event.every:g} s, must not be shorter than the duration, {event.duration:g} s"
+            )
+        ]
+    return []
+
+
+def expand_events(rules: Sequence[EventRule], counts: Counts, problems: list[str]) -> list[Event]:
+    """The events of every single signal, in the order they are written."""
+    events = []
+    for rule in rules:
+        names: dict[str, None] = {}
+        for entry in rule.signals:
+            try:
+                found = read_signal(entry.value, counts).names(counts)
+            except ScenarioError as error:
+                problems += [entry.problem(problem) for problem in error.problems]
+                continue
+            problems += [
+                entry.problem(f"'{name}' stands there twice; an event happens to a signal once")
+                for name in found
+                if name in names
+            ]
+            names |= dict.fromkeys(found)
+        events += [replace(rule.event, signal=name) for name in names]
+    return events

@@ -1,0 +1,316 @@
+"""A scenario between TOML and `System`: groups of instances, before counts, lists and patterns are expanded.
+
+Presets and options on the command line change the draft, so that `cruise.alpha` means all controllers whatever their
+number, and what they say is checked as if it stood in the file.
+"""
+
+from __future__ import annotations
+
+import math
+import os
+import re
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field
+from typing import Any
+
+from ..errors import ScenarioError, did_you_mean
+from ..system import Instance
+from .patterns import NAME, Rule, member
+
+MAX_COUNT = 10_000
+RESERVED = frozenset(
+    {"simulation", "instances", "connections", "events", "presets", "require", "metrics", "published", "figures"}
+)
+OPTION_KEYS = ("step", "isolate", "step_timeout", "memory_limit")
+_PYTHON_CLASS = re.compile(rf"(.*\.py):({NAME})", re.DOTALL)
+
+
+@dataclass(frozen=True)
+class Entry:
+    """A value, where it stands (`file.toml:12`, `--set x.y=1`) and what it is called there."""
+
+    value: Any
+    origin: str
+    place: str = ""
+
+    def problem(self, message: str) -> str:
+        """A message that says where."""
+        return f"{self.origin}: {self.place}: {message}" if self.place else f"{self.origin}: {message}"
+
+
+@dataclass
+class Member:
+    """What is said of one instance of a group alone."""
+
+    origin: str = ""
+    model: str | None = None
+    swapped: bool | None = None  # None: as the group
+    options: dict[str, Entry] = field(default_factory=dict)
+    build: dict[str, Any] = field(default_factory=dict)
+    start: dict[str, Entry] = field(default_factory=dict)
+
+
+@dataclass
+class Group:
+    """Instances that are written together: `train`, of which there are `count`; one without a number where None."""
+
+    name: str
+    origin: str
+    model: str = ""
+    count: int | None = None
+    swapped: bool = False
+    options: dict[str, Entry] = field(default_factory=dict)
+    build: dict[str, Any] = field(default_factory=dict)
+    start: dict[str, Entry] = field(default_factory=dict)
+    members: dict[int, Member] = field(default_factory=dict)
+
+    def swap(self, model: str, index: int | None = None) -> None:
+        """Put another model in the place of all, or of one; connections, start values and build arguments stay."""
+        ones = list(self.members.values()) if index is None else [self.members.setdefault(index, Member())]
+        for one in ones:
+            was_swapped = self.swapped if one.swapped is None else one.swapped
+            one.swapped = was_swapped or model != (one.model or self.model)
+            one.model = None if index is None else model
+        if index is None:
+            self.swapped |= model != self.model
+            self.model = model
+
+    def set_option(self, name: str, entry: Entry, index: int | None = None) -> None:
+        """Give one of `OPTION_KEYS` to all, or to one."""
+        if index is not None:
+            self.members.setdefault(index, Member()).options[name] = entry
+            return
+        self.options[name] = entry
+        for one in self.members.values():
+            one.options.pop(name, None)
+
+    def set_build(self, name: str, value: Any, index: int | None = None) -> None:
+        """Give a build argument to all, or to one."""
+        if index is not None:
+            self.members.setdefault(index, Member()).build[name] = value
+            return
+        self.build[name] = value
+        for one in self.members.values():
+            one.build.pop(name, None)
+
+    def set_start(self, name: str, entry: Entry, index: int | None = None) -> None:
+        """Give a start value to all, or to one; what comes later wins, a whole array over its elements too."""
+        if index is None:
+            for one in self.members.values():
+                _drop(one.start, name)
+        table = self.start if index is None else self.members.setdefault(index, Member()).start
+        _drop(table, name)
+        table[name] = entry
+
+
+@dataclass
+class Draft:
+    """A scenario before expansion."""
+
+    simulation: dict[str, Entry] = field(default_factory=dict)
+    groups: dict[str, Group] = field(default_factory=dict)
+    rules: list[Rule] = field(default_factory=list)
+
+    @property
+    def counts(self) -> dict[str, int | None]:
+        """Group names with their count."""
+        return {group.name: group.count for group in self.groups.values()}
+
+
+def _drop(table: dict[str, Entry], name: str) -> None:
+    for key in [key for key in table if key == name or key.startswith(f"{name}[")]:
+        del table[key]
+
+
+def resolve_model(text: Any, folder: str, kind: str = "component") -> str:
+    """A model as `Instance.model` has it: files absolute, names of the catalogue as they are.
+
+    Args:
+        text: a name, `file.py:Class`, or a path that ends in `.fmu`.
+        folder: what relative paths are relative to.
+        kind: the key it stands under, `component` or `fmu`; empty where either will do.
+
+    Raises:
+        ScenarioError: it is none of these, or there is no such file.
+    """
+    if not isinstance(text, str) or not text.strip():
+        raise ScenarioError("takes a text: a component's name, 'file.py:Class', or the path of an .fmu")
+    is_fmu = text.lower().endswith(".fmu")
+    if kind == "component" and is_fmu:
+        raise ScenarioError(f"'{text}' is an FMU file; write fmu = ... instead of component = ...")
+    if is_fmu or kind == "fmu":
+        if not is_fmu:
+            raise ScenarioError(
+                f"'{text}' does not end in .fmu; for a component of the catalogue write component = ..."
+            )
+        return _existing(text, folder)
+    match = _PYTHON_CLASS.fullmatch(text)
+    if match:
+        return f"{_existing(match[1], folder)}:{match[2]}"
+    if text.endswith(".py") or ".py:" in text:
+        raise ScenarioError(f"'{text}' does not name a class; write 'file.py:Class'")
+    if not re.fullmatch(NAME, text):
+        raise ScenarioError(f"'{text}' is neither a component's name, nor 'file.py:Class', nor the path of an .fmu")
+    return text
+
+
+def _existing(text: str, folder: str) -> str:
+    path = os.path.abspath(os.path.join(folder, text))
+    if os.path.isfile(path):
+        return path
+    near = ""
+    if os.path.isdir(os.path.dirname(path)):
+        near = did_you_mean(os.path.basename(path), os.listdir(os.path.dirname(path)))
+    raise ScenarioError(f"there is no file '{path}'{near}")
+
+
+def build_argument(value: Any, folder: str) -> Any:
+    """A build argument as it is: a text that ends in `.json` names a file and becomes an absolute path.
+
+    Raises:
+        ScenarioError: there is no such file, or the value is a date or a time.
+    """
+    if isinstance(value, str) and value.endswith(".json"):
+        return _existing(value, folder)
+    if not is_plain(value, tables=True):
+        raise ScenarioError("takes numbers, texts, true or false, lists and tables of these; quote a date")
+    return value
+
+
+def is_plain(value: Any, tables: bool = False) -> bool:
+    """Whether a value consists of numbers, texts and truth values, lists of these, and perhaps tables."""
+    if isinstance(value, list):
+        return all(is_plain(item, tables) for item in value)
+    if isinstance(value, dict):
+        return tables and all(is_plain(item, tables) for item in value.values())
+    return isinstance(value, bool | int | float | str)
+
+
+def expand_group(group: Group, problems: list[str]) -> list[tuple[Instance, dict[str, str]]]:
+    """The instances of a group, each with the origins of its options and start values."""
+    members: list[tuple[Instance, dict[str, str]]] = []
+    total = 1 if group.count is None else group.count
+    for entry_name, entry in group.start.items():
+        if group.count is not None and isinstance(entry.value, list) and len(entry.value) != total:
+            values = f"{len(entry.value)} value{'s' * (len(entry.value) != 1)}"
+            problems.append(
+                entry.problem(
+                    f"{entry_name} has {values} for the {total} instances of '{group.name}'; "
+                    "give one for each, or a single value for all"
+                )
+            )
+    for k in range(total):
+        index = None if group.count is None else k + 1
+        one = group.members.get(k + 1, Member()) if index else Member()
+        start = {name: _share(entry, k, index) for name, entry in group.start.items()}
+        for name, entry in one.start.items():
+            _drop(start, name)
+            start[name] = entry
+        options = {**group.options, **one.options}
+        model, swapped = one.model or group.model, group.swapped if one.swapped is None else one.swapped
+        build = {**group.build, **one.build}
+        if build and model.lower().endswith(".fmu"):  # what a swap left behind is nobody's mistake
+            if not swapped:
+                problems.append(
+                    f"{one.origin or group.origin}: '{model}' is a finished FMU and takes no build arguments"
+                )
+            build = {}
+        instance = Instance(
+            member(group.name, index),
+            model,
+            build,
+            {name: entry.value for name, entry in start.items()},
+            index,
+            total,
+            **_options(options, problems),
+            swapped=swapped,
+            origin=one.origin or group.origin,
+        )
+        origins = {f"instances.{instance.name}.{key}": entry.origin for key, entry in options.items()}
+        origins |= {f"{instance.name}.{name}": entry.origin for name, entry in start.items()}
+        members.append((instance, origins))
+    return members
+
+
+def _options(entries: dict[str, Entry], problems: list[str]) -> dict[str, Any]:
+    """The values of `OPTION_KEYS`, checked."""
+    values: dict[str, Any] = {}
+    for key, entry in entries.items():
+        if key == "isolate":
+            values[key] = truth(entry, problems)
+        else:
+            values[key] = positive(entry, problems, "MiB" if key == "memory_limit" else "s")
+    return values
+
+
+def _share(entry: Entry, k: int, index: int | None) -> Entry:
+    """One instance's part of a value: the outer axis of a list is the instance, wherever there is a count."""
+    if index is None or not isinstance(entry.value, list):
+        return entry
+    return Entry(entry.value[k] if k < len(entry.value) else 0.0, entry.origin, entry.place)
+
+
+def number(
+    entry: Entry,
+    problems: list[str],
+    default: float = 0.0,
+    what: str = "a finite number",
+    fits: Callable[[float], bool] = math.isfinite,
+) -> float:
+    """A finite number that fits; `what` it has to be is said otherwise."""
+    value = entry.value
+    try:
+        if isinstance(value, int | float) and not isinstance(value, bool) and math.isfinite(value) and fits(value):
+            return float(value)
+    except OverflowError:
+        pass
+    problems.append(entry.problem(f"takes {what}, not {shown(value)}"))
+    return default
+
+
+def positive(entry: Entry, problems: list[str], unit: str = "s") -> float:
+    """A finite number greater than 0."""
+    return number(entry, problems, 1.0, f"a number greater than 0, in {unit}", lambda value: value > 0)
+
+
+def whole(entry: Entry, problems: list[str], fits: Callable[[int], bool], what: str, default: int = 1) -> int:
+    """A whole number that fits; `what` it has to be is said otherwise."""
+    value = entry.value
+    if isinstance(value, int) and not isinstance(value, bool) and fits(value):
+        return value
+    problems.append(entry.problem(f"takes {what}, not {shown(value)}"))
+    return default
+
+
+def truth(entry: Entry, problems: list[str]) -> bool:
+    """True or false."""
+    if not isinstance(entry.value, bool):
+        problems.append(entry.problem(f"takes true or false, not {shown(entry.value)}"))
+    return entry.value is True
+
+
+def choice(entry: Entry, problems: list[str], valid: Sequence[str], what: str) -> str:
+    """One of a few words; `what` they are called in the message."""
+    if entry.value in valid:
+        return str(entry.value)
+    near = did_you_mean(str(entry.value), valid) or f"; there are {', '.join(valid)}"
+    problems.append(entry.problem(f"there is no {what} {shown(entry.value)}{near}"))
+    return valid[0]
+
+
+def shown(value: Any) -> str:
+    """A value as a message shows it: as TOML writes it, cut where it is long."""
+    text = {True: "true", False: "false"}[value] if isinstance(value, bool) else _short(value)
+    return text if len(text) <= 60 else f"{text[:57]}..."
+
+
+def _short(value: Any) -> str:
+    if isinstance(value, int) and abs(value) >= 10**50:
+        return "a number of more than 50 digits"
+    return repr(value)
+
+
+def whole_multiple(value: float, step: float) -> bool:
+    """Whether `value` is a whole number (at least 1) of steps, up to rounding."""
+    steps = value / step
+    return math.isfinite(steps) and round(steps) >= 1 and abs(steps - round(steps)) <= 1e-9 * steps + 1e-12

@@ -1,0 +1,386 @@
+"""TOML -> draft: which sections and keys there are, and what may stand in them."""
+
+from __future__ import annotations
+
+import keyword
+import re
+from collections.abc import Collection, Iterator, Mapping
+from typing import Any
+
+from ..errors import ExpressionError, ScenarioError, did_you_mean
+from ..evaluation import FUNCTIONS, PUBLISHED_KEYS, check_published, parse, parse_requirement
+from ..figures import PANEL_KEYS
+from ..system import Connection
+from .groups import (
+    MAX_COUNT,
+    OPTION_KEYS,
+    RESERVED,
+    Draft,
+    Entry,
+    Group,
+    Member,
+    build_argument,
+    is_plain,
+    number,
+    resolve_model,
+    shown,
+    truth,
+)
+from .patterns import NAME, Rule, read_endpoint
+from .simulation import SIMULATION_KEYS, TOLERANCES
+from .toml_source import Source
+
+TEXT_KEYS = ("title", "source", "description", "default_preset")
+TOP_KEYS = (
+    *TEXT_KEYS,
+    "simulation",
+    "instances",
+    "connections",
+    "events",
+    "presets",
+    "require",
+    "metrics",
+    "published",
+    "figures",
+)
+INSTANCE_KEYS = ("component", "fmu", "count", *OPTION_KEYS, "swapped", "build", "start")
+CONNECTION_KEYS = ("from", "delay", "scale", "offset")
+_MEMBER = re.compile(rf"({NAME})\[(\d{{1,9}})\]")
+
+
+class Reader:
+    """Reads one source into a draft and collects everything that is wrong with it in `problems`."""
+
+    def __init__(self, source: Source, folder: str) -> None:
+        self.source = source
+        self.folder = folder
+        self.problems: list[str] = []
+        self.draft = Draft()
+
+    def read(self) -> Draft:
+        """The draft; what is wrong with the file stands in `problems` afterwards."""
+        data = self.source.data
+        self.check_keys(data, TOP_KEYS)
+        for key in TEXT_KEYS:
+            if key in data and (not isinstance(data[key], str) or (key == "default_preset" and not data[key])):
+                self.problem(f"takes a text, not {shown(data[key])}", key)
+        self._simulation(self.table(data, "simulation"))
+        self._instances(self.table(data, "instances"))
+        self._connections(self.table(data, "connections"))
+        return self.draft
+
+    # ---------------------------------------------------------------- helpers
+
+    def entry(self, value: Any, *path: str | int) -> Entry:
+        """A value with its place."""
+        return Entry(value, self.source.origin(*path), place_of(path))
+
+    def problem(self, message: str, *path: str | int) -> None:
+        """Note something wrong at a place."""
+        self.problems.append(self.entry(None, *path).problem(message))
+
+    def table(self, parent: Mapping[str, Any], key: str, *path: str | int) -> dict[str, Any]:
+        """The table under a key; empty, with a problem noted, where something else stands there."""
+        value = parent.get(key, {})
+        if isinstance(value, dict):
+            return value
+        self.problem(f"is a table, [{place_of((*path, key))}], not {shown(value)}", *path, key)
+        return {}
+
+    def texts(self, section: str) -> dict[str, str]:
+        """The texts of `[require]` or `[metrics]`, each of them readable."""
+        found = {}
+        for name, text in self.table(self.source.data, section).items():
+            if not isinstance(text, str):
+                self.problem(f"takes a text, not {shown(text)}", section, name)
+                continue
+            found[name] = text
+            if section == "metrics":
+                self._expression(text, section, name)
+                continue
+            try:
+                parse_requirement(name, text)
+            except ExpressionError as error:
+                for problem in error.problems:
+                    self.problem(problem.removeprefix(f"requirement '{name}': "), section, name)
+        return found
+
+    def tables(self, section: str) -> list[dict[str, Any]]:
+        """The tables of `[[events]]`, `[[published]]` or `[[figures]]`."""
+        found = self.source.data.get(section, [])
+        if isinstance(found, list) and all(isinstance(entry, dict) for entry in found):
+            return found
+        self.problem(f"is a list of tables; each begins with [[{section}]]", section)
+        return []
+
+    def published(self, metrics: Collection[str], presets: Collection[str]) -> list[dict[str, Any]]:
+        """The published values; whether a metric has such an index is known only with the interfaces."""
+        found = self.tables("published")
+        strange: set[Any] = set()  # a preset that is misspelt at the top would otherwise be told for every entry
+        for k, entry in enumerate(found):
+            self.check_keys(entry, PUBLISHED_KEYS, "published", k)
+            known = {key: value for key, value in entry.items() if key in PUBLISHED_KEYS}
+            preset = known.get("preset")
+            if isinstance(preset, str) and preset not in presets:
+                if preset in strange:
+                    del known["preset"]
+                strange.add(preset)
+            prefix = f"[[published]] entry 1 ({entry.get('metric', 'no metric')}): "
+            for located in check_published([known], {name: _AnyIndex() for name in metrics}, presets):
+                problem = located.removeprefix(prefix)
+                key = next((key for key in known if re.search(rf"\b{key}\b", problem)), None)
+                self.problem(problem, "published", k, *([key] if key else []))
+        return found
+
+    def figures(self) -> list[dict[str, Any]]:
+        """The figures; the signals they draw are looked up when the interfaces are known."""
+        found = self.tables("figures")
+        for k, figure in enumerate(found):
+            self._panel(figure, (*PANEL_KEYS, "panels"), "figures", k)
+            if not is_plain(figure, tables=True):
+                self.problem("takes numbers, texts, true or false, lists and tables of these; no dates", "figures", k)
+            panels = figure.get("panels", [])
+            for j, panel in enumerate(panels if isinstance(panels, list) else []):
+                if isinstance(panel, dict):
+                    self._panel(panel, PANEL_KEYS, "figures", k, "panels", j)
+        return found
+
+    def _panel(self, panel: Mapping[str, Any], valid: Collection[str], *path: str | int) -> None:
+        self.check_keys(panel, valid, *path)
+        texts = panel.get("y", [])
+        for text in texts if isinstance(texts, list) else [texts]:
+            if isinstance(text, str):
+                self._expression(text, *path, "y")
+            else:
+                self.problem(f"takes expressions, texts, not {shown(text)}", *path, "y")
+
+    def _expression(self, text: str, *path: str | int) -> None:
+        try:
+            parse(text, FUNCTIONS)
+        except ExpressionError as error:
+            for problem in error.problems:
+                self.problem(problem, *path)
+
+    def check_keys(self, table: Mapping[str, Any], valid: Collection[str], *path: str | int) -> None:
+        """Note every key that does not belong there."""
+        for key in table:
+            if key not in valid:
+                near = did_you_mean(key, valid) or f"; valid here: {', '.join(valid)}"
+                self.problem(f"unknown key '{key}'{near}", *path, key)
+
+    # ---------------------------------------------------------------- times, instances
+
+    def _simulation(self, table: Mapping[str, Any]) -> None:
+        self.check_keys(table, SIMULATION_KEYS, "simulation")
+        draft = self.draft.simulation
+        for key, value in table.items():
+            if key in SIMULATION_KEYS and key != "tolerances":
+                draft[key] = self.entry(value, "simulation", key)
+        for keys, value in flatten(self.table(table, "tolerances", "simulation")):
+            draft[TOLERANCES + ".".join(keys)] = self.entry(value, "simulation", "tolerances", *keys)
+
+    def _instances(self, tables: Mapping[str, Any]) -> None:
+        if not tables and "instances" not in self.source.data:
+            self.problems.append(f"{self.source.label}: there are no instances; begin one with [instances.NAME]")
+        singles: dict[str, dict[int, dict[str, Any]]] = {}
+        written: dict[str, None] = {}
+        for name in tables:
+            table = self.table(tables, name, "instances")
+            match = _MEMBER.fullmatch(name)
+            written[match[1] if match else name] = None
+            if match:
+                singles.setdefault(match[1], {})[int(match[2])] = table
+            elif self._name(name, "instances", name):
+                self.draft.groups[name] = self._group(name, table)
+        for name, members in singles.items():
+            self._members(name, members)
+        self.draft.groups = {name: self.draft.groups[name] for name in written if name in self.draft.groups}
+
+    def _name(self, name: str, *path: str | int) -> bool:
+        if re.fullmatch(NAME, name) and name not in RESERVED and not keyword.iskeyword(name):
+            return True
+        why = (
+            "is taken"
+            if name in RESERVED or keyword.iskeyword(name)
+            else "takes letters, digits and _, not first a digit"
+        )
+        self.problem(f"an instance's name {why}; choose another for '{name}'", *path)
+        return False
+
+    def _group(self, name: str, table: Mapping[str, Any]) -> Group:
+        path = ("instances", name)
+        self.check_keys(table, INSTANCE_KEYS, *path)
+        group = Group(name, self.source.origin(*path))
+        if "component" not in table and "fmu" not in table:
+            self.problem("says neither component = ... nor fmu = ...; name the model", *path)
+        group.model = self._model(table, *path) or ""
+        if "count" in table:
+            group.count = check_count(self.entry(table["count"], *path, "count"), self.problems)
+        group.swapped = self._swapped(table, *path) or False
+        group.options = self._options_of(table, *path)
+        group.build = self._build(table, *path)
+        group.start = self._start(table, *path)
+        return group
+
+    def _members(self, name: str, tables: Mapping[int, Mapping[str, Any]]) -> None:
+        """Instances written singly: all of a family, or some of one that also has a section of its own."""
+        first = f"{name}[{min(tables)}]"
+        group = self.draft.groups.get(name)
+        if group is None:
+            if not self._name(name, "instances", first):
+                return
+            group = Group(name, self.source.origin("instances", first), count=max(tables))
+            missing = next((k for k in range(1, len(tables) + 1) if k not in tables), None)
+            if missing is not None:
+                self.problem(f"there is no {name}[{missing}]; number from 1 without gaps", "instances", first)
+                group.count = max(1, min(max(tables), MAX_COUNT))
+            self.draft.groups[name] = group
+        for k, table in tables.items():
+            path = ("instances", f"{name}[{k}]")
+            self.check_keys(table, [key for key in INSTANCE_KEYS if key != "count"], *path)
+            if group.count is None or not 1 <= k <= group.count:
+                there = "no count" if group.count is None else f"a count of {group.count}"
+                self.problem(f"'{name}' has {there}, so there is no {name}[{k}]", *path)
+                continue
+            model = self._model(table, *path)
+            if not group.model and not ("component" in table or "fmu" in table):
+                self.problem("says neither component = ... nor fmu = ...; name the model", *path)
+            group.members[k] = Member(
+                self.source.origin(*path),
+                model,
+                self._swapped(table, *path),
+                self._options_of(table, *path),
+                self._build(table, *path),
+                self._start(table, *path),
+            )
+
+    def _model(self, table: Mapping[str, Any], *path: str) -> str | None:
+        kinds = [kind for kind in ("component", "fmu") if kind in table]
+        if len(kinds) > 1:
+            self.problem("component and fmu exclude each other; keep one", *path, "fmu")
+        if not kinds:
+            return None
+        try:
+            return resolve_model(table[kinds[0]], self.folder, kinds[0])
+        except ScenarioError as error:
+            self.problem(str(error), *path, kinds[0])
+            return None
+
+    def _swapped(self, table: Mapping[str, Any], *path: str) -> bool | None:
+        return truth(self.entry(table["swapped"], *path, "swapped"), self.problems) if "swapped" in table else None
+
+    def _options_of(self, table: Mapping[str, Any], *path: str) -> dict[str, Entry]:
+        return {key: self.entry(table[key], *path, key) for key in OPTION_KEYS if key in table}
+
+    def _build(self, table: Mapping[str, Any], *path: str) -> dict[str, Any]:
+        build = {}
+        for name, value in self.table(table, "build", *path).items():
+            try:
+                build[name] = build_argument(value, self.folder)
+            except ScenarioError as error:
+                self.problem(str(error), *path, "build", name)
+        return build
+
+    def _start(self, table: Mapping[str, Any], *path: str) -> dict[str, Entry]:
+        start: dict[str, Entry] = {}
+        for keys, value in flatten(self.table(table, "start", *path)):
+            entry = self.entry(value, *path, "start", *keys)
+            if is_plain(value):
+                start[".".join(keys)] = entry
+            else:
+                self.problems.append(
+                    entry.problem(f"takes numbers, texts, true or false, or lists of these, not {shown(value)}")
+                )
+        return start
+
+    # ---------------------------------------------------------------- connections
+
+    def _connections(self, table: Mapping[str, Any]) -> None:
+        for keys, value in self._lines(table, ()):
+            path = ("connections", *keys)
+            options = self._options(value, *path)
+            ends = []
+            for end in (".".join(keys), options.source):
+                try:
+                    ends.append(read_endpoint(end, self.draft.counts))
+                except ScenarioError as error:
+                    self.problem(str(error), *path)
+            if len(ends) == 2:
+                self.draft.rules.append(Rule(ends[0], ends[1], options))
+
+    def _lines(self, table: Mapping[str, Any], path: tuple[str, ...]) -> Iterator[tuple[tuple[str, ...], Any]]:
+        """The lines of the section; `gust.size = "x.y"` without quotes is a table in TOML, and a line here."""
+        for key, value in table.items():
+            keys = (*path, key)
+            is_options = "." in key or (path and isinstance(value, dict) and any(k in CONNECTION_KEYS for k in value))
+            if isinstance(value, dict) and not is_options:
+                yield from self._lines(value, keys)
+            elif isinstance(value, str | dict):
+                yield keys, value
+            else:
+                self.problem(
+                    f'takes "instance.output" or {{ from = "instance.output", ... }}, not {shown(value)}',
+                    "connections",
+                    *keys,
+                )
+
+    def _options(self, value: str | Mapping[str, Any], *path: str) -> Connection:
+        made = Connection("", path[-1], origin=self.source.origin(*path))
+        if isinstance(value, str):
+            made.source = value
+            return made
+        self.check_keys(value, CONNECTION_KEYS, *path)
+        if not isinstance(value.get("from"), str):
+            self.problem('names no source; write { from = "instance.output", ... }', *path)
+        else:
+            made.source = value["from"]
+        delay = value.get("delay", 0)
+        if isinstance(delay, bool) or not isinstance(delay, int) or not 0 <= delay <= 10**6:
+            self.problem(f"takes a whole number of communication steps, at least 0, not {shown(delay)}", *path, "delay")
+        else:
+            made.delay = delay
+        made.scale = number(self.entry(value.get("scale", 1.0), *path, "scale"), self.problems, 1.0)
+        made.offset = number(self.entry(value.get("offset", 0.0), *path, "offset"), self.problems)
+        return made
+
+
+class _AnyIndex(Collection[int | None]):
+    """The indices of a metric while they are not known: every one may be there."""
+
+    def __contains__(self, index: object) -> bool:
+        return True
+
+    def __iter__(self) -> Iterator[int | None]:
+        return iter(())
+
+    def __len__(self) -> int:
+        return 0
+
+
+def check_count(entry: Entry, problems: list[str]) -> int:
+    """How many instances; 1, with a problem noted, where the value is unusable."""
+    count = entry.value
+    if isinstance(count, int) and not isinstance(count, bool) and 1 <= count <= MAX_COUNT:
+        return count
+    problems.append(entry.problem(f"takes a whole number from 1 to {MAX_COUNT}, not {shown(count)}"))
+    return 1
+
+
+def flatten(table: Mapping[str, Any], path: tuple[str, ...] = ()) -> Iterator[tuple[tuple[str, ...], Any]]:
+    """The values of nested tables, each with its keys: `start.engine.torque = 1` means the variable engine.torque."""
+    for key, value in table.items():
+        if isinstance(value, dict):
+            yield from flatten(value, (*path, key))
+        else:
+            yield (*path, key), value
+
+
+def place_of(path: tuple[str | int, ...]) -> str:
+    """A place as messages write it: `presets.as-stated."cruise.alpha"`, `published[1].value`."""
+    text = ""
+    for part in path:
+        if isinstance(part, int):
+            text += f"[{part + 1}]"
+        else:
+            text += ("." if text else "") + (part if re.fullmatch(r"[\w-]+", part) else f'"{part}"')
+    return text

@@ -1,0 +1,172 @@
+"""`[simulation]`: which keys it has, and what may stand in them."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from typing import Any
+
+from ..errors import ScenarioError
+from ..system import ACCELERATIONS, ALGORITHMS, LOOPS
+from .groups import Entry, choice, number, positive, shown, whole, whole_multiple
+from .patterns import Counts, read_signal
+
+SIMULATION_KEYS = (
+    "stop_time",
+    "step",
+    "start_time",
+    "algorithm",
+    "record",
+    "seed",
+    "order",
+    "extrapolation",
+    "algebraic_loops",
+    "tolerance",
+    "tolerances",
+    "max_iterations",
+    "relaxation",
+    "acceleration",
+    "min_step",
+)
+TOLERANCES = "tolerances."
+"""A draft holds `[simulation.tolerances]` line by line: the key is this and the signal as written."""
+
+_CHOICES = {
+    "algorithm": (ALGORITHMS, "algorithm"),
+    "algebraic_loops": (LOOPS, "treatment of algebraic loops"),
+    "acceleration": (ACCELERATIONS, "acceleration"),
+}
+
+
+def read_simulation(entries: Mapping[str, Entry], origin: str, problems: list[str]) -> dict[str, Any]:
+    """The values of `[simulation]`, checked; `order` and the signals of `tolerances` are left as written."""
+    before = len(problems)
+    if "stop_time" not in entries:
+        problems.append(f"{origin}: simulation.stop_time is missing; say how long to run, in s: stop_time = 350.0")
+    values: dict[str, Any] = {
+        key: number(entries[key], problems, 1.0)
+        for key in ("stop_time", "step", "start_time", "record")
+        if key in entries
+    }
+    for key, (valid, what) in _CHOICES.items():
+        if key in entries:
+            values[key] = choice(entries[key], problems, valid, what)
+    if "seed" in entries:
+        fits = "a whole number from 0 to 2**63 - 1"
+        values["seed"] = whole(entries["seed"], problems, lambda value: 0 <= value < 2**63, fits)
+    if len(problems) == before:
+        problems += _grid(entries, values)
+    return values | _numerics(entries, problems)
+
+
+def _numerics(entries: Mapping[str, Entry], problems: list[str]) -> dict[str, Any]:
+    """What steers extrapolation, iterations and steps of variable length."""
+    values: dict[str, Any] = {}
+    if "extrapolation" in entries:
+        order = "0, 1 or 2, the order of the polynomial by which inputs are continued"
+        values["extrapolation"] = whole(entries["extrapolation"], problems, lambda value: value in (0, 1, 2), order)
+    if "max_iterations" in entries:
+        least = "a whole number, at least 1"
+        values["max_iterations"] = whole(entries["max_iterations"], problems, lambda value: value >= 1, least)
+    if "tolerance" in entries:
+        within = "a number greater than 0 and less than 1"
+        values["tolerance"] = number(entries["tolerance"], problems, 0.5, within, lambda value: 0 < value < 1)
+    if "relaxation" in entries:
+        within = "a number greater than 0 and at most 2"
+        values["relaxation"] = number(entries["relaxation"], problems, 1.0, within, lambda value: 0 < value <= 2)
+    if "min_step" in entries:
+        values["min_step"] = positive(entries["min_step"], problems)
+        problems += _shortest(entries)
+    pairs = {key: entry for key, entry in entries.items() if key.startswith(TOLERANCES)}
+    if pairs:
+        values["tolerances"] = {key.removeprefix(TOLERANCES): _pair(entry, problems) for key, entry in pairs.items()}
+    return values
+
+
+def _shortest(entries: Mapping[str, Entry]) -> list[str]:
+    """What is wrong with a shortest step that is a number, beside a step that is one."""
+    unsaid: list[str] = []
+    step = number(entries["step"], unsaid) if "step" in entries else 0.1
+    shortest = positive(entries["min_step"], unsaid)
+    if unsaid or step <= 0 or shortest <= step:
+        return []
+    where = f" ({entries['step'].origin})" if "step" in entries else ""
+    return [
+        entries["min_step"].problem(
+            f"the shortest step, {shortest:.10g} s, must not be longer than the step, {step:.10g} s{where}"
+        )
+    ]
+
+
+def _pair(entry: Entry, problems: list[str]) -> list[float]:
+    """`[relative, absolute]`."""
+    if isinstance(entry.value, list) and len(entry.value) == 2:
+        unfit: list[str] = []
+        pair = [number(Entry(one, ""), unfit, 0.0, "", lambda value: value >= 0) for one in entry.value]
+        if not unfit and any(pair):
+            return pair
+    problems.append(
+        entry.problem(f"takes [relative, absolute], two numbers from 0 and not both 0, not {shown(entry.value)}")
+    )
+    return [0.0, 1.0]
+
+
+def _grid(entries: Mapping[str, Entry], values: Mapping[str, Any]) -> list[str]:
+    """What is wrong with the points in time."""
+    step, start, stop = values.get("step", 0.1), values.get("start_time", 0.0), values["stop_time"]
+    steps_of = f"steps of {step:.10g} s" + (f" ({entries['step'].origin})" if "step" in entries else "")
+    if step <= 0:
+        return [entries["step"].problem(f"the step must be greater than 0 s, not {step:g} s")]
+    if stop <= start:
+        return [entries["stop_time"].problem(f"the stop time, {stop:g} s, must be later than the start, {start:g} s")]
+    record = values.get("record")
+    if values.get("algorithm") == "adaptive":  # a step ends wherever a row or the end is due
+        if record is not None and record <= 0:
+            return [entries["record"].problem(f"the distance of rows must be greater than 0 s, not {record:g} s")]
+        return []
+    problems = []
+    if not whole_multiple(stop - start, step):
+        steps = max(1, math.floor((stop - start) / step)) if math.isfinite((stop - start) / step) else 1
+        near = " or ".join(f"{start + k * step:.10g} s" for k in (steps, steps + 1))
+        problems.append(
+            entries["stop_time"].problem(
+                f"{stop - start:.10g} s is not a whole number of {steps_of}; change the step, or stop at {near}"
+            )
+        )
+    if record is not None and not whole_multiple(record, step):
+        fitting = max(1, round(record / step)) * step if 0 < record / step < 1e15 else step
+        problems.append(
+            entries["record"].problem(
+                f"{record:.10g} s is not a whole number of {steps_of}; take {fitting:.10g} s (simulation.record)"
+            )
+        )
+    return problems
+
+
+def spread_tolerances(entries: Mapping[str, Entry], counts: Counts, problems: list[str]) -> dict[str, str]:
+    """For every signal that has a tolerance of its own, the key in `entries` that says so; one beats all."""
+    lines = []
+    for key, entry in entries.items():
+        if key.startswith(TOLERANCES):
+            try:
+                lines.append((read_signal(key.removeprefix(TOLERANCES), counts), key))
+            except ScenarioError as error:
+                problems += [entry.problem(problem) for problem in error.problems]
+    lines.sort(key=lambda line: line[0].index is not None)
+    return {name: key for signal, key in lines for name in signal.names(counts)}
+
+
+def set_tolerance(entries: dict[str, Entry], text: str, entry: Entry, counts: Counts) -> None:
+    """Give a signal a tolerance; what comes later wins, all instances over one and an array over its elements too.
+
+    Raises:
+        ScenarioError: there is no such instance.
+    """
+    signal = read_signal(text, counts)
+    for key in [key for key in entries if key.startswith(TOLERANCES)]:
+        try:
+            if signal.covers(read_signal(key.removeprefix(TOLERANCES), counts)):
+                del entries[key]
+        except ScenarioError:  # told where it stands
+            pass
+    entries[TOLERANCES + text] = entry

@@ -1,0 +1,108 @@
+"""`System` -> TOML that loads to an equal system."""
+
+from __future__ import annotations
+
+import json
+import re
+from collections.abc import Iterator, Mapping
+from typing import Any
+
+import numpy as np
+
+from ..system import Connection, Instance, System
+from .events import EVENT_KEYS
+from .groups import OPTION_KEYS
+from .simulation import SIMULATION_KEYS
+
+
+def dump(system: System) -> str:
+    """A scenario that loads to an equal system: counts, patterns and the preset in force are written out.
+
+    Published values of other presets are left out, as are all of them where the system was modified: a scenario of its
+    own does not owe them.
+
+    Raises:
+        TypeError: a value that TOML cannot hold.
+    """
+    return "\n".join(_lines(system)).lstrip("\n") + "\n"
+
+
+def _lines(system: System) -> Iterator[str]:
+    yield from _assignments({key: getattr(system, key) or None for key in ("title", "source", "description")})
+    yield from _assignments({"default_preset": system.preset})
+    yield from ("", "[simulation]")
+    keys = ("start_time", "stop_time", "step", "algorithm", "record", "seed")
+    yield from _assignments({key: getattr(system, key) for key in keys})
+    yield from _assignments({"order": system.order or None})
+    others = [key for key in SIMULATION_KEYS if key not in (*keys, "order", "tolerances")]
+    yield from _assignments({key: value for key in others if (value := getattr(system, key)) != getattr(System, key)})
+    if system.tolerances:
+        yield from ("", "[simulation.tolerances]", *_assignments(system.tolerances))
+    yield from () if system.instances else ("", "[instances]")
+    for instance in system.instances.values():
+        yield from _instance(instance)
+    connections = {connection.target: _options(connection) for connection in system.connections}
+    for section, table in (
+        ("connections", connections),
+        ("require", system.requirements),
+        ("metrics", system.metrics),
+    ):
+        if table:
+            yield from ("", f"[{section}]", *_assignments(table))
+    for event in system.events:
+        yield from ("", "[[events]]", *_assignments({key: getattr(event, key) for key in EVENT_KEYS}))
+    owed = [] if system.modified else [entry for entry in system.published if _applies(entry, system)]
+    for section, tables in (("published", owed), ("figures", system.figures)):
+        for entry in tables:
+            yield from ("", f"[[{section}]]", *_assignments(entry))
+
+
+def _assignments(table: Mapping[str, Any]) -> Iterator[str]:
+    return (f"{_key(key)} = {_value(value)}" for key, value in table.items() if value is not None)
+
+
+def _applies(entry: Mapping[str, Any], system: System) -> bool:
+    return bool(entry.get("preset", system.default_preset) == system.preset)
+
+
+def _instance(instance: Instance) -> Iterator[str]:
+    yield from ("", f"[instances.{_key(instance.name)}]")
+    yield f"{'fmu' if instance.model.lower().endswith('.fmu') else 'component'} = {_value(instance.model)}"
+    keys = (*OPTION_KEYS, "swapped")
+    yield from _assignments({key: value for key in keys if (value := getattr(instance, key)) != getattr(Instance, key)})
+    yield from _assignments({"build": instance.build or None})
+    yield from (f"start.{line}" for line in _assignments(instance.start))
+
+
+def _options(connection: Connection) -> str | dict[str, Any]:
+    options = {"delay": connection.delay, "scale": connection.scale, "offset": connection.offset}
+    given = {key: value for key, value in options.items() if value != getattr(Connection, key)}
+    return {"from": connection.source, **given} if given else connection.source
+
+
+def _key(name: str) -> str:
+    return name if re.fullmatch(r"[A-Za-z0-9_-]+", name) else _text(name)
+
+
+def _text(text: str) -> str:
+    # JSON's escapes are a subset of TOML's, which forbids one more control character
+    return json.dumps(text, ensure_ascii=False).replace("\x7f", "\\u007f")
+
+
+def _value(value: Any) -> str:
+    if isinstance(value, np.ndarray | np.generic):
+        value = value.tolist()
+    match value:
+        case bool():
+            return "true" if value else "false"
+        case int() | float():
+            return repr(value)
+        case str():
+            return _text(value)
+        case list() | tuple():
+            return f"[{', '.join(_value(item) for item in value)}]"
+        case dict():
+            return (
+                f"{{ {', '.join(f'{_key(key)} = {_value(item)}' for key, item in value.items())} }}" if value else "{}"
+            )
+    raise TypeError(f"a scenario cannot hold {value!r}")

@@ -1,0 +1,545 @@
+"""FMUs that nobody here wrote: what the standard allows and few use, and files that lie, through the command line.
+
+Of each: the message, the exit code, and what was saved.
+"""
+
+import json
+import shutil
+import subprocess
+import sys
+import time
+from dataclasses import dataclass
+from pathlib import Path
+
+import fmpy
+import pytest
+from railcosim.orchestrator.cli import app as cli
+from railcosim.orchestrator.errors import FmuError
+from railcosim.orchestrator.fmi.models import load_fmu
+from railcosim.orchestrator.master import compiled
+from railcosim.orchestrator.run.results import Results
+
+GCC = shutil.which("gcc")
+FOREIGN = Path(__file__).parents[1] / "foreign"
+LIBRARY = f"Foreign{fmpy.sharedLibraryExtension}"
+ITEMS = '<Item name="low" value="1"/><Item name="high" value="3"/>'
+GEAR = f'<SimpleType name="Gear"><Enumeration>{ITEMS}</Enumeration></SimpleType>'
+VARIES = 'canHandleVariableCommunicationStepSize="true"'
+
+pytestmark = pytest.mark.skipif(GCC is None or sys.platform != "linux", reason="compiles its FMUs with gcc")
+
+
+def v(name, reference, causality, kind="Real", *, start=None, typed="", **own):
+    """A variable as a model description has it."""
+    own = {"name": name, "valueReference": reference, "causality": causality, **own}
+    named = " ".join(f'{key}="{escaped(value)}"' for key, value in own.items())
+    start = "" if start is None else f'start="{escaped(start)}"'
+    return f"<ScalarVariable {named}><{kind} {start} {typed}/></ScalarVariable>"
+
+
+def escaped(text):
+    return str(text).replace("&", "&amp;").replace("<", "&lt;").replace('"', "&quot;")
+
+
+def signal(name, reference, causality, kind, typed=""):
+    start = None if causality == "output" else {"Boolean": "false", "String": ""}.get(kind, 1)
+    return v(name, reference, causality, kind, start=start, typed=typed, variability="discrete")
+
+
+REALS = [
+    v("u", 0, "input", start=0.0),
+    v("y", 1, "output"),
+    v("gain", 2, "parameter", start=2.0, variability="tunable"),
+    v("x", 3, "output", start=0.0, initial="exact"),
+    v("calls", 4, "output"),
+    v("at", 5, "parameter", start=5.0, variability="fixed"),
+    v("longest", 6, "parameter", start=1e9, variability="fixed"),
+    v("now", 7, "output"),
+]
+NUMBERS = [
+    *REALS,
+    v("mode", 0, "parameter", "Integer", start=0, variability="fixed"),
+    signal("m", 1, "input", "Integer"),
+    signal("n", 2, "output", "Integer"),
+    signal("gear", 3, "input", "Enumeration", 'declaredType="Gear"'),
+    signal("next", 4, "output", "Enumeration", 'declaredType="Gear"'),
+    signal("on", 0, "input", "Boolean"),
+    signal("off", 1, "output", "Boolean"),
+]
+ALL = [
+    *NUMBERS,
+    v("label", 0, "parameter", "String", start="", variability="fixed"),
+    signal("word", 1, "input", "String"),
+    signal("said", 2, "output", "String"),
+]
+"""The variables of foreign.c."""
+
+
+@pytest.fixture(scope="session")
+def libraries(tmp_path_factory):
+    """The library of foreign.c: as it is, without what few need, and without what all need."""
+    folder = tmp_path_factory.mktemp("foreign")
+    made = {}
+    for kind, options in {"whole": (), "bare": ("-DBARE",), "lame": ("-DBARE", "-DLAME")}.items():
+        target = folder / kind
+        command = [GCC, "-shared", "-fPIC", "-O1", *options, FOREIGN / "foreign.c", "-o", target, "-lm"]
+        subprocess.run(command, check=True)
+        made[kind] = target.read_bytes()
+    return made
+
+
+@pytest.fixture
+def fmu(libraries, xml, tmp_path):
+    """Write an FMU of foreign.c."""
+
+    def make(
+        variables=NUMBERS,
+        *,
+        name="f.fmu",
+        binaries=None,
+        simulation=VARIES,
+        guid="{1}",
+        structure=None,
+        more="",
+        **files,
+    ):
+        outputs = [k for k, text in enumerate(variables, 1) if 'causality="output"' in text]
+        unknowns = "".join(f'<Unknown index="{k}"/>' for k in outputs)
+        if structure is None and outputs:
+            structure = f"<Outputs>{unknowns}</Outputs><InitialUnknowns>{unknowns}</InitialUnknowns>"
+        text = (
+            f'<?xml version="1.0"?><fmiModelDescription fmiVersion="2.0" modelName="Foreign" guid="{guid}">'
+            f'<CoSimulation modelIdentifier="Foreign" {simulation}/><TypeDefinitions>{GEAR}</TypeDefinitions>{more}'
+            f"<ModelVariables>{''.join(variables)}</ModelVariables>"
+            f"<ModelStructure>{structure or ''}</ModelStructure></fmiModelDescription>"
+        )
+        binaries = {LIBRARY: "whole"} if binaries is None else binaries
+        content = {f"binaries/{fmpy.platform}/{key}": libraries.get(b, b) for key, b in binaries.items()}
+        resources = {f"resources/{key}.txt": value for key, value in files.items()}
+        return xml["write_archive"](tmp_path / name, {"modelDescription.xml": text, **content, **resources})
+
+    return make
+
+
+@dataclass
+class Outcome:
+    """A command's exit code and words; of a run, its record and results."""
+
+    code: int
+    out: str
+    errors: list[str]
+    record: dict
+    results: Results | None
+
+    @property
+    def notes(self):
+        return [line.removeprefix("note: ") for line in self.out.splitlines() if line.startswith("note: ")]
+
+
+@pytest.fixture
+def go(tmp_path, capsys):
+    """Write a scenario and run it, or check it, in a directory of its own."""
+
+    def run(fmus, start=None, connections=None, command="run", more="", **simulation):
+        lines = ["[simulation]", *(f"{k} = {x}" for k, x in ({"stop_time": 10.0, "step": 0.5} | simulation).items())]
+        for name, path in (fmus if isinstance(fmus, dict) else {"it": fmus}).items():
+            lines += [f"[instances.{name}]", f"fmu = {json.dumps(str(path))}", f"[instances.{name}.start]"]
+            lines += [f"{json.dumps(k)} = {json.dumps(x)}" for k, x in ((start or {}).get(name, {})).items()]
+        lines += ["[connections]", *(f"{json.dumps(k)} = {json.dumps(x)}" for k, x in (connections or {}).items())]
+        (tmp_path / "s.toml").write_text("\n".join([*lines, more]) + "\n", encoding="utf-8")
+        output = tmp_path / "out"
+        shutil.rmtree(output, ignore_errors=True)
+        capsys.readouterr()
+        options = ["-o", str(output), "--no-figures"] if command == "run" else []
+        code = cli.call([command, str(tmp_path / "s.toml"), *options])
+        said = capsys.readouterr()
+        errors = [line for line in said.err.splitlines() if "% of" not in line]
+        record = json.loads((output / "run.json").read_text()) if output.exists() else {}
+        return Outcome(
+            code, said.out, errors, record, Results.load(output) if (output / "results.csv").exists() else None
+        )
+
+    return run
+
+
+@pytest.fixture
+def traced(tmp_path, monkeypatch):
+    """The file in which calls are written down."""
+    monkeypatch.setenv("FOREIGN_TRACE", str(tmp_path / "trace"))
+    return tmp_path / "trace"
+
+
+BOTH_LOOPS = pytest.mark.usefixtures("loop")
+
+
+@pytest.fixture(params=["compiled", "interpreted"])
+def loop(request, monkeypatch):
+    """Both step loops."""
+    if request.param == "interpreted":
+        monkeypatch.setattr(compiled, "kernel", None)
+    elif compiled.kernel is None:
+        pytest.skip("installed without a C compiler")
+
+
+# -------------------------------------------------------------------- what a step may return
+
+
+@BOTH_LOOPS
+@pytest.mark.parametrize(
+    ("mode", "message"),
+    [
+        (2, "status discard: discarded the step, and takes none from there on, not even one of 4.8e-07 s"),
+        (3, "status error: fmi2DoStep failed"),
+        (4, "status fatal: fmi2DoStep failed"),
+        (5, "status pending: fmi2DoStep is pending: asynchronous FMUs are not supported"),
+        (6, "status 6 (unknown): fmi2DoStep failed"),
+        (13, "status discard: discarded the step and does not say how far it got, so that nothing else can be tried"),
+        (14, "status discard: discarded the step and does not say how far it got, so that nothing else can be tried"),
+        (15, "status discard: discarded the step, and takes none from there on, not even one of 4.8e-07 s"),
+        (16, "status discard: says that it got to t = 105.5 s in the step to t = 5.5 s"),
+        (18, "status discard: discarded the step and does not say how far it got, so that nothing else can be tried"),
+    ],
+)
+def test_a_step_that_fails(fmu, go, mode, message):
+    found = go(fmu(), {"it": {"mode": mode, "u": 1.0, "longest": 0.1}})
+    assert found.code == 3
+    assert found.errors[0] == f"error: an FMU failed: it, t = 5 s, {message}"
+    assert "it does as it was told" in found.errors[1]  # its own words, once however often it said them
+    assert len(found.errors) == 2
+    assert (found.record["status"], found.record["time_reached"]) == ("failed", 5.0)
+    assert found.record["error"] == "\n".join(found.errors).removeprefix("error: an FMU failed: ")
+    assert list(found.results.time) == [0.5 * k for k in range(11)]
+    assert found.results["it.x"][-1] == 5.0
+
+
+@BOTH_LOOPS
+def test_a_warning_is_no_failure(fmu, go):
+    found = go(fmu(), {"it": {"mode": 1, "u": 1.0}})
+    assert (found.code, found.record["status"], found.results["it.x"][-1]) == (0, "completed", 10.0)
+
+
+@BOTH_LOOPS
+@pytest.mark.parametrize(
+    ("mode", "calls"),
+    [
+        (10, 21),  # once three fifths and the rest
+        (11, 70),  # from t = 5 s on, 0.5 s in parts of at most 0.2 s
+    ],
+)
+def test_a_discarded_step_is_taken_in_parts(fmu, go, mode, calls):
+    found = go(fmu(), {"it": {"mode": mode, "u": 1.0, "longest": 0.2}})
+    assert (found.code, found.record["status"]) == (0, "completed")
+    assert (found.results["it.calls"][-1], len(found.results)) == (calls, 21)
+    assert found.results["it.x"] == pytest.approx(found.results.time, abs=1e-12)
+    assert found.results["it.now"] == pytest.approx(found.results.time, abs=1e-12)
+
+
+@BOTH_LOOPS
+def test_a_discarded_step_of_an_fmu_that_takes_one_length_only(fmu, go):
+    found = go(fmu(simulation=""), {"it": {"mode": 11, "longest": 0.2}})
+    what = "discarded the step, and takes steps of one length only: choose another step"
+    assert (found.code, found.errors[0]) == (3, f"error: an FMU failed: it, t = 5 s, status discard: {what}")
+
+
+@BOTH_LOOPS
+@pytest.mark.parametrize(("start", "stop"), [(0.0, 0.3), (1e6, 1e6 + 0.7), (-0.3, 0.0)])
+def test_the_last_step_is_not_past_the_end(fmu, go, start, stop):
+    """0.2 + 0.1 is more than 0.3."""
+    found = go(fmu(), {"it": {"mode": 50, "at": -1.0}}, start_time=start, stop_time=stop, step=0.1)
+    assert (found.code, found.record["status"]) == (0, "completed")
+
+
+@BOTH_LOOPS
+@pytest.mark.parametrize(("mode", "at"), [(12, "5.25"), (17, "5")])
+def test_an_fmu_that_asks_for_the_end(fmu, go, mode, at):
+    found = go(fmu(), {"it": {"mode": mode, "u": 1.0}})
+    assert (found.code, found.errors, found.record["status"]) == (0, [], "terminated")
+    assert found.record["error"] == f"it, t = {at} s: asks for the end of the simulation"
+    assert f"terminated at t = 5 s of 10 s: {found.record['error']}" in found.out
+    assert found.results.time[-1] == 5.0
+
+
+@BOTH_LOOPS
+@pytest.mark.parametrize(
+    ("mode", "ending"),
+    [
+        (0, ["step", "terminate", "free"]),
+        (3, ["step", "step", "free"]),
+        (4, ["step", "step"]),  # after a fatal status nothing may be called
+        (5, ["step", "cancel", "free"]),  # a step under way has to be cancelled before its FMU is freed
+    ],
+)
+def test_what_is_called_in_the_end(fmu, go, traced, mode, ending):
+    go(fmu(), {"it": {"mode": mode}})
+    calls = traced.read_text().split("\n")[:-1]
+    assert calls[:4] == ["instantiate", "setup", "enter", "exit"]
+    assert calls[-len(ending) :] == ending
+
+
+@BOTH_LOOPS
+@pytest.mark.parametrize(
+    ("mode", "message", "reached"),
+    [
+        (20, "it, t = 5 s: output 'y' is nan", 4.5),
+        (21, "it, t = 5 s: output 'y' is inf", 4.5),
+        (22, "it, t = 5 s: output 'y' is -inf", 4.5),
+        (103, "it, t = 5 s, status error: fmi2GetReal failed", 4.5),
+        (203, "it, t = 5 s, status error: fmi2SetReal failed", 5.0),
+        (303, "it, t = 10 s, status error: fmi2Terminate failed", 10.0),
+        (503, "it, t = 0 s, status error: fmi2ExitInitializationMode failed", None),
+    ],
+)
+def test_failures_elsewhere(fmu, go, mode, message, reached):
+    path = fmu()
+    found = go({"it": path, "source": path}, {"it": {"mode": mode}}, {"it.u": "source.x"})
+    assert (found.code, found.errors[0]) == (3, f"error: an FMU failed: {message}")
+    assert (found.record["status"], found.record["time_reached"]) == ("failed", reached)
+    assert found.record["error"].startswith(message)
+    if reached is not None:
+        assert found.results.time[-1] == reached
+
+
+CRASH = """
+from railcosim.orchestrator.cli import app as cli
+from railcosim.orchestrator.run import results
+results._FLUSH_SECONDS = 0.0
+cli.main()
+"""
+
+
+@pytest.mark.parametrize(("mode", "code"), [(30, -11), (31, 7)])
+def test_an_fmu_that_ends_the_process(fmu, go, tmp_path, mode, code):
+    """Without isolation there is no error to tell; what was on the disk by then can be used."""
+    start = {"it": {"mode": mode, "u": 1.0}, "slow": {"mode": 40, "at": 0.0}}
+    path = fmu()
+    go({"it": path, "slow": path}, start, command="check", step=0.02)
+    command = [sys.executable, "-c", CRASH, "run", str(tmp_path / "s.toml"), "-o", str(tmp_path / "out")]
+    assert subprocess.run(command, capture_output=True, check=False).returncode == code
+    loaded = Results.load(tmp_path / "out")
+    assert not loaded.completed
+    assert 1.0 < loaded.time[-1] <= 5.0
+    assert loaded["it.x"] == pytest.approx(loaded.time)
+    assert cli.call(["plot", str(tmp_path / "out"), "it.x"]) == 0
+    assert list((tmp_path / "out").glob("*.png"))
+
+
+# -------------------------------------------------------------------- libraries
+
+
+def test_a_library_without_what_nobody_calls(fmu, go):
+    found = go(fmu(REALS, binaries={LIBRARY: "bare"}, mode="11"), {"it": {"u": 1.0}})
+    assert (found.code, found.results["it.x"][-1]) == (0, 10.0)
+
+
+def test_a_library_that_cannot_say_how_far_it_got(fmu, go):
+    found = go(fmu(REALS, binaries={LIBRARY: "bare"}, mode="11"), {"it": {"longest": 0.2}})
+    assert found.code == 3
+    assert "it, t = 5 s, status discard: discarded the step and does not say how far it got" in found.errors[0]
+
+
+@pytest.mark.parametrize(
+    ("variables", "binaries", "message"),
+    [
+        (REALS, {LIBRARY: "lame"}, "it: cannot be instantiated: its library has no function fmi2DoStep"),
+        (NUMBERS, {LIBRARY: "bare"}, "it, t = 0 s: its library has no function fmi2GetInteger"),
+        (
+            REALS,
+            {LIBRARY: b"nothing"},
+            f"it: cannot be instantiated: Failed to load shared library binaries/{fmpy.platform}/{LIBRARY}.",
+        ),
+    ],
+)
+def test_a_library_that_cannot_be_used(fmu, go, variables, binaries, message):
+    found = go(fmu(variables, binaries=binaries))
+    assert (found.code, found.record["status"], found.results) == (3, "failed", None)
+    assert found.errors[0].startswith(f"error: an FMU failed: {message}")
+
+
+def test_a_library_of_another_description(fmu, go):
+    """It is asked once more with logging on: what the matter is, this FMU says only then."""
+    found = go(fmu(guid="{2}"))
+    assert (found.code, found.record["status"]) == (3, "failed")
+    assert found.errors == [
+        "error: an FMU failed: it: cannot be instantiated: it gives no instance",
+        "    [error] wrong guid {2}",
+    ]
+
+
+@pytest.mark.parametrize("others", [{}, {"libneeded.so": b"\x7fELF"}])
+def test_a_library_of_another_name(fmu, go, others):
+    path = fmu(binaries={"its_own.so": "whole", **others})
+    found = go(path)
+    assert (found.code, found.record["status"]) == (0, "completed")
+    assert found.notes[0] == f"{path}: its library its_own.so is not named after its model identifier 'Foreign'"
+    assert found.record["notes"][0] == found.notes[0]
+
+
+@pytest.mark.parametrize("second", ["whole", b"nothing"])
+def test_a_library_beside_the_right_one_is_let_be(fmu, go, second):
+    assert not any("library" in note for note in go(fmu(binaries={LIBRARY: "whole", "more.so": second})).notes)
+
+
+def test_no_telling_which_library(fmu, go, tmp_path):
+    path = fmu(binaries={"a.so": "whole", "b.so": "bare"})
+    found = go(path)
+    several = f"{path} has several libraries for {fmpy.platform} (a.so, b.so) and none called {LIBRARY}"
+    assert (found.code, found.errors) == (2, [f"error: {tmp_path / 's.toml'}:4: instance 'it': {several}"])
+    assert found.record == {}
+
+
+def test_resources_are_found(fmu, go):
+    assert go(fmu(mode="3")).errors[0] == "error: an FMU failed: it, t = 5 s, status error: fmi2DoStep failed"
+
+
+def test_a_state_that_is_promised_and_not_kept(fmu, workspace):
+    model = load_fmu(fmu(mode="403", simulation='canGetAndSetFMUstate="true"'), workspace)
+    it = model.instantiate("it")
+    it.setup(0.0, 1.0)
+    it.channel("Real", ["at"]).set([0.0])
+    with pytest.raises(FmuError, match=r"^it, t = 0 s, status error: fmi2GetFMUstate failed"):
+        it.save()
+    it.free()
+
+
+# -------------------------------------------------------------------- variables
+
+
+def test_every_type_goes_from_fmu_to_fmu(fmu, go):
+    path = fmu(ALL)
+    start = {"a": {"gear": "high", "m": 41, "on": True, "label": "zürich", "word": 'a,"b"'}, "b": {"gear": 3}}
+    wires = {"b.gear": "a.next", "b.m": "a.n", "b.on": "a.off", "b.word": "a.said", "b.u": "a.n"}
+    found = go({"a": path, "b": path}, start, wires, stop_time=1.0)
+    assert found.code == 0
+    last = {name: found.results[f"b.{name}"][-1] for name in ("next", "n", "off", "said", "y")}
+    assert last == {"next": 3.0, "n": 43.0, "off": 1.0, "said": ' zürich a,"b"', "y": 84.0}
+
+
+@pytest.mark.parametrize(("mode", "text"), [(23, 'a\rb\nc\r\n"'), (24, "")])
+def test_texts_of_all_kinds_survive_the_file(fmu, go, mode, text):
+    """Ends of lines of every kind, and none at all where the FMU gives no text."""
+    found = go(fmu(ALL), {"it": {"mode": mode, "at": 0.0}}, stop_time=1.0)
+    assert (found.code, list(found.results["it.said"])) == (0, [text] * 3)
+
+
+ODD = [
+    "a.b",
+    "a[1,2]",
+    "a[1, 3]",
+    "der(x)",
+    "'q u o'",
+    "sp ace",
+    "zürich",
+    'x"y',
+    "p<&>",
+    "b[1].c[2].d",
+    "n" * 300,
+    "{x}",
+]
+
+
+def test_odd_names(fmu, go, tmp_path):
+    """In start values and connections as they are; in expressions between quotes."""
+    inputs = [v(name, 100 + 2 * k, "input", start=0.0) for k, name in enumerate(ODD)]
+    outputs = [v(f"out.{name}", 101 + 2 * k, "output") for k, name in enumerate(ODD)]
+    path = fmu([*inputs, *outputs])
+    start = {name: float(k) for k, name in enumerate(ODD)}
+    quoted = {f"m{k:.0f}": f"max(signal('b.out.{name}'))" for name, k in start.items() if "'" not in name}
+    metrics = "\n".join(f"{key} = {json.dumps(text)}" for key, text in quoted.items())
+    wires = {f"b.{name}": f"a.out.{name}" for name in ODD}
+    found = go({"a": path, "b": path}, {"a": start}, wires, more=f"[metrics]\n{metrics}\n")
+    assert (found.code, found.errors) == (0, [])
+    assert {name: found.results[f"b.out.{name}"][-1] for name in ODD} == start
+    measured = json.loads((tmp_path / "out" / "metrics.json").read_text())["metrics"]
+    assert {key: measured[key]["values"] for key in quoted} == {key: {"": float(key[1:])} for key in quoted}
+    assert cli.call(["plot", str(tmp_path / "out"), 'signal("b.out.der(x)")']) == 0
+
+
+def test_start_values(fmu, go):
+    """What may be set is set; what is computed or constant may not, and says so."""
+    variables = [
+        *NUMBERS,
+        v("c", 100, "output", start=7.0, variability="constant"),
+        v("guess", 102, "local", start=1.0, initial="approx", variability="fixed"),
+        v("k", 104, "calculatedParameter", variability="fixed"),
+    ]
+    path = fmu(variables)
+    found = go(path, {"it": {"x": 3.0, "gain": 5.0, "u": 1.0, "guess": 2.0}}, stop_time=1.0)
+    assert (found.code, found.results["it.x"][-1], found.results["it.y"][-1]) == (0, 4.0, 5.0)
+    assert found.record["parameters"]["it.gain"] == 5.0
+    wrong = {"c": 1.0, "k": 1.0, "y": 1.0, "gear": 2, "m": 3e9, "on": 1, "nonsense": 0}
+    found = go(path, {"it": wrong})
+    assert (found.code, found.record) == (2, {})
+    assert [error.partition(": it.")[2] for error in found.errors] == [
+        "c: it is a constant of the model and cannot be set",
+        "k: it is computed (causality calculatedParameter) and cannot be set",
+        "y: it is computed (causality output) and cannot be set",
+        "gear: takes one of low (1), high (3), not 2",
+        "m: takes a whole number from -2147483648 to 2147483647, not 3000000000.0",
+        "on: takes true or false, not 1",
+        "nonsense: Foreign has no such variable",
+    ]
+
+
+def test_several_names_of_one_variable(fmu, go):
+    variables = [*NUMBERS, v("twin", 0, "input", start=0.0), v("image", 1, "output")]
+    path = fmu(variables)
+    found = go({"a": path, "b": path}, {"a": {"u": 3.0}}, {"b.twin": "a.image"}, stop_time=1.0)
+    assert (found.code, found.results["b.y"][-1], found.results["b.image"][-1]) == (0, 12.0, 12.0)
+    assert not any(note.startswith(("b.u ", "b.twin ")) for note in found.notes)
+    found = go({"a": path, "b": path}, {}, {"b.u": "a.x", "b.twin": "a.image"}, command="check")
+    what = "b.twin is another name of b.u, and they are fed by 'a.x' and by 'a.image': connect one of them"
+    assert (found.code, found.errors[0].partition("toml:")[2][-len(what) :]) == (2, what)
+
+
+def test_no_variables(fmu, go):
+    found = go(fmu([]))
+    assert (found.code, found.record["status"], len(found.results)) == (0, "completed", 21)
+    assert list(found.results.names()) == []
+    assert "Element 'ModelVariables'" in found.notes[0]
+
+
+def test_no_word_on_dependencies(fmu, go):
+    """No feed-through is assumed, and said; so the order of the instances has nothing to follow."""
+    path = fmu()
+    found = go({"a": path, "b": path}, {}, {"b.u": "a.y", "a.u": "b.y"}, command="check")
+    assert found.code == 0
+    assert "Foreign lists no dependencies of y, x, calls, now; no direct feed-through is assumed" in found.notes
+    direct = (
+        "<Outputs>" + "".join(f'<Unknown index="{k}" dependencies="{d}"/>' for k, d in ((2, 1), (4, ""))) + "</Outputs>"
+    )
+    found = go({"a": fmu(structure=direct), "b": path}, {}, {"b.u": "a.y"}, command="check")
+    assert "gauss-seidel steps in the order: a, b" in found.out
+
+
+def test_an_fmu_that_is_made_for_one_step(fmu, go):
+    path = fmu(simulation="", more='<DefaultExperiment stepSize="0.2"/>')
+    told = "Foreign cannot vary its step and is made for 0.2 s; it is stepped at 0.5 s"
+    assert told in go(path, command="check").notes
+    assert told not in go(path, command="check", step=0.4, stop_time=4.0).notes
+
+
+# -------------------------------------------------------------------- many variables
+
+
+def test_thousands_of_variables(fmu, go):
+    """Reading, wiring, checking and recording take a time that grows with their number, not with its square."""
+    count = 2500
+    variables = [v(f"bus.s{k}.u", 100 + 2 * k, "input", start=0.0) for k in range(count)]
+    variables += [v(f"bus.s{k}.y", 101 + 2 * k, "output", typed='unit="-"') for k in range(count)]
+    unknowns = "".join(f'<Unknown index="{count + k}" dependencies="{k}"/>' for k in range(1, count + 1))
+    path = fmu(variables, structure=f"<Outputs>{unknowns}</Outputs>")
+    wires = {f"b.bus.s{k}.u": f"a.bus.s{k}.y" for k in range(count)}
+    begin = time.process_time()
+    found = go({"a": path, "b": path}, {"a": {"bus.s7.u": 3.0}}, wires, stop_time=1.0)
+    taken = time.process_time() - begin
+    assert (found.code, found.results["b.bus.s7.y"][-1]) == (0, 3.0)
+    assert found.notes == [
+        "a: 2499 inputs are not connected (bus.s0.u, bus.s1.u, bus.s2.u, bus.s3.u, ...); they keep their start values",
+        f'{path}: The unit "-" of variable "bus.s0.y" (line 1) is not defined. (and 2499 more like it)',
+    ]
+    assert taken < 4.0
+    begin = time.process_time()
+    found = go({"a": path, "b": path}, {}, {x.replace(".u", ".w"): y for x, y in wires.items()}, command="check")
+    assert (found.code, len(found.errors)) == (2, count)
+    assert found.errors[0].endswith("Foreign (b) has no variable 'bus.s0.w'; did you mean 'bus.s0.u'?")
+    assert time.process_time() - begin < 8.0

@@ -1,0 +1,162 @@
+"""What is refused, and what is noted, of the way a system is coupled."""
+
+import pytest
+from railcosim.orchestrator.errors import ScenarioError
+from railcosim.orchestrator.run.checking import check, describe_stepping
+from railcosim.orchestrator.system import System
+
+BODY = """
+class Pass(Base):
+    '''y = gain u.'''
+
+    gain = Parameter("1", 0.5)
+    u = Input("1", optional=True)
+    y = Output("1")
+
+    def outputs(self):
+        return {"y": self.gain * self.u}
+
+
+class Lag(Base):
+    '''x' = u - x.'''
+
+    u = Input("1", optional=True)
+    x = State("1", 1.0, output=True)
+    row = State("1", shape=(2,), output=True)
+
+    def derivatives(self):
+        return {"x": self.u - self.x, "row": -self.row}
+
+
+class Sampled(Base):
+    '''Samples its input.'''
+
+    u = Input("1", optional=True)
+    seen = Memory("1", 0.0, output=True)
+
+    def update(self):
+        return {"seen": self.u}
+"""
+
+
+@pytest.fixture
+def ring(components):
+    """Two components in a circle."""
+    mine = components(BODY)
+
+    def make(a="Pass", b="Lag", **how):
+        it = System(**{"stop_time": 1.0, "step": 0.1} | how)
+        outputs = {"Pass": "y", "Lag": "x", "Sampled": "seen"}
+        it.add("a", mine(a))
+        it.add("b", mine(b))
+        it.connect(f"a.{outputs[a]}", "b.u")
+        it.connect(f"b.{outputs[b]}", "a.u")
+        return it
+
+    return make
+
+
+def problems(it, workspace):
+    with pytest.raises(ScenarioError) as caught:
+        check(it, workspace, "plain")
+    return caught.value.problems
+
+
+def notes(it, workspace):
+    return check(it, workspace, "plain").notes
+
+
+# -------------------------------------------------------------------- refused
+
+
+def stranger(foreign, xml, **of):
+    v = xml["variable"]
+    return foreign([v("u", "input", start=0.0), v("y", "output", dependencies=[])], **of)
+
+
+def test_iterative_needs_saved_states_in_cycles_only(ring, foreign, xml, workspace):
+    it = ring(algorithm="iterative")
+    path = stranger(foreign, xml)
+    it.add("outside", path)
+    it.connect("a.y", "outside.u")
+    check(it, workspace, "plain")
+    it.add("inside", path)
+    it.connect("inside.y", "inside.u")
+    (told,) = problems(it, workspace)
+    assert told == (
+        "inside: in a cycle, and the state that iterative comes back to cannot be saved (canGetAndSetFMUstate is "
+        "false); choose gauss-seidel or jacobi, or break the cycle by a delay"
+    )
+    it.connections[-1].delay = 1
+    check(it, workspace, "plain")
+
+
+@pytest.mark.parametrize(
+    ("signal", "told"),
+    [
+        ("b.z", "simulation.tolerances: 'b.z' is no Real output"),
+        ("b.u", "simulation.tolerances: 'b.u' is no Real output"),
+        ("c.x", "simulation.tolerances: 'c.x' is no Real output; did you mean 'b.x'?"),
+    ],
+)
+def test_tolerances_of_what_is_not_there(ring, workspace, signal, told):
+    (found,) = problems(ring(algorithm="iterative", tolerances={signal: [0.0, 1e-3]}), workspace)
+    assert found.startswith(told)
+
+
+@pytest.mark.parametrize("signal", ["b.x", "b.row", "b.row[2]"])
+def test_tolerances_go_by_signal_by_array_and_by_element(ring, workspace, signal):
+    check(ring(algorithm="iterative", tolerances={signal: [0.0, 1e-3]}), workspace, "plain")
+
+
+# -------------------------------------------------------------------- noted
+
+
+@pytest.mark.parametrize(
+    ("how", "told"),
+    [
+        ({}, "it is solved at initialization and acts one step late from then on; algebraic_loops = 'solve' solves it"),
+        ({"algebraic_loops": "solve"}, "it is solved at each communication point"),
+        ({"algorithm": "iterative"}, "it is solved by the iterations"),
+        ({"algorithm": "iterative", "algebraic_loops": "solve"}, "it is solved at each communication point"),
+    ],
+)
+def test_what_becomes_of_a_loop(ring, workspace, how, told):
+    found = [note for note in notes(ring("Pass", "Pass", **how), workspace) if "algebraic" in note]
+    assert len(found) == 1
+    assert found[0].startswith(f"algebraic loop through a.y, b.y: {told}")
+
+
+def test_no_loop_no_note(ring, workspace):
+    assert notes(ring(), workspace) == ()
+
+
+def test_long_loops_are_not_listed_in_full(components, workspace):
+    mine = components(BODY)
+    it = System(stop_time=1.0, step=0.1)
+    for k in range(9):
+        it.add(f"p{k}", mine("Pass"))
+    for k in range(9):
+        it.connect(f"p{k}.y", f"p{(k + 1) % 9}.u")
+    (loop,) = [note for note in notes(it, workspace) if note.startswith("algebraic loop")]
+    assert "p5.y and 3 more: it is solved" in loop
+
+
+# -------------------------------------------------------------------- shown
+
+
+def test_check_tells_what_iterative_repeats(ring, workspace):
+    it = ring(algorithm="iterative")
+    it.instances["sampled"] = ring("Sampled").instances["a"]
+    it.instances["sampled"].name = "sampled"
+    it.connect("b.x", "sampled.u")
+    lines = describe_stepping(check(it, workspace, "plain"))
+    assert lines == [
+        "iterative steps first, at the values of the step's begin: sampled",
+        "iterative repeats until they agree: a, b",
+    ]
+
+
+def test_check_tells_the_order_of_adaptive(ring, workspace):
+    lines = describe_stepping(check(ring("Lag", "Pass", algorithm="adaptive"), workspace, "plain"))
+    assert lines == ["adaptive steps in the order: b, a"]

@@ -1,0 +1,320 @@
+"""`orchestrate validate` on good, broken, crashing and hanging FMUs: what it finds, and that nothing takes it down."""
+
+import shutil
+import subprocess
+import sys
+import time
+import zipfile
+from pathlib import Path
+
+import fmpy
+import pytest
+from railcosim.fmus.build import build, native_problem, resolve
+from railcosim.orchestrator import FmuFileError
+from railcosim.orchestrator.cli.app import call
+from railcosim.orchestrator.validation.report import PROBES, validate
+
+needs_native = pytest.mark.skipif(
+    bool(native_problem(resolve("PointMassTrain"))), reason="native FMUs cannot be made here"
+)
+needs_compiler = pytest.mark.skipif(shutil.which("cc") is None, reason="there is no C compiler")
+
+HEADERS = Path(fmpy.__file__).parent / "c-code"
+SOURCE = """
+#include <stdlib.h>
+#include <string.h>
+#include "fmi2Functions.h"
+typedef struct { double t, y, u, k; int phase; fmi2CallbackLogger log; } Model;
+#ifndef SHARED_STATE
+#define SHARED_STATE 0
+#endif
+static double shared;
+#define M ((Model *)c)
+#define Y (*(SHARED_STATE ? &shared : &M->y))
+const char *fmi2GetTypesPlatform(void) { return "default"; }
+const char *fmi2GetVersion(void) { return "2.0"; }
+fmi2Status fmi2SetDebugLogging(fmi2Component c, fmi2Boolean on, size_t n, const fmi2String names[]) { return fmi2OK; }
+fmi2Component fmi2Instantiate(fmi2String name, fmi2Type type, fmi2String guid, fmi2String place,
+                              const fmi2CallbackFunctions *functions, fmi2Boolean visible, fmi2Boolean logging)
+{
+    ON_INSTANTIATE
+    Model *c = calloc(1, sizeof(Model));
+    c->k = 1.0;
+    c->log = functions->logger;
+    return c;
+}
+void fmi2FreeInstance(fmi2Component c) { free(c); }
+fmi2Status fmi2SetupExperiment(fmi2Component c, fmi2Boolean a, fmi2Real b, fmi2Real start, fmi2Boolean d, fmi2Real e)
+{ M->t = start; Y = 0.0; return fmi2OK; }
+static fmi2Status go(fmi2Component c, int from) { if (M->phase != from) return fmi2Error; M->phase++; return fmi2OK; }
+fmi2Status fmi2EnterInitializationMode(fmi2Component c) { return go(c, 0); }
+fmi2Status fmi2ExitInitializationMode(fmi2Component c) { return go(c, 1); }
+fmi2Status fmi2Terminate(fmi2Component c) { return fmi2OK; }
+fmi2Status fmi2Reset(fmi2Component c) { ON_RESET M->phase = 0; M->t = 0.0; M->u = 0.0; M->k = 1.0; return fmi2OK; }
+fmi2Status fmi2GetReal(fmi2Component c, const fmi2ValueReference vr[], size_t n, fmi2Real v[])
+{
+    for (size_t i = 0; i < n; i++) {
+        ON_GET
+        if (vr[i] > 2) return fmi2Error;
+        v[i] = vr[i] == 0 ? Y : vr[i] == 1 ? M->u : M->k;
+    }
+    return fmi2OK;
+}
+fmi2Status fmi2SetReal(fmi2Component c, const fmi2ValueReference vr[], size_t n, const fmi2Real v[])
+{
+    for (size_t i = 0; i < n; i++) {
+        if (vr[i] == 1) M->u = v[i]; else if (vr[i] == 2) M->k = v[i]; else return fmi2Error;
+    }
+    return fmi2OK;
+}
+fmi2Status fmi2DoStep(fmi2Component c, fmi2Real t, fmi2Real h, fmi2Boolean no)
+{
+    ON_STEP
+    if (M->phase != 2 || !(h > 0)) return fmi2Error;
+    M->t = t + h;
+    Y += h * (M->k + M->u - Y);
+    return fmi2OK;
+}
+#define NO(name, ...) fmi2Status name(fmi2Component c, __VA_ARGS__) { return fmi2Error; }
+typedef const fmi2ValueReference *R;
+NO(fmi2GetInteger, R r, size_t n, fmi2Integer *v) NO(fmi2GetBoolean, R r, size_t n, fmi2Boolean *v)
+NO(fmi2GetString, R r, size_t n, fmi2String *v) NO(fmi2SetInteger, R r, size_t n, const fmi2Integer *v)
+NO(fmi2SetBoolean, R r, size_t n, const fmi2Boolean *v) NO(fmi2SetString, R r, size_t n, const fmi2String *v)
+fmi2Status fmi2GetFMUstate(fmi2Component c, fmi2FMUstate *s)
+{ Model *m = malloc(sizeof *m); memcpy(m, c, sizeof *m); *s = m; return fmi2OK; }
+fmi2Status fmi2SetFMUstate(fmi2Component c, fmi2FMUstate s) { memcpy(c, s, sizeof(Model)); ON_RESTORE return fmi2OK; }
+fmi2Status fmi2FreeFMUstate(fmi2Component c, fmi2FMUstate *s) { free(*s); *s = NULL; return fmi2OK; }
+NO(fmi2SerializedFMUstateSize, fmi2FMUstate s, size_t *n)
+NO(fmi2SerializeFMUstate, fmi2FMUstate s, fmi2Byte b[], size_t n)
+NO(fmi2DeSerializeFMUstate, const fmi2Byte b[], size_t n, fmi2FMUstate *s)
+NO(fmi2GetDirectionalDerivative, R r, size_t n, R q, size_t m, const fmi2Real *a, fmi2Real *b)
+NO(fmi2SetRealInputDerivatives, R r, size_t n, const fmi2Integer *o, const fmi2Real *v)
+NO(fmi2GetRealOutputDerivatives, R r, size_t n, const fmi2Integer *o, fmi2Real *v)
+fmi2Status fmi2CancelStep(fmi2Component c) { return fmi2Error; }
+NO(fmi2GetStatus, const fmi2StatusKind k, fmi2Status *v) NO(fmi2GetRealStatus, const fmi2StatusKind k, fmi2Real *v)
+NO(fmi2GetIntegerStatus, const fmi2StatusKind k, fmi2Integer *v)
+NO(fmi2GetBooleanStatus, const fmi2StatusKind k, fmi2Boolean *v)
+NO(fmi2GetStringStatus, const fmi2StatusKind k, fmi2String *v)
+"""
+PLACES = ("ON_INSTANTIATE", "ON_RESET", "ON_GET", "ON_STEP", "ON_RESTORE")
+DESCRIPTION = """<?xml version="1.0" encoding="UTF-8"?>
+<fmiModelDescription fmiVersion="2.0" modelName="Lag" guid="{1}" generationTool="a test">
+  <CoSimulation modelIdentifier="Lag" canGetAndSetFMUstate="true"/>
+  <ModelVariables>
+    <ScalarVariable name="y" valueReference="0" causality="output"><Real/></ScalarVariable>
+    <ScalarVariable name="u" valueReference="1" causality="input"><Real start="0"/></ScalarVariable>
+    <ScalarVariable name="k" valueReference="2" causality="parameter" variability="fixed">
+      <Real start="1"/>
+    </ScalarVariable>
+  </ModelVariables>
+  <ModelStructure>
+    <Outputs><Unknown index="1"/></Outputs><InitialUnknowns><Unknown index="1"/></InitialUnknowns>
+  </ModelStructure>
+</fmiModelDescription>
+"""
+CRASH = "*(volatile int *)0 = 1;"
+
+
+@pytest.fixture
+def lag(tmp_path):
+    """A small FMU in C, with code of choice put in at some places: dy/dt = k + u - y, Euler."""
+
+    def make(description=DESCRIPTION, library="Lag", platform=fmpy.platform, **code):
+        source, binary = tmp_path / "lag.c", tmp_path / "library"
+        source.write_text(SOURCE)
+        defined = [f"-D{place}={code.get(place.lower(), '')}" for place in PLACES]
+        defined += [f"-D{name.upper()}={text}" for name, text in code.items() if name.upper() not in PLACES]
+        command = ["cc", "-w", "-shared", "-fPIC", "-I", str(HEADERS), *defined, str(source), "-o", str(binary)]
+        subprocess.run(command, check=True)
+        path = tmp_path / "lag.fmu"
+        with zipfile.ZipFile(path, "w") as archive:
+            archive.writestr("modelDescription.xml", description)
+            archive.writestr(f"binaries/{platform}/{library}{fmpy.sharedLibraryExtension}", binary.read_bytes())
+        return path
+
+    return make
+
+
+def verdicts(report):
+    return {finding.check: finding.verdict for finding in report.findings}
+
+
+def detail(report, check):
+    return next(finding.detail for finding in report.findings if finding.check == check)
+
+
+@needs_native
+def test_our_native_fmus_pass_everything():
+    report = validate(build("PointMassTrain", kind="native"))
+    assert set(verdicts(report).values()) == {"pass"}
+    assert set(PROBES.values()) < set(verdicts(report))
+    assert report.passed
+
+
+def test_our_python_fmus_pass():
+    report = validate(build("PointMassTrain", kind="python"))
+    assert report.passed, report.findings
+    assert verdicts(report)[PROBES["order"]] in ("pass", "warning")  # pythonfmu's wrapper takes any order
+
+
+@needs_compiler
+def test_a_good_fmu_of_another_maker_passes(lag):
+    report = validate(lag())
+    assert set(verdicts(report).values()) == {"pass"}
+    assert "rules of railcosim" not in verdicts(report)
+
+
+@needs_compiler
+@pytest.mark.parametrize(
+    ("code", "probe", "part"),
+    [
+        ({"on_instantiate": CRASH}, "instantiate", "took its process down (SIGSEGV)"),
+        ({"on_instantiate": "return 0;"}, "instantiate", "cannot be instantiated"),
+        ({"on_step": CRASH}, "simulate", "took its process down (SIGSEGV)"),
+        ({"on_step": "abort();"}, "simulate", "SIGABRT"),
+        ({"on_step": "exit(0);"}, "simulate", "exit code 0"),
+        ({"on_step": "if (t > 0.5) return fmi2Error;"}, "simulate", "t = 0.6 s, status error: fmi2DoStep failed"),
+        (
+            {"on_step": 'M->log(0,"probe0",fmi2Error,"e","broken");return fmi2Fatal;'},
+            "simulate",
+            "t = 0 s, status fatal: fmi2DoStep failed; it said: [error] broken",
+        ),
+        (
+            {"on_step": 'M->log(0,"another name",fmi2Error,"e","broken");return fmi2Fatal;'},
+            "simulate",
+            "fmi2DoStep failed; it said: [ERROR] broken",
+        ),
+        ({"on_step": "M->k = 0.0 / 0.0;"}, "simulate", "output y is nan at t = 0.1 s"),
+        ({"on_get": "if (vr[i] == 2) { v[i] = 7; continue; }"}, "starts", "k starts at 7.0, not at 1.0"),
+        ({"on_reset": "return fmi2OK;"}, "reset", "t = 0 s, status error: fmi2EnterInitializationMode failed"),
+        ({"on_step": "static double n; M->u = n++;"}, "reset", "other outputs after fmi2Reset"),
+        ({"shared_state": "1"}, "instances", "other outputs beside a second instance"),
+        ({"on_restore": "M->y = 0;"}, "state", "other outputs after fmi2SetFMUstate"),
+        ({"on_get": "if (vr[i] > 2) " + CRASH}, "order", "down at fmi2GetReal of a value reference that is not there"),
+    ],
+)
+def test_what_is_wrong_is_found_and_takes_nothing_down(lag, code, probe, part):
+    report = validate(lag(**code))
+    assert verdicts(report)[PROBES[probe]] == "fail"
+    assert part in detail(report, PROBES[probe])
+    assert not report.passed
+
+
+@needs_compiler
+def test_leniency_of_another_maker_is_a_warning(lag):
+    report = validate(lag(on_step="M->y += 1; return fmi2OK;"))
+    assert verdicts(report)[PROBES["order"]] == "warning"
+    assert "fmi2DoStep before initialization, fmi2DoStep with a negative step" in detail(report, PROBES["order"])
+    assert report.passed
+
+
+@pytest.mark.long
+@needs_compiler
+def test_an_fmu_that_hangs_is_ended(lag):
+    begin = time.monotonic()
+    report = validate(lag(on_step="for (;;) {}"), timeout=3.0)
+    assert "not finished after 3 s" in detail(report, PROBES["simulate"])
+    assert verdicts(report)[PROBES["instantiate"]] == "pass"
+    assert time.monotonic() - begin < 60.0
+
+
+@needs_compiler
+def test_the_schema_and_the_validator_are_asked(lag):
+    report = validate(lag(DESCRIPTION.replace('<Real start="0"/>', '<Real begin="0" start="0"/>')))
+    assert verdicts(report)["schema"] == "fail"
+    assert "line 6" in detail(report, "schema")
+    report = validate(lag(DESCRIPTION.replace('<InitialUnknowns><Unknown index="1"/></InitialUnknowns>', "")))
+    assert (verdicts(report)["schema"], verdicts(report)["description"]) == ("pass", "fail")
+    assert "InitialUnknowns" in detail(report, "description")
+
+
+@needs_compiler
+def test_a_library_of_another_name_or_platform(lag):
+    report = validate(lag(library="Other"))
+    assert "not named after the model identifier 'Lag'" in detail(report, "binary")
+    assert verdicts(report)[PROBES["simulate"]] == "pass"
+    report = validate(lag(platform="elsewhere64"))
+    assert verdicts(report)["binary"] == "skipped"
+    assert "it brings elsewhere64" in detail(report, "binary")
+
+
+@needs_native
+def test_our_own_rules_bind_our_own_fmus(tmp_path):
+    """The same archive with what we promise taken out of it."""
+    path = tmp_path / "worse.fmu"
+    with zipfile.ZipFile(build("PointMassTrain", kind="native")) as old, zipfile.ZipFile(path, "w") as new:
+        for entry in old.namelist():
+            content = old.read(entry)
+            if entry == "modelDescription.xml":
+                for good, bad in (
+                    (b' canSerializeFMUstate="true"', b""),
+                    (b' canInterpolateInputs="true"', b""),
+                    (b' dependencies=""', b""),
+                    (b' description="speed"', b""),
+                    (b'<BaseUnit kg="1" m="1" s="-2"/>', b""),
+                ):
+                    assert good in content
+                    content = content.replace(good, bad)
+            if not entry.startswith(("documentation", "sources")):
+                new.writestr(entry, content)
+    found = detail(validate(path), "rules of railcosim")
+    for part in (
+        "canSerializeFMUstate is not declared",
+        "canInterpolateInputs is not declared",
+        "the output speed lists no dependencies",
+        "speed has no description",
+        "the unit 'N' is not defined by base units",
+        "documentation/index.html is missing",
+        ".c is listed and missing",
+    ):
+        assert part in found
+
+
+@pytest.mark.parametrize("index", ["99", "", "x", "9" * 50])
+def test_a_file_that_says_it_is_ours_is_not_believed(tmp_path, xml, index):
+    ours = '<VendorAnnotations><Tool name="railcosim"><component kind="native"/></Tool></VendorAnnotations>'
+    text = xml["description"]([xml["variable"]("y", "output")], simulation='needsExecutionTool="false"')
+    text = text.replace("<ModelVariables>", f"{ours}<ModelVariables>")
+    text = text.replace("<InitialUnknowns>", f'<Derivatives><Unknown index="{index}"/></Derivatives><InitialUnknowns>')
+    text = text.replace('<InitialUnknowns><Unknown index="1"/>', f'<InitialUnknowns><Unknown index="{index}"/>')
+    path = xml["write_archive"](tmp_path / "theirs.fmu", {"modelDescription.xml": text})
+    assert "y is calculated and missing from InitialUnknowns" in detail(validate(path), "rules of railcosim")
+
+
+@pytest.mark.parametrize(
+    ("name", "content"),
+    [
+        ("no_zip.fmu", None),
+        ("no_description.fmu", {"readme.txt": "x"}),
+        ("no_xml.fmu", {"modelDescription.xml": "<fmi"}),
+        ("fmi3.fmu", {"modelDescription.xml": '<fmiModelDescription fmiVersion="3.0"/>'}),
+        ("outside.fmu", {"modelDescription.xml": DESCRIPTION, "../evil": "x"}),
+    ],
+)
+def test_a_file_that_is_no_fmu_is_refused(tmp_path, xml, name, content, capsys):
+    path = tmp_path / name
+    path.write_text("nothing") if content is None else xml["write_archive"](path, content)
+    with pytest.raises(FmuFileError, match=name):
+        validate(path)
+    assert call(["validate", str(path)]) == 2
+    assert name in capsys.readouterr().err
+
+
+@needs_compiler
+def test_the_command_prints_a_table_and_tells_by_its_exit_code(lag, capsys):
+    assert call(["validate", str(lag())]) == 0
+    good = capsys.readouterr().out
+    assert "20 steps of 0.1 s, 1 outputs finite" in good
+    assert "\nvalid: " in good
+    assert call(["validate", str(lag(on_step=CRASH))]) == 1
+    bad = capsys.readouterr().out
+    assert "SIGSEGV" in bad
+    assert "\nnot valid: " in bad
+    assert call(["validate", "nowhere.fmu"]) == 2
+
+
+@pytest.mark.skipif(sys.platform.startswith("win"), reason="POSIX signals")
+@needs_compiler
+def test_what_an_fmu_prints_is_its_last_words(lag):
+    report = validate(lag(on_step='write(2,"all is lost",11);abort();'))
+    assert "last words: all is lost" in detail(report, PROBES["simulate"])
