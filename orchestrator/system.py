@@ -5,10 +5,6 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 from typing import Any, Literal
 
-Algorithm = Literal["gauss-seidel", "jacobi", "iterative", "adaptive"]
-ALGORITHMS: tuple[Algorithm, ...] = ("gauss-seidel", "jacobi", "iterative", "adaptive")
-SWEEPING: tuple[Algorithm, ...] = ("gauss-seidel", "adaptive")
-"""Those that step one instance after the other, in an order."""
 Loops = Literal["delay", "solve"]
 LOOPS: tuple[Loops, ...] = ("delay", "solve")
 Acceleration = Literal["none", "aitken", "anderson"]
@@ -129,7 +125,7 @@ class System:
     step: float = 0.1
     start_time: float = 0.0
     record: float | None = None
-    algorithm: Algorithm = "gauss-seidel"
+    algorithm: str = "gauss-seidel"
     seed: int = 0
     order: list[str] = field(default_factory=list)
     extrapolation: int = 0

@@ -22,6 +22,7 @@ from ..evaluation import PublishedRow
 from ..figures import check_figures, draw
 from ..fmi import Workspace
 from ..isolation import isolate
+from ..master import ALGORITHMS
 from ..run import (
     ROWS_FILE,
     Results,
@@ -207,7 +208,7 @@ def _exit_code(outcome: Run, second: Run | None) -> int:
 
 @app.command("list")
 def list_all() -> None:
-    """List the shipped scenarios and components."""
+    """List the shipped scenarios, components and master algorithms."""
     out = console.console()
     console.say(out, "Scenarios (orchestrate run NAME)", "bold")
     for name, title in shipped():
@@ -218,6 +219,9 @@ def list_all() -> None:
     console.say(out, "Components (orchestrate describe NAME)", "bold")
     for name, component in CATALOGUE.items():
         console.say(out, f"  {name}: {summary(component)}")
+    console.say(out, "Master algorithms (orchestrate run SCENARIO --algorithm NAME)", "bold")
+    for name, algorithm in ALGORITHMS.items():
+        console.say(out, f"  {name}: {algorithm.summary()}")
 
 
 @app.command()

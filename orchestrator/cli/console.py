@@ -172,16 +172,7 @@ def _coupling(how: Mapping[str, Any]) -> Iterator[str]:
     if loop := how.get("algebraic_loop"):
         signals, residual = len(loop["signals"]), loop["worst_residual"]
         yield f"algebraic loop through {signals} signals: worst relative residual {residual:.2g}"
-    if it := how.get("iterative"):
-        yield (
-            f"{it['iterations_per_step']:.3g} iterations per step, at most {it['most_iterations']}; worst residual "
-            f"{it['worst_residual_per_tolerance']:.2g} of the tolerance"
-        )
-    if steps := how.get("adaptive"):
-        yield (
-            f"{steps['accepted']} steps accepted, {steps['rejected']} rejected, between "
-            f"{steps['shortest_step'] or 0.0:.3g} and {steps['longest_step']:.3g} s long"
-        )
+    yield from (report["summary"] for report in how.values() if "summary" in report)
     if "events" in how:
         count = sum(what["phase"] == "begin" for what in how["events"])
         yield f"{count} event{'s' * (count != 1)}, listed in run.json"

@@ -8,6 +8,7 @@ from typing import Annotated, Any
 import typer
 
 from ..errors import ScenarioError
+from ..master import ALGORITHMS
 from ..scenario import load, parse_value
 from ..system import System
 
@@ -31,15 +32,6 @@ class PackagingName(StrEnum):
     python = "python"
 
 
-class AlgorithmName(StrEnum):
-    """`system.ALGORITHMS`, as the command line needs them."""
-
-    gauss_seidel = "gauss-seidel"
-    jacobi = "jacobi"
-    iterative = "iterative"
-    adaptive = "adaptive"
-
-
 Scenario = Annotated[
     str, typer.Argument(metavar="SCENARIO", help="A shipped scenario (see 'orchestrate list'), or a .toml file.")
 ]
@@ -55,7 +47,9 @@ Swap = Annotated[
 ]
 Stop = Annotated[float | None, typer.Option(help="Stop time in s.")]
 Step = Annotated[float | None, typer.Option(help="Communication step in s; sample times equal to it follow.")]
-Algorithm = Annotated[AlgorithmName | None, typer.Option(help="How the instances exchange values.")]
+Algorithm = Annotated[
+    str | None, typer.Option(metavar=f"<{'|'.join(ALGORITHMS)}>", help="How the instances exchange values.")
+]
 Kind = Annotated[
     KindName,
     typer.Option(
@@ -94,7 +88,7 @@ def load_system(
     *,
     stop: float | None = None,
     step: float | None = None,
-    algorithm: AlgorithmName | None = None,
+    algorithm: str | None = None,
 ) -> System:
     """The scenario as the options of a command change it."""
     return load(
@@ -105,5 +99,5 @@ def load_system(
         swaps=swaps or (),
         stop_time=stop,
         step=step,
-        algorithm=algorithm.value if algorithm else None,
+        algorithm=algorithm,
     )

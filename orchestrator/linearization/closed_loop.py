@@ -18,10 +18,10 @@ import networkx as nx
 import numpy as np
 
 from ..errors import FmuError, ScenarioError, did_you_mean
-from ..fmi import Kind, Slave, Workspace
+from ..fmi import Kind, Workspace
 from ..fmi.binding import forget_paths
-from ..master import Master, Settings, settle
-from ..run import Checked, Progress, check
+from ..master import ALGORITHMS, Explicit, Master, Operation, settle
+from ..run import Checked, Progress, assembled, check
 from ..system import System
 from .blocks import Array, Continuous, Stepped, make_block
 from .composition import Composition
@@ -110,23 +110,13 @@ def linearize(
     stop = max(system.stop_time, system.start_time + (round(steps) + 2) * system.step)
     system = replace(system, **nothing, stop_time=stop, record=None)
     with Workspace() as workspace:
-        slaves: dict[str, Slave] = {}
         try:
             checked = check(system, workspace, kind)
-            for name, model in checked.models.items():
-                slaves[name] = model.instantiate(name)
-            wiring = checked.wiring
-            settings = Settings.of(system)
-            master = Master(
-                slaves, checked.order.sequence, wiring.links, wiring.starts, system.algorithm, settings=settings
-            )
-            master.initialize(system.start_time, stop)
-            _advance(master, system, round(steps), progress)
-            loop = Loop(system, checked, master, inputs, outputs)
-            return loop.linearize(sampled)
+            with assembled(checked) as master:
+                master.initialize(system.start_time, stop)
+                _advance(master, system, round(steps), progress)
+                return Loop(system, checked, master, inputs, outputs).linearize(sampled)
         finally:
-            for slave in slaves.values():
-                slave.free()
             forget_paths(workspace.folder)
 
 
@@ -227,7 +217,7 @@ class Loop:
         return self._discrete()
 
     def _continuous(self) -> Linearization:
-        settle(self.master.exchange, self.master.sequence, self.master.time)
+        settle(self.master.exchange, self.master.coupling.sequence, self.master.time)
         sizes = {name: (block.states, block.inputs, block.outputs) for name, block in self.blocks.items()}
         x, u, y = ([(n, s) for n, names in sizes.items() for s in names[k]] for k in range(3))
         a, b = np.zeros((len(x), len(x))), np.zeros((len(x), len(u)))
@@ -280,25 +270,29 @@ class Loop:
 
     def _discrete(self) -> Linearization:
         """One communication step, in the master's own order; registers keep what is read a step late."""
-        if self.system.algorithm not in ("gauss-seidel", "jacobi") or self.master.settings.rates:
+        algorithm = self.master.algorithm
+        if not isinstance(algorithm, Explicit) or self.master.coupling.settings.rates:
+            able = " or ".join(name for name, one in ALGORITHMS.items() if issubclass(one, Explicit))
             raise ScenarioError(
-                "the linear model of one communication step is that of gauss-seidel or jacobi with one step for all; "
-                "choose --algorithm gauss-seidel, and no step of an instance's own"
+                f"the linear model of one communication step is that of {able} with one step for all; choose "
+                "--algorithm gauss-seidel, and no step of an instance's own"
             )
-        matrices, states = Composition(self, self._step_models()).result()
+        known = list(self.master.values)
+        steps = [(op, name) for batch in algorithm.batches() for op in batch.operations for name in batch.names]
+        matrices, states = Composition(self, self._step_models(steps), steps).result()
+        self.master.values[:] = known
         return self._result(matrices, states, self.system.step)
 
-    def _step_models(self) -> dict[str, Stepped]:
-        master, models = self.master, {}
-        if self.system.algorithm == "jacobi":
-            for name in self.blocks:
-                master.exchange.write(name, self.time)
-        for slave in master.sequence:
-            if self.system.algorithm != "jacobi":
-                master.exchange.write(slave.name, self.time)
-            models[slave.name] = self.blocks[slave.name].step(self.time, self.system.step)
-            if self.system.algorithm != "jacobi":
-                master.exchange.read_finite(slave, self.time + self.system.step)
+    def _step_models(self, steps: Sequence[tuple[Operation, str]]) -> dict[str, Stepped]:
+        """Of each block that of a step at the values at which the master would take it."""
+        exchange, models, length = self.master.exchange, {}, self.system.step
+        for operation, name in steps:
+            if operation == Operation.SET:
+                exchange.write(name, self.time)
+            elif operation == Operation.STEP:
+                models[name] = self.blocks[name].step(self.time, length)
+            else:
+                exchange.read_finite(self.master.slaves[name], self.time + length)
         rough = [name for model in models.values() for name in model.rough]
         if rough:
             self.notes.append(f"no slope here, what switches is held: {_families(rough)}")

@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Mapping
+from collections.abc import Collection, Mapping, Sequence
 from typing import TYPE_CHECKING
 
 import numpy as np
 
+from ..master import Operation
 from ..wiring import Link
 from .blocks import Array, Continuous, Stepped
 
@@ -20,10 +21,8 @@ class Composition:
     Every quantity is a row over (states at the begin, chosen inputs); a row is passed on as the master passes values.
     """
 
-    def __init__(self, loop: Loop, models: Mapping[str, Stepped]) -> None:
-        self.loop, self.models = loop, models
-        self.sequence = [slave.name for slave in loop.master.sequence]
-        self.jacobi = loop.system.algorithm == "jacobi"
+    def __init__(self, loop: Loop, models: Mapping[str, Stepped], steps: Sequence[tuple[Operation, str]]) -> None:
+        self.loop, self.models, self.steps = loop, models, steps
         self.states = [(n, s) for n, block in loop.blocks.items() for s in block.states]
         self.registers: list[tuple[Signal, int]] = []
         self._register()
@@ -34,17 +33,18 @@ class Composition:
     def _register(self) -> None:
         """What is read of former communication points and does not follow from the states: (signal, how old)."""
         stepped: set[str] = set()
-        for name in self.sequence:
-            for target in self._targets(name):
+        for operation, name in self.steps:
+            if operation == Operation.GET:
+                stepped.add(name)
+            for target in self._targets(name) if operation == Operation.SET else ():
                 link = self.loop.links[target]
                 age = self._age(link, link.source[0] in stepped)
                 if age is not None:
                     # A value k points old needs all the younger ones to pass through.
                     kept = [(link.source, k) for k in range(age + 1) if self._must_keep(link.source, k)]
                     self.registers += [register for register in kept if register not in self.registers]
-            if not self.jacobi:
-                stepped.add(name)
-        self.registers.sort(key=lambda r: (self.sequence.index(r[0][0]), r[0][1], r[1]))
+        rank = {slave.name: k for k, slave in enumerate(self.loop.master.coupling.sequence)}
+        self.registers.sort(key=lambda r: (rank[r[0][0]], r[0][1], r[1]))
 
     def _targets(self, name: str) -> list[Signal]:
         return [(name, i) for i in self.loop.blocks[name].inputs if (name, i) in self.loop.links]
@@ -108,16 +108,20 @@ class Composition:
         loop, stepped = self.loop, set[str]()
         following = np.zeros_like(self.rows)
         seen: dict[Signal, Array] = {}
-        for name in self.sequence:
-            model, block = self.models[name], loop.blocks[name]
-            x, u = self._state_rows(name), self._input_rows(name, stepped)
-            following[[k for k, (n, _) in enumerate(self.states) if n == name]] = model.phi @ x + model.gamma @ u
-            after, before = model.e @ x + model.f @ u, model.c @ x + model.d @ u
-            for k, output in enumerate(block.outputs):
-                self.fresh[name, output] = after[k]
-                seen[name, output] = self._added((name, output), before[k])
-            if not self.jacobi:
+        given: dict[str, Array] = {}
+        for operation, name in self.steps:
+            if operation == Operation.SET:
+                given[name] = self._input_rows(name, stepped)
+            elif operation == Operation.GET:
                 stepped.add(name)
+            else:
+                model, block = self.models[name], loop.blocks[name]
+                x, u = self._state_rows(name), given[name]
+                following[[k for k, (n, _) in enumerate(self.states) if n == name]] = model.phi @ x + model.gamma @ u
+                after, before = model.e @ x + model.f @ u, model.c @ x + model.d @ u
+                for k, output in enumerate(block.outputs):
+                    self.fresh[name, output] = after[k]
+                    seen[name, output] = self._added((name, output), before[k])
         for k, (signal, age) in enumerate(self.registers, len(self.states)):
             following[k] = self.fresh[signal] if age == 0 else self._recorded(signal, age - 1)
         outputs = np.array([seen[signal] for signal in loop.outputs]).reshape(-1, self.rows.shape[1])

@@ -6,14 +6,19 @@ kernel.
 """
 
 from .algebraic_loops import find_loops
-from .coupling import check_coupling, describe_coupling
+from .algorithms import ALGORITHMS, Explicit, Operation
+from .checking import check_coupling, describe_coupling
 from .event_check import check_events
 from .initialization import settle
-from .loop import Master, Rows
+from .loop import Master
+from .observer import Rows
 from .settings import Settings
 
 __all__ = [
+    "ALGORITHMS",
+    "Explicit",
     "Master",
+    "Operation",
     "Rows",
     "Settings",
     "check_coupling",

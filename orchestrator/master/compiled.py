@@ -1,30 +1,30 @@
-"""The bridge to the compiled step loop: a `Master`'s plan as flat arrays, and blocks of steps with it.
+"""The bridge to the compiled step loop: an explicit algorithm's operations as flat arrays, and blocks of steps with it.
 
 The kernel is an optional extension: without it, or for what it does not do (components as Python objects, text
-signals), `Master` steps in Python with identical results.
+signals), steps are taken in Python with identical results.
 """
 
 from __future__ import annotations
 
 import time as clock
 from collections.abc import Sequence
-from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ..fmi.binding import FmuChannel, FmuSlave
+from .algorithms import Explicit, Operation
+from .coupling import Coupling
 from .exchange import Change
+from .observer import Observer
 
 try:
     from . import kernel
 except ImportError:  # installed without a C compiler
     kernel = None  # type: ignore[assignment]
 
-if TYPE_CHECKING:
-    from .loop import Master, Observer
-
-_SET, _STEP, _GET, _CHANGE = 0, 1, 2, 3
+_CHANGE = 3
+"""The kernel's number for what an event does to values that have been read; the others are `Operation`."""
 _DISCARD = 2
 _BLOCK_SECONDS = 0.05
 """Wall time a block is meant to take: short enough for Ctrl-C and a progress bar, long enough to cost nothing."""
@@ -42,22 +42,19 @@ _CHANGES = np.dtype(
 _OPERATION = np.dtype([(name, "i4") for name in ("kind", "index", "period", "phase", "rank", "unused")])
 
 
-def can_run(master: Master) -> bool:
-    """Whether the kernel is there and can do what this master's plan asks for."""
-    if kernel is None or not all(isinstance(slave, FmuSlave) for slave in master.slaves.values()):
-        return False
-    settings = master.settings
-    if master.algorithm not in ("gauss-seidel", "jacobi") or settings.extrapolation or master.loops is not None:
-        return False
-    return "String" not in master.kinds
-
-
 class CompiledLoop:
-    """A master's plan for the kernel."""
+    """An explicit algorithm's plan for the kernel."""
 
-    def __init__(self, master: Master) -> None:
-        self._master = master
-        self._exchange = master.exchange
+    @classmethod
+    def of(cls, coupling: Coupling, algorithm: Explicit) -> CompiledLoop | None:
+        """One that takes these steps, where the kernel is there and can do all that is asked for."""
+        able = kernel is not None and all(isinstance(slave, FmuSlave) for slave in coupling.slaves.values())
+        held = not coupling.settings.extrapolation and coupling.loops is None
+        return cls(coupling, algorithm) if able and held and "String" not in coupling.exchange.kinds else None
+
+    def __init__(self, coupling: Coupling, algorithm: Explicit) -> None:
+        self._coupling = coupling
+        self._exchange = coupling.exchange
         self._channels: list[tuple[int, int, int, int, int]] = []
         self._entries: list[tuple[int, int, int, float, float]] = []
         self._references: list[int] = []
@@ -65,39 +62,33 @@ class CompiledLoop:
         self._culprits: list[tuple[FmuSlave | None, str]] = []
         self._instances: list[tuple[int, int]] = []
         self._changes: list[tuple[Change, int, bool]] = []
-        self._slaves = {name: slave for name, slave in master.slaves.items() if isinstance(slave, FmuSlave)}
-        is_shared = kernel.HAS_THREADS and master.algorithm == "jacobi"
-        self.threads = min(master.settings.threads, len(self._slaves)) if is_shared else 1
+        self._slaves = {name: slave for name, slave in coupling.slaves.items() if isinstance(slave, FmuSlave)}
+        self._whole = [place for place, kind in enumerate(self._exchange.kinds) if kind != "Real"]
+        is_shared = kernel.HAS_THREADS and algorithm.takes_threads
+        self.threads = min(coupling.settings.threads, len(self._slaves)) if is_shared else 1
         ends: list[int] = []
-        if master.algorithm == "gauss-seidel":  # instance by instance
-            for slave in master.sequence:
-                self._add([slave.name], (_SET, _STEP, _GET))
-        elif self.threads <= 1:  # all of one operation before the first of the next
-            self._add(list(self._slaves), (_SET, _STEP, _GET))
-        else:  # those of each thread; what all have set and stepped is read only then
-            shares = [list(share) for share in np.array_split(list(self._slaves), self.threads)]
-            for kinds in ((_SET, _STEP), (_GET,)):
-                for share in shares:
-                    self._add(share, kinds)
-                    ends.append(len(self._operations))
+        for batch in algorithm.batches():
+            for share in np.array_split(list(batch.names), max(1, self.threads)):
+                self._add(list(share), batch.operations)
+                ends.append(len(self._operations))
         self._plan = (
             np.array([(*o, rank, 0) for o, rank in zip(self._operations, self._ranks(), strict=True)], _OPERATION),
-            np.array(ends or [len(self._operations)], dtype=np.int64),
+            np.array(ends if self.threads > 1 else [len(self._operations)], dtype=np.int64),
             np.array(self._channels, dtype=_CHANNEL),
             np.array(self._instances, dtype=_INSTANCE),
             np.array(self._entries, dtype=_ENTRY),
             np.array(self._references, dtype=np.uint32),
         )
 
-    def _add(self, names: Sequence[str], kinds: Sequence[int]) -> None:
-        add = {_SET: self._add_sets, _STEP: self._add_step, _GET: self._add_gets}
-        for kind in kinds:
+    def _add(self, names: Sequence[str], operations: Sequence[Operation]) -> None:
+        add = {Operation.SET: self._add_sets, Operation.STEP: self._add_step, Operation.GET: self._add_gets}
+        for operation in operations:
             for name in names:
-                add[kind](self._slaves[name], self._master.settings.rates.get(name, 1))
+                add[operation](self._slaves[name], self._coupling.settings.rates.get(name, 1))
 
     def _ranks(self) -> list[int]:
         """Where each operation would stand without threads, so that of two that fail the first is told."""
-        stage = {_SET: 0, _STEP: 1, _GET: 2, _CHANGE: 2}
+        stage = {Operation.SET: 0, Operation.STEP: 1, Operation.GET: 2, _CHANGE: 2}
         numbers = range(len(self._operations))
         if self.threads > 1:
             order = sorted(numbers, key=lambda n: (stage[self._operations[n][0]], n))
@@ -118,14 +109,14 @@ class CompiledLoop:
                 change = -1 if slot is None else self._add_change(slot, -1, feed.is_real)
                 entries.append((source, -1 if age is None else age, change, scale, offset))
             assert isinstance(feed.channel, FmuChannel)
-            self._add_channel(_SET, slave, feed.channel, entries, feed.is_real, due=(rate, 0))
+            self._add_channel(Operation.SET, slave, feed.channel, entries, feed.is_real, due=(rate, 0))
 
     def _add_gets(self, slave: FmuSlave, rate: int) -> None:
         for part in self._exchange.yields[slave.name]:
             due = (rate, 0 if part.direct else rate - 1)
             entries = [(place, -1, -1, 1.0, 0.0) for place in range(part.begin, part.end)]
             assert isinstance(part.channel, FmuChannel)
-            self._add_channel(_GET, slave, part.channel, entries, part.is_real, due=due)
+            self._add_channel(Operation.GET, slave, part.channel, entries, part.is_real, due=due)
             for place, change in self._exchange.output_changes.items():
                 if part.begin <= place < part.end:
                     index = self._add_change(change, place, part.is_real)
@@ -145,14 +136,14 @@ class CompiledLoop:
         *,
         due: tuple[int, int],
     ) -> None:
-        call = channel.calls[kind == _GET]
+        call = channel.calls[kind == Operation.GET]
         self._add_operation(kind, len(self._channels), (slave, call), due)
         self._channels.append((*slave.addresses(call), len(self._entries), len(entries), int(is_real)))
         self._entries += entries
         self._references += channel.references
 
     def _add_step(self, slave: FmuSlave, rate: int) -> None:
-        self._add_operation(_STEP, len(self._instances), (slave, "fmi2DoStep"), (rate, 0))
+        self._add_operation(Operation.STEP, len(self._instances), (slave, "fmi2DoStep"), (rate, 0))
         self._instances.append(slave.addresses("fmi2DoStep"))
 
     def run(self, start_time: float, step: float, points: tuple[int, int, int], every: int, observe: Observer) -> bool:
@@ -168,7 +159,7 @@ class CompiledLoop:
         Raises:
             FmuError: a model failed, or a value is not finite.
         """
-        master, exchange = self._master, self._exchange
+        coupling, exchange = self._coupling, self._exchange
         done, stop, count = points
         values = np.array(exchange.values, dtype=np.float64)
         history, newest = self._unrolled(len(values))
@@ -190,8 +181,10 @@ class CompiledLoop:
             seconds = clock.perf_counter() - clock_begin
             begin = 0
             done += taken
-            master.steps, master.time = done, start_time + done * step
+            coupling.steps, coupling.time = done, start_time + done * step
             exchange.values[:] = values.tolist()
+            for place in self._whole:  # the kernel's values are all doubles
+                exchange.values[place] = int(exchange.values[place])
             if taken:
                 self._roll(history, newest)
                 goes_on = observe(done, rows[:written])
@@ -199,7 +192,7 @@ class CompiledLoop:
                 self._recover(failed, status, start_time + done * step, step)
                 begin = failed + 1  # the step goes on where it was left
             block = max(1, int(taken * min(_BLOCK_SECONDS / max(seconds, 1e-9), _GROWTH)))
-        for slave in master.slaves.values():
+        for slave in coupling.slaves.values():
             slave.time = start_time + done * step
         return goes_on
 
@@ -214,7 +207,7 @@ class CompiledLoop:
             self._exchange.history.extend(np.roll(history, -newest - 1, axis=0).tolist())
 
     def _recover(self, failed: int, status: int, time: float, step: float) -> None:
-        """Go on where an FMU discarded a step that it takes in parts; raise what `Master` does otherwise."""
+        """Go on where an FMU discarded a step that it takes in parts; raise what happens in Python otherwise."""
         slave, call = self._culprits[failed]
         assert slave is not None
         period, phase = self._operations[failed][2:]

@@ -1,140 +1,101 @@
-"""Whether the master algorithm that a system asks for can be had with its FMUs; every refusal names them."""
+"""`Coupling`: what an algorithm works with."""
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 
-from ..errors import did_you_mean
-from ..fmi import Interface
-from ..system import System, split
-from ..wiring import Wiring
-from .algebraic_loops import find_loops
-from .algorithms.adaptive import is_watched
-from .algorithms.iterative import find_blocks
+from ..errors import CouplingError
+from ..fmi import Slave
+from ..wiring import Link
+from .algebraic_loops import LoopSolver
+from .exchange import Exchange
+from .extrapolation import Extrapolator
+from .settings import Settings
 
-_SHOWN = 6
-
-
-def check_coupling(system: System, interfaces: Mapping[str, Interface], wiring: Wiring) -> list[str]:
-    """What is wrong with algorithm, steps and tolerances, one sentence each."""
-    problems = [
-        *_check_rates(system),
-        *_check_tolerances(system, interfaces),
-    ]
-    if system.algorithm == "iterative":
-        blocks = find_blocks(interfaces, wiring.links)
-        problems += _cannot(
-            [name for name in interfaces if name in blocks.cyclic and not interfaces[name].can_save_state],
-            "in a cycle, and the state that iterative comes back to cannot be saved (canGetAndSetFMUstate is false); "
-            "choose gauss-seidel or jacobi, or break the cycle by a delay",
-        )
-    elif system.algorithm == "adaptive":
-        problems += _check_adaptive(system, interfaces, wiring)
-    return problems
+_SOLVED = 1e-9
+"""Relative residual up to which an algebraic loop counts as solved."""
 
 
-def _check_adaptive(system: System, interfaces: Mapping[str, Interface], wiring: Wiring) -> Iterable[str]:
-    sampled = [name for name, interface in interfaces.items() if interface.vendor.get("sampled")]
-    yield from _cannot(
-        sampled, "sampled at points of its own, which adaptive cannot step over; choose gauss-seidel or iterative"
-    )
-    others = {name: interface for name, interface in interfaces.items() if name not in sampled}
-    yield from _cannot(
-        [name for name, interface in others.items() if not interface.can_save_state],
-        "the state that adaptive comes back to cannot be saved (canGetAndSetFMUstate is false); choose gauss-seidel",
-    )
-    yield from _cannot(
-        [name for name, interface in others.items() if not interface.variable_step],
-        "the step cannot vary (canHandleVariableCommunicationStepSize is false); choose gauss-seidel or iterative",
-    )
-    late = sorted({link.connection.target for link in wiring.links if link.delay})
-    if late:
-        yield (
-            f"{_listed(late)}: a delay counts communication points, which adaptive sets anew at every run; leave the "
-            "delay out, or choose gauss-seidel"
-        )
+class Coupling:
+    """The instances of a system, the values they exchange, what happens to these on the way, and how far it has got.
 
+    Args:
+        slaves: the instances by name, in the sequence in which they are recorded.
+        sequence: their names in the order of a sweep.
+        links: scalar connections.
+        settings: how values are continued over a step, and loops treated.
+        is_sweeping: whether an instance is given what others have computed in the same step.
+        is_of_end: whether the inputs of a step are those of its end; sampled components act on those of its begin, so
+            that their outputs with direct feed-through are read apart from the others.
 
-def _check_rates(system: System) -> Iterable[str]:
-    duration = system.stop_time - system.start_time
-    for instance in system.instances.values():
-        if instance.step is None or instance.step == system.step:
-            continue
-        place = f"{instance.origin}: " if instance.origin else ""
-        if system.algorithm not in ("gauss-seidel", "jacobi"):
-            yield f"{place}{instance.name} has a step of its own, which goes with gauss-seidel and jacobi only"
-        elif system.algebraic_loops == "solve":
-            yield f"{place}{instance.name} has a step of its own, with which algebraic_loops = 'solve' does not go"
-        own = f"{place}{instance.name}: its step = {instance.step:g} s"
-        if not _is_multiple(instance.step, system.step):
-            yield f"{own} is not a whole multiple of the system's, {system.step:g} s"
-        elif not _is_multiple(duration, instance.step):
-            yield f"{own} does not divide the run of {duration:g} s into whole steps"
+    Attributes:
+        loops: solves algebraic loops at each communication point; None where there is none, or none is to be solved.
+        steps: communication steps taken. time: the communication point that has been reached, in s.
+    """
 
+    def __init__(
+        self,
+        slaves: Mapping[str, Slave],
+        sequence: Sequence[str],
+        links: Sequence[Link],
+        settings: Settings,
+        *,
+        is_sweeping: bool,
+        is_of_end: bool,
+    ) -> None:
+        self.slaves = slaves
+        self.sequence = [slaves[name] for name in sequence]
+        self.settings = settings
+        self.interfaces = {name: slave.interface for name, slave in slaves.items()}
+        parted = set(settings.rates)
+        if is_of_end:
+            parted |= {name for name, interface in self.interfaces.items() if interface.vendor.get("sampled")}
+        self.exchange = Exchange(slaves, links, sweeping=is_sweeping, parted=parted)
+        order = settings.extrapolation
+        self.extrapolator = Extrapolator(self.exchange, links, order, ended=is_of_end) if order else None
+        self.loops: LoopSolver | None = None
+        self.steps = 0
+        self.time = 0.0
 
-def _is_multiple(length: float, step: float) -> bool:
-    count = length / step
-    return count > 0.5 and abs(count - round(count)) <= 1e-6
+    def write(self, name: str, time: float, length: float, *, ended: bool = False) -> None:
+        """Set the inputs of an instance for a step.
 
-
-def _check_tolerances(system: System, interfaces: Mapping[str, Interface]) -> Iterable[str]:
-    known = [
-        f"{name}.{variable}"
-        for name, interface in interfaces.items()
-        for variable in (*(v.name for v in interface.of("output") if v.type == "Real"), *interface.arrays)
-    ]
-    for signal in system.tolerances:
-        if signal not in known:
-            origin = system.origins.get(f"simulation.tolerances.{signal}", "")
-            place = f"{origin}: " if origin else ""
-            yield f"{place}simulation.tolerances: {signal!r} is no Real output{did_you_mean(signal, known)}"
-    if system.min_step is not None and system.algorithm != "adaptive":
-        yield f"simulation.min_step is for adaptive; the algorithm is {system.algorithm}"
-
-
-def _cannot(names: Sequence[str], what: str) -> Iterable[str]:
-    if names:
-        yield f"{_listed(names)}: {what}"
-
-
-def _listed(names: Sequence[str]) -> str:
-    return ", ".join(names[:_SHOWN]) + (f" and {len(names) - _SHOWN} more" if len(names) > _SHOWN else "")
-
-
-def describe_coupling(system: System, interfaces: Mapping[str, Interface], wiring: Wiring) -> list[str]:
-    """What a user should know of the coupling though it is no error: loops, and inputs that are held all the same."""
-    notes = []
-    for loop in find_loops(interfaces, wiring.links):
-        if system.algebraic_loops == "solve":
-            how = "it is solved at each communication point"
-        elif system.algorithm == "iterative":
-            how = "it is solved by the iterations"
+        Args:
+            name: the instance's.
+            time: where the step begins, in s.
+            length: of the step, in s.
+            ended: whether the present values are those of its end.
+        """
+        if self.extrapolator is None:
+            self.exchange.write(name, time)
         else:
-            how = (
-                "it is solved at initialization and acts one step late from then on; algebraic_loops = 'solve' solves "
-                "it at each communication point"
-            )
-        notes.append(f"algebraic loop through {_listed(loop)}: {how}")
-    if system.algorithm == "adaptive":
-        notes += _unwatched(system, interfaces)
-    if system.extrapolation:
-        held = [n for n, x in interfaces.items() if any(link.target[0] == n for link in wiring.links)]
-        held = [n for n in held if not interfaces[n].interpolates_inputs]
-        if held:
-            notes.append(f"inputs of {_listed(held)} are held over a step: canInterpolateInputs is false")
-    elif system.algorithm == "iterative":
-        able = [n for n in find_blocks(interfaces, wiring.links).cyclic if interfaces[n].interpolates_inputs]
-        if able:
-            notes.append(
-                f"{_listed(sorted(able))} can interpolate inputs: extrapolation = 1 makes iterative second order there"
-            )
-    return notes
+            self.extrapolator.write(name, time, length, ended=ended)
 
+    def solve_loops(self, time: float) -> None:
+        """Find values that agree at a time in s, where algebraic loops are to be solved.
 
-def _unwatched(system: System, interfaces: Mapping[str, Interface]) -> Iterable[str]:
-    """Tolerances that `adaptive` has no use for."""
-    for signal in system.tolerances:
-        instance, name = split(signal)
-        interface = interfaces[instance]
-        if not any(is_watched(interface, interface.variables[scalar]) for scalar in interface.scalars(name) or ()):
-            yield f"the tolerance of {signal} has no effect: adaptive watches continuous outputs without feed-through"
+        Raises:
+            CouplingError: there are none near the present ones.
+        """
+        if self.loops is None:
+            return
+        left = self.loops.solve(time)
+        if not left <= _SOLVED:
+            names = ", ".join(self.loops.signals[:6])
+            raise CouplingError(
+                f"t = {time:g} s: the algebraic loop through {names} has no solution near its last one: it is left "
+                f"with a relative residual of {left:.3g}; take a smaller step, or put a component with memory into it"
+            )
+
+    def tolerances(self, default: float) -> list[tuple[float, float]]:
+        """Relative and absolute tolerance of each value; `default` is relative, for a system that gives none."""
+        given = self.settings.tolerance
+        tolerance = default if given is None else given
+        found = []
+        for (instance, name), signal in zip(self.exchange.places, self.exchange.signals, strict=True):
+            nominal = self.interfaces[instance].variables[name].nominal
+            ways = self.settings.tolerances
+            array = f"{instance}.{name.rpartition('[')[0]}"
+            own = ways.get(signal) or ways.get(array) or (tolerance, tolerance * abs(nominal or 1.0))
+            found.append((float(own[0]), float(own[1])))
+        return found

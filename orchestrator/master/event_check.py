@@ -10,6 +10,7 @@ from ..errors import did_you_mean
 from ..fmi import Interface, Variable
 from ..system import ACTIONS, Event, System, split
 from ..wiring import Wiring, bounded
+from .algorithms import ALGORITHMS
 
 
 def check_events(system: System, interfaces: Mapping[str, Interface], wiring: Wiring) -> list[str]:
@@ -94,7 +95,7 @@ def _typed(value: Any, variable: Variable) -> None:
 def _step(system: System, instance: str, variable: Variable) -> float:
     """Distance in s of the points at which a change of a variable is felt."""
     own = system.instances[instance].step if variable.causality == "input" else None
-    return 0.0 if system.algorithm == "adaptive" else own or system.step
+    return 0.0 if ALGORITHMS[system.algorithm].varies_step else own or system.step
 
 
 def _wrong_times(event: Event, step: float) -> Iterator[str]:

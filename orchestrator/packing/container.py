@@ -24,6 +24,7 @@ from lxml import etree
 from ...fmus.build import build, write_archive
 from ..errors import RailcosimError, ScenarioError
 from ..fmi import Model, Workspace
+from ..master import ALGORITHMS, Explicit
 from ..run import Checked, check
 from ..system import System
 from ..wiring import Link
@@ -105,7 +106,7 @@ def _chosen(platforms: Sequence[str]) -> tuple[str, ...]:
 def _refused(system: System, checked: Checked, platforms: Sequence[str]) -> list[str]:
     problems = [problem for link in checked.wiring.links for problem in _refused_link(link)]
     lost = {
-        f"algorithm = {system.algorithm}": system.algorithm not in ("gauss-seidel", "jacobi"),
+        f"algorithm = {system.algorithm}": not issubclass(ALGORITHMS[system.algorithm], Explicit),
         f"extrapolation = {system.extrapolation}": bool(system.extrapolation),
         "algebraic_loops = solve": system.algebraic_loops == "solve",
         "[[events]]": bool(system.events),
@@ -183,7 +184,7 @@ def _container(
         raise RailcosimError(
             "packing needs fmu-manipulation-toolbox: pip install fmu-manipulation-toolbox (extra 'railcosim[pack]')"
         ) from error
-    sequential = system.algorithm == "gauss-seidel"
+    sequential = ALGORITHMS[system.algorithm].in_order
     try:
         with _silent():
             container = FMUContainer(_LIBRARY, folder)
@@ -252,7 +253,8 @@ def _digest(archive: Mapping[str, bytes], exposed: Sequence[Exposed], system: Sy
 
 def _notes(system: System, checked: Checked) -> Iterator[str]:
     yield from checked.notes
-    if system.algorithm == "jacobi":
+    if not ALGORITHMS[system.algorithm].is_sweeping:
         late = {f"{link.source[0]}.{link.source[1]}" for link in checked.wiring.links if link.direct}
         if late:
-            yield f"jacobi: {', '.join(sorted(late))} pass directly through their models and act one step late"
+            names = ", ".join(sorted(late))
+            yield f"{system.algorithm}: {names} pass directly through their models and act one step late"

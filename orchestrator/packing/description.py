@@ -10,6 +10,7 @@ from typing import Any
 from lxml import etree
 
 from ..fmi import Unit
+from ..master import ALGORITHMS
 from ..run import Checked
 from ..system import System
 from .exposure import Exposed
@@ -148,7 +149,7 @@ def page(system: System, checked: Checked, exposed: Sequence[Exposed]) -> str:
     )
     how = (
         f"in the order {', '.join(checked.order.sequence)}, each with what the others gave last"
-        if system.algorithm == "gauss-seidel"
+        if ALGORITHMS[system.algorithm].in_order
         else "all at once; what passes directly through a model acts one step late"
     )
     return (

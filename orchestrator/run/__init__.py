@@ -1,5 +1,6 @@
 """One run: checked, simulated, recorded, judged, and written to a directory from which it can go on."""
 
+from .assembly import assembled
 from .checking import Checked, check, describe_stepping
 from .checkpoint import CHECKPOINT_FILE, read_checkpoint
 from .execution import at_half_the_step, execute, go_on, resume, run
@@ -15,6 +16,7 @@ __all__ = [
     "Progress",
     "Results",
     "Run",
+    "assembled",
     "at_half_the_step",
     "check",
     "describe_stepping",

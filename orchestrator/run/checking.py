@@ -11,9 +11,8 @@ from ..evaluation import check_metrics, check_published, check_requirements, met
 from ..figures import check_figures
 from ..fmi import Interface, Kind, Model, Workspace, load_models
 from ..isolation import check_isolation, check_once_per_process, isolation_notes
-from ..master import check_coupling, check_events, describe_coupling
-from ..master.algorithms import find_blocks
-from ..system import ALGORITHMS, SWEEPING, System, split
+from ..master import ALGORITHMS, check_coupling, check_events, describe_coupling
+from ..system import System, split
 from ..wiring import Order, Wiring, derive_order, wire
 
 _MOST_STEPS = 1e15
@@ -44,6 +43,8 @@ def check(system: System, workspace: Workspace, kind: Kind = "auto") -> Checked:
         ScenarioError: with every problem found, each naming its place and the remedy.
     """
     problems = _check_simulation(system)
+    if system.algorithm not in ALGORITHMS:  # nothing more can be said of it
+        raise ScenarioError(problems)
     try:
         models = load_models(system, workspace, kind)
     except ScenarioError as error:
@@ -54,7 +55,7 @@ def check(system: System, workspace: Workspace, kind: Kind = "auto") -> Checked:
     problems += check_isolation(system) + check_once_per_process(system, interfaces)
     names = signal_names(interfaces, wiring)
     every_step = system.record is None or abs(system.record - system.step) < 1e-9 * system.step
-    every_step &= system.algorithm != "adaptive"
+    every_step &= not ALGORITHMS[system.algorithm].varies_step
     system, left_out = _without_the_missing(system, interfaces, names, every_step)
     problems += check_events(system, interfaces, wiring)
     problems += check_coupling(system, interfaces, wiring)
@@ -139,7 +140,9 @@ def _check_times(system: System) -> list[str]:
         return [f"step must be a positive number, not {system.step!r} s"]
     if not 0.0 < system.stop_time - system.start_time < math.inf:
         return [f"stop_time {system.stop_time!r} s must lie after start_time {system.start_time!r} s"]
-    if system.algorithm == "adaptive":  # which lands wherever it is told to
+    if (
+        system.algorithm in ALGORITHMS and ALGORITHMS[system.algorithm].varies_step
+    ):  # which lands wherever it is told to
         wrong = system.record is not None and not 0.0 < system.record < math.inf
         return [f"record must be a positive number, not {system.record!r} s"] if wrong else []
     record = system.step if system.record is None else system.record
@@ -157,18 +160,10 @@ def _check_times(system: System) -> list[str]:
 def describe_stepping(checked: Checked) -> list[str]:
     """How a run would step, a line each."""
     system = checked.system
-    lines = []
-    if system.algorithm in SWEEPING:
-        lines.append(f"{system.algorithm} steps in the order: {', '.join(checked.order.sequence)}")
-    elif system.algorithm == "jacobi":
-        lines.append("jacobi: all instances step in parallel; a feed-through output acts one step late")
-    else:
-        blocks = find_blocks({name: model.interface for name, model in checked.models.items()}, checked.wiring.links)
-        if blocks.sampled:
-            lines.append(f"iterative steps first, at the values of the step's begin: {', '.join(blocks.sampled)}")
-        for group in blocks.continuous:
-            repeated = not blocks.cyclic.isdisjoint(group)
-            lines.append(f"iterative {'repeats until they agree' if repeated else 'steps once'}: {', '.join(group)}")
+    interfaces = {name: model.interface for name, model in checked.models.items()}
+    algorithm = ALGORITHMS[system.algorithm]
+    steps = [f"steps in the order: {', '.join(checked.order.sequence)}"] if algorithm.in_order else []
+    lines = [f"{algorithm.name} {line}" for line in (*steps, *algorithm.fit(system, interfaces, checked.wiring).steps)]
     for instance in system.instances.values():
         if instance.step is not None:
             lines.append(f"{instance.name} steps every {instance.step:g} s")
@@ -191,6 +186,6 @@ def _notes(system: System, models: Mapping[str, Model], wiring: Wiring, order: O
             notes[f"{model} says that it needs the tool it was made with ({interface.generator or 'unnamed'})"] = None
     notes.update(dict.fromkeys(isolation_notes(system, models)))
     notes.update(dict.fromkeys(describe_coupling(system, interfaces, wiring)))
-    if system.algorithm in SWEEPING:
+    if ALGORITHMS[system.algorithm].in_order:
         notes.update(dict.fromkeys(order.late))
     return list(notes)

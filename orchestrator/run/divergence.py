@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 
 from ..errors import FmuError
 from ..fmi import Interface
-from ..master import find_loops
+from ..master import ALGORITHMS, find_loops
 from ..system import System
 from ..wiring import Link
 from .results import Results
@@ -61,7 +61,7 @@ def explain_divergence(
         results: what was recorded.
         error: what the run failed of, if it did.
     """
-    if system.algorithm == "adaptive":  # it holds the error or fails, and its rows are of uneven length
+    if ALGORITHMS[system.algorithm].varies_step:  # it holds the error or fails, and its rows are of uneven length
         return ""
     failed = isinstance(error, FmuError)
     for group in _cycles(links):
@@ -166,7 +166,7 @@ def _advice(system: System, interfaces: Mapping[str, Interface], links: Sequence
     members = interfaces.values()
     moving = any(interface.interpolates_inputs for interface in members)
     ways = ["take a smaller step"]
-    if system.algorithm == "iterative":
+    if ALGORITHMS[system.algorithm].solves_loops:
         ways += ["let inputs move over it by extrapolation = 1"] if moving and not system.extrapolation else []
     elif system.algebraic_loops == "delay" and find_loops(interfaces, links, doubtful=True):
         ways = ['let its algebraic loop be solved at each communication point by algebraic_loops = "solve"']

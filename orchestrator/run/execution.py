@@ -13,7 +13,7 @@ from ..evaluation import evaluate_metrics, judge_published, judge_requirements
 from ..figures import draw
 from ..fmi import Kind, Workspace
 from ..fmi.binding import forget_paths
-from ..system import Algorithm, Instance, System
+from ..system import Instance, System
 from . import checkpoint
 from . import record as record_file
 from .checking import Checked, check
@@ -28,7 +28,7 @@ def run(
     *,
     stop_time: float | None = None,
     step: float | None = None,
-    algorithm: Algorithm | None = None,
+    algorithm: str | None = None,
     kind: Kind = "auto",
     output: str | Path | None = None,
     figures: bool = True,
@@ -47,8 +47,8 @@ def run(
             process; ``"auto"`` takes native where it can.
         output: directory for results, metrics and figures; without one everything stays in memory.
         figures: whether to draw the system's figures (only with an output directory).
-        threads: how many threads step the instances in parallel, with ``jacobi`` and compiled FMUs; results are the
-            same to the bit.
+        threads: how many threads step the instances in parallel, with compiled FMUs and an algorithm that can
+            (``jacobi``); results are the same to the bit.
         checkpoint_every: distance in s of the points from which `resume` can go on; needs an output directory.
         progress: called at every per cent of the run and at least ten times a second.
 
@@ -218,7 +218,7 @@ def at_half_the_step(system: System) -> System:
     return _override(replace(system, record=system.record or system.step), None, 0.5 * system.step, None)
 
 
-def _override(system: System, stop_time: float | None, step: float | None, algorithm: Algorithm | None) -> System:
+def _override(system: System, stop_time: float | None, step: float | None, algorithm: str | None) -> System:
     changes: dict[str, Any] = {}
     if stop_time is not None and stop_time != system.stop_time:
         changes["stop_time"] = stop_time

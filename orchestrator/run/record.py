@@ -12,7 +12,8 @@ from pathlib import Path
 from typing import Any
 
 from ..isolation import is_isolated
-from ..system import SWEEPING, System
+from ..master import ALGORITHMS
+from ..system import System
 from . import rows
 from .checking import Checked
 from .checkpoint import CHECKPOINT_FILE
@@ -77,7 +78,7 @@ def finish(directory: Path, outcome: Run, kind: str) -> None:
 
 
 def _describe(system: System, checked: Checked, kind: str) -> dict[str, Any]:
-    starts = checked.wiring.starts
+    starts, in_order = checked.wiring.starts, ALGORITHMS[system.algorithm].in_order
     return {
         "scenario": system.name,
         "path": system.path,
@@ -90,8 +91,8 @@ def _describe(system: System, checked: Checked, kind: str) -> dict[str, Any]:
         "record": system.record or system.step,
         "seed": system.seed,
         "algorithm": system.algorithm,
-        "order": list(checked.order.sequence) if system.algorithm in SWEEPING else None,
-        "late": list(checked.order.late) if system.algorithm in SWEEPING else None,
+        "order": list(checked.order.sequence) if in_order else None,
+        "late": list(checked.order.late) if in_order else None,
         "extrapolation": system.extrapolation,
         "algebraic_loops": system.algebraic_loops,
         "steps": {name: instance.step for name, instance in system.instances.items() if instance.step is not None},

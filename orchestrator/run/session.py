@@ -16,10 +16,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import RunError, ScenarioError, StoppedError
-from ..fmi import Kind, Slave
-from ..isolation import instantiate
-from ..master import Master, Rows, Settings
+from ..fmi import Kind
+from ..master import ALGORITHMS, Master, Rows
 from . import record as record_file
+from .assembly import assembled
 from .checking import Checked
 from .checkpoint import Checkpoint
 from .outcome import Status
@@ -72,7 +72,6 @@ class Session:
         self.seconds: dict[str, float] = {"setup": 0.0, "stepping": 0.0, "steps": 0}
         self.coupling: dict[str, Any] = {}
         self._past = past
-        self._slaves: dict[str, Slave] = {}
         self._recorder: Recorder | None = None
         self._stopped = threading.Event()
 
@@ -87,13 +86,8 @@ class Session:
         """
         with _interruptible(self._stopped):
             try:
-                master = self._begin()
-                self.seconds["setup"] = clock.perf_counter() - begin
-                try:
-                    self.status = "completed" if self._step(master) else "interrupted"
-                    master.terminate()
-                finally:
-                    self.coupling = master.report()
+                with assembled(self.checked, threads=self.job.threads) as master:
+                    self._simulate(master, begin)
             except StoppedError as error:
                 self.status, self.error = "terminated", error
             except RunError as error:
@@ -104,20 +98,23 @@ class Session:
                 if self.job.directory is not None:
                     record_file.abandon(self.job.directory, error)
                 raise
-            finally:
-                if self._recorder is not None:
-                    self._recorder.close()
-                for slave in self._slaves.values():
-                    slave.free()
 
-    def _begin(self) -> Master:
-        """Instances in their initial state, or that of the checkpoint, with the rows up to there."""
-        system, checked, wiring = self.system, self.checked, self.checked.wiring
-        for name, model in checked.models.items():
-            self._slaves[name] = instantiate(model, system.instances[name])
-        settings = Settings.of(system, self.job.threads)
-        sequence = checked.order.sequence
-        master = Master(self._slaves, sequence, wiring.links, wiring.starts, system.algorithm, settings=settings)
+    def _simulate(self, master: Master, begin: float) -> None:
+        try:
+            self._begin(master)
+            self.seconds["setup"] = clock.perf_counter() - begin
+            try:
+                self.status = "completed" if self._step(master) else "interrupted"
+                master.terminate()
+            finally:
+                self.coupling = master.report()
+        finally:
+            if self._recorder is not None:
+                self._recorder.close()
+
+    def _begin(self, master: Master) -> None:
+        """Bring instances to their initial state, or that of the checkpoint, and the rows up to there."""
+        system = self.system
         master.initialize(system.start_time, system.stop_time, may_go_on=self.job.checkpoint_every is not None)
         if self.job.begin is None or self._past is None:
             self._recorder = Recorder(master.signals, master.kinds, self.job.directory)
@@ -126,16 +123,16 @@ class Session:
             self.job.begin.restore(master)
             past, there = self._past[: self.job.begin.rows], len(self._past)
             self._recorder = Recorder(master.signals, master.kinds, self.job.directory, past, there)
-        return master
 
     def _step(self, master: Master) -> bool:
         """The communication steps, with checkpoints between them; True unless they were interrupted."""
         system, every = self.system, self.job.checkpoint_every
         count = round((system.stop_time - system.start_time) / system.step)
-        row_every: float = int(system.algorithm != "adaptive")
+        varies = ALGORITHMS[system.algorithm].varies_step
+        row_every: float = 0 if varies else 1
         if system.record is not None:
             row_every = system.record / system.step
-            row_every = row_every if system.algorithm == "adaptive" else round(row_every)
+            row_every = row_every if varies else round(row_every)
         stride = count if every is None else max(1, round(every / system.step))
         observe = self._observer(master)
         begin, before = clock.perf_counter(), master.steps

@@ -9,7 +9,7 @@ from __future__ import annotations
 import math
 import os
 import re
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Collection
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -289,13 +289,13 @@ def truth(entry: Entry, problems: list[str]) -> bool:
     return entry.value is True
 
 
-def choice(entry: Entry, problems: list[str], valid: Sequence[str], what: str) -> str:
+def choice(entry: Entry, problems: list[str], valid: Collection[str], what: str) -> str:
     """One of a few words; `what` they are called in the message."""
     if entry.value in valid:
         return str(entry.value)
     near = did_you_mean(str(entry.value), valid) or f"; there are {', '.join(valid)}"
     problems.append(entry.problem(f"there is no {what} {shown(entry.value)}{near}"))
-    return valid[0]
+    return next(iter(valid))
 
 
 def shown(value: Any) -> str:

@@ -7,7 +7,8 @@ from collections.abc import Mapping
 from typing import Any
 
 from ..errors import ScenarioError
-from ..system import ACCELERATIONS, ALGORITHMS, LOOPS
+from ..master import ALGORITHMS
+from ..system import ACCELERATIONS, LOOPS
 from .groups import Entry, choice, number, positive, shown, whole, whole_multiple
 from .patterns import Counts, read_signal
 
@@ -120,7 +121,9 @@ def _grid(entries: Mapping[str, Entry], values: Mapping[str, Any]) -> list[str]:
     if stop <= start:
         return [entries["stop_time"].problem(f"the stop time, {stop:g} s, must be later than the start, {start:g} s")]
     record = values.get("record")
-    if values.get("algorithm") == "adaptive":  # a step ends wherever a row or the end is due
+    if (
+        "algorithm" in values and ALGORITHMS[values["algorithm"]].varies_step
+    ):  # a step ends wherever a row or the end is due
         if record is not None and record <= 0:
             return [entries["record"].problem(f"the distance of rows must be greater than 0 s, not {record:g} s")]
         return []

@@ -1,7 +1,14 @@
-"""The master algorithms, one file each."""
+"""The master algorithms, one file each: what each needs, what it can, and how it takes a step.
 
-from .iterative import find_blocks
+A file that stands here is found; nothing else needs to know of it.
+"""
 
-__all__ = [
-    "find_blocks",
-]
+from importlib import import_module
+from pkgutil import iter_modules
+
+from .algorithm import ALGORITHMS, Algorithm, Batch, Explicit, Fit, FixedStep, Operation, VariableStep
+
+for _module in iter_modules(__path__):
+    import_module(f"{__name__}.{_module.name}")
+
+__all__ = ["ALGORITHMS", "Algorithm", "Batch", "Explicit", "Fit", "FixedStep", "Operation", "VariableStep"]

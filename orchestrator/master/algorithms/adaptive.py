@@ -11,14 +11,17 @@ a step that would be accepted is taken whole once more, with the inputs of its e
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
 from typing import Any
 
 from ...errors import CouplingError, FmuError, LostError, RunError, StoppedError
 from ...fmi import Interface, Variable
-from ...wiring import is_direct
-from ..exchange import Exchange
+from ...system import System, split
+from ...wiring import Wiring, is_direct
+from ..coupling import Coupling
+from .algorithm import Fit, VariableStep
+from .refusals import cannot
 
 _SAFETY, _SMALLEST, _LARGEST = 0.9, 0.2, 5.0
 """How a step may change: of the step that the error estimate asks for, and by which factors at most."""
@@ -27,6 +30,10 @@ _AT_END = {1: 3.0, 2: 1.8, 3: 1.9}
 course: polynomials through former points have the error constants 1/2, 5/12, 3/8; with the end -1/2, -1/12, -1/24."""
 _ROUNDING = 1e-9
 """Part of a step that is not worth a step of its own."""
+_TOLERANCE = 1e-4
+"""Relative tolerance of the error of a step, where the system gives none."""
+_SHORTEST = 2.0**-20
+"""Part of the longest step that the shortest is, where nothing else is said."""
 
 
 def is_watched(interface: Interface, variable: Variable) -> bool:
@@ -55,46 +62,67 @@ class _Point:
     memory: Any
 
 
-@dataclass
-class Adaptive:
-    """Chooses communication steps.
+class Adaptive(VariableStep):
+    """Steps as long as a tolerance lets them be, by step doubling; within each, instances step one after the other."""
 
-    Attributes:
-        exchange: the values.
-        sweep: takes one step of given time and length, both in s, with the inputs of its begin or, ``ended``, with the
-            present ones as those of its end; a newer state may be given up again.
-        watched: places of the values whose error counts. tolerances: relative and absolute, by place.
-        longest, shortest: bounds of the step in s.
-        order: of the coupling's error over the whole run.
-        save, restore: what is remembered beside states and values.
-    """
+    name = "adaptive"
+    in_order = True
 
-    exchange: Exchange
-    sweep: Callable[[float, float, bool], None]
-    watched: Sequence[int]
-    tolerances: Sequence[tuple[float, float]]
-    longest: float
-    shortest: float
-    order: int = 1
-    save: Callable[[], Any] = lambda: None
-    restore: Callable[[Any], None] = lambda saved: None
-    length: float = 0.0
-    tally: Tally = field(default_factory=Tally)
+    def __init__(self, coupling: Coupling) -> None:
+        super().__init__(coupling)
+        settings, exchange = coupling.settings, coupling.exchange
+        self.exchange, self.tally = exchange, Tally()
+        self.tolerances = coupling.tolerances(_TOLERANCE)
+        self.shortest = settings.min_step
+        self.order = 1 + settings.extrapolation
+        """Of the coupling's error over the whole run."""
+        self.watched = [
+            place
+            for (instance, name), place in exchange.places.items()
+            if is_watched(coupling.interfaces[instance], coupling.interfaces[instance].variables[name])
+        ]
+        """Places of the values whose error counts."""
 
-    def advance(self, time: float, until: float) -> float:
-        """Take one step from ``time`` that does not pass ``until``; the time it ends at, all in s.
+    @classmethod
+    def fit(cls, system: System, interfaces: Mapping[str, Interface], wiring: Wiring) -> Fit:
+        """States are saved and steps vary, so nothing may count steps."""
+        sampled = [name for name, interface in interfaces.items() if interface.vendor.get("sampled")]
+        others = {name: interface for name, interface in interfaces.items() if name not in sampled}
+        problems = [
+            *cannot(
+                sampled,
+                "sampled at points of its own, which adaptive cannot step over; choose gauss-seidel or iterative",
+            ),
+            *cannot(
+                [name for name, interface in others.items() if not interface.can_save_state],
+                "the state that adaptive comes back to cannot be saved (canGetAndSetFMUstate is false); choose "
+                "gauss-seidel",
+            ),
+            *cannot(
+                [name for name, interface in others.items() if not interface.variable_step],
+                "the step cannot vary (canHandleVariableCommunicationStepSize is false); choose gauss-seidel or "
+                "iterative",
+            ),
+            *cannot(
+                sorted({link.connection.target for link in wiring.links if link.delay}),
+                "a delay counts communication points, which adaptive sets anew at every run; leave the delay out, or "
+                "choose gauss-seidel",
+            ),
+        ]
+        return Fit(problems, list(_unwatched(system, interfaces)))
 
-        Raises:
-            CouplingError: the error is too large at the shortest step.
-            FmuError: an FMU failed even then.
-        """
+    # ---------------------------------------------------------------- on the way
+
+    def advance(self, time: float, until: float, longest: float) -> float:
+        """Take one step, as `VariableStep.advance` says."""
+        shortest = longest * _SHORTEST if self.shortest is None else self.shortest
         begin = self._keep()
         kept = [begin]
-        wanted = min(self.length or self.longest, self.longest)
+        wanted = min(self.length or longest, longest)
         try:
             while True:
                 end, length = _fit(time, wanted, until)
-                is_shortest = length <= self.shortest * (1.0 + _ROUNDING)
+                is_shortest = length <= shortest * (1.0 + _ROUNDING)
                 try:
                     error, place = self._take(time, end, kept)
                 except RunError as failure:  # of a shorter step they may be capable
@@ -104,31 +132,41 @@ class Adaptive:
                 ideal = _SAFETY * error ** (-1.0 / (self.order + 1)) if error > 0.0 else _LARGEST
                 factor = min(_LARGEST, max(_SMALLEST, ideal))
                 if error <= 1.0:
-                    self._accept(length, wanted, factor)
+                    self._accept(length)
+                    # A step that was cut short to land on a point says little of how long the next may be.
+                    self.length = min(longest, max(length * factor, wanted if factor >= 1.0 else shortest))
                     return end
                 self.tally.rejected += 1
                 if is_shortest:
                     self._fail(time, length, error, place)
                 self._go_to(begin)
-                wanted = max(self.shortest, length * min(factor, _SAFETY))
+                wanted = max(shortest, length * min(factor, _SAFETY))
         finally:
             for point in kept:
                 self._forget(point)
 
+    def _sweep(self, time: float, length: float, ended: bool) -> None:
+        """A step that may be taken back, with the inputs of its begin or, ``ended``, the present ones as of its end."""
+        for slave in self.coupling.sequence:
+            self.coupling.write(slave.name, time, length, ended=ended)
+            slave.step(time, length, final=False)
+            self.exchange.read_finite(slave, time + length)
+        self.coupling.solve_loops(time + length)
+
     def _take(self, time: float, end: float, kept: list[_Point]) -> tuple[float, int]:
         """Take a step in two halves; its error as `_error` has it, and the place of the value that has it."""
         length, middle = end - time, 0.5 * (time + end)
-        self.sweep(time, length, False)
+        self._sweep(time, length, False)
         whole = self._seen()
         self._go_to(kept[0])
-        self.sweep(time, middle - time, False)
-        self.sweep(middle, end - middle, False)
+        self._sweep(time, middle - time, False)
+        self._sweep(middle, end - middle, False)
         halves = self._seen()
         found = self._error(whole, halves, 2.0**self.order - 1.0)
         if found[0] <= 1.0:
             kept.append(self._keep())
             self._go_to(kept[0], values=False)
-            self.sweep(time, length, True)
+            self._sweep(time, length, True)
             found = max(found, self._error(self._seen(), halves, _AT_END[self.order]))
             self._go_to(kept[-1])
         return found
@@ -136,14 +174,16 @@ class Adaptive:
     def _keep(self) -> _Point:
         """The present point, to come back to."""
         states = [slave.save() for slave in self.exchange.slaves.values()]
-        return _Point(states, list(self.exchange.values), self.save())
+        memory = self.coupling.extrapolator
+        return _Point(states, list(self.exchange.values), memory and memory.save())
 
     def _go_to(self, point: _Point, *, values: bool = True) -> None:
         for slave, state in zip(self.exchange.slaves.values(), point.states, strict=True):
             slave.restore(state)
         if values:
             self.exchange.values[:] = point.values
-        self.restore(point.memory)
+        if self.coupling.extrapolator is not None:
+            self.coupling.extrapolator.restore(point.memory)
 
     def _forget(self, point: _Point) -> None:
         for slave, state in zip(self.exchange.slaves.values(), point.states, strict=True):
@@ -169,12 +209,10 @@ class Adaptive:
                 worst, where = (error, k) if math.isfinite(error) else (math.inf, k)
         return worst, where
 
-    def _accept(self, length: float, wanted: float, factor: float) -> None:
+    def _accept(self, length: float) -> None:
         self.tally.accepted += 1
         self.tally.shortest = min(self.tally.shortest, length)
         self.tally.longest = max(self.tally.longest, length)
-        # A step that was cut short to land on a point says little of how long the next may be.
-        self.length = min(self.longest, max(length * factor, wanted if factor >= 1.0 else self.shortest))
 
     def _fail(self, time: float, length: float, error: float, place: int) -> None:
         relative, absolute = self.tolerances[place]
@@ -184,6 +222,31 @@ class Adaptive:
             f"absolute): its error is {error:.3g} times as large at the shortest step, {length:g} s; loosen "
             f"simulation.tolerance, or this signal's in [simulation.tolerances], or allow a smaller simulation.min_step"
         )
+
+    def report(self) -> dict[str, Any]:
+        """Steps taken and their lengths."""
+        tally = self.tally
+        shortest = None if math.isinf(tally.shortest) else tally.shortest
+        return {
+            "accepted": tally.accepted,
+            "rejected": tally.rejected,
+            "shortest_step": shortest,
+            "longest_step": tally.longest,
+            "summary": f"{tally.accepted} steps accepted, {tally.rejected} rejected, between {shortest or 0.0:.3g} and "
+            f"{tally.longest:.3g} s long",
+        }
+
+
+def _unwatched(system: System, interfaces: Mapping[str, Interface]) -> Iterable[str]:
+    """Tolerances that it has no use for."""
+    for signal in system.tolerances:
+        instance, name = split(signal)
+        interface = interfaces.get(instance)
+        scalars = interface.scalars(name) if interface is not None else None
+        if interface is None or scalars is None:  # told elsewhere
+            continue
+        if not any(is_watched(interface, interface.variables[scalar]) for scalar in scalars):
+            yield f"the tolerance of {signal} has no effect: adaptive watches continuous outputs without feed-through"
 
 
 def _is_fatal(failure: RunError) -> bool:
@@ -199,14 +262,3 @@ def _fit(time: float, wanted: float, until: float) -> tuple[float, float]:
     if left < 2.0 * wanted:
         wanted = 0.5 * left
     return time + wanted, time + wanted - time
-
-
-def describe(tally: Tally) -> dict[str, Any]:
-    """For the record of the run."""
-    shortest = None if math.isinf(tally.shortest) else tally.shortest
-    return {
-        "accepted": tally.accepted,
-        "rejected": tally.rejected,
-        "shortest_step": shortest,
-        "longest_step": tally.longest,
-    }

@@ -7,23 +7,24 @@ step's begin, and step first.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Mapping, Sequence
-from dataclasses import dataclass, field
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
 from typing import Any
 
 import networkx as nx
 import numpy as np
-from numpy.typing import NDArray
 
 from ...errors import CouplingError, FmuError, StoppedError
 from ...fmi import Interface
-from ...system import Acceleration
-from ...wiring import Link, derive_order
-from ..exchange import Exchange
+from ...system import System
+from ...wiring import Link, Wiring, derive_order
+from ..coupling import Coupling
+from .acceleration import ACCELERATIONS, Vector
+from .algorithm import Fit, FixedStep
+from .refusals import cannot, listed
 
-Vector = NDArray[np.float64]
-_DEPTH = 5
-"""Former iterates that Anderson's method combines."""
+_TOLERANCE = 1e-8
+"""Relative tolerance of what is exchanged, where the system gives none."""
 
 
 @dataclass(frozen=True)
@@ -70,34 +71,49 @@ class Tally:
     residual: float = 0.0
 
 
-@dataclass
-class Iterative:
-    """Takes communication steps that agree at their end.
+class Iterative(FixedStep):
+    """Steps of coupled instances are repeated from saved states until what is exchanged agrees at their end."""
 
-    Attributes:
-        exchange: the values; its sampled components' outputs are parted into direct ones and others.
-        blocks: how the system is stepped.
-        write: sets the inputs of an instance for a step (name, time, length).
-        tolerances: relative and absolute, by place of the value.
-        max_iterations, relaxation, acceleration: of the fixed-point iteration; relaxation is the first one of Aitken's
-            and the mixing of Anderson's.
-    """
+    name = "iterative"
+    solves_loops = True
+    is_of_end = True
 
-    exchange: Exchange
-    blocks: Blocks
-    write: Callable[[str, float, float], None]
-    tolerances: Sequence[tuple[float, float]]
-    max_iterations: int = 50
-    relaxation: float = 1.0
-    acceleration: Acceleration = "anderson"
-    tally: Tally = field(default_factory=Tally)
-
-    def __post_init__(self) -> None:
+    def __init__(self, coupling: Coupling) -> None:
+        super().__init__(coupling)
+        settings, exchange = coupling.settings, coupling.exchange
+        self.exchange, self.tally = exchange, Tally()
+        self.blocks = find_blocks(coupling.interfaces, exchange.links)
+        self.tolerances = coupling.tolerances(_TOLERANCE)
+        self.max_iterations = settings.max_iterations
+        self.relaxation, self.acceleration = settings.relaxation, settings.acceleration
         self._exchanged = {
             group: self._find_exchanged(group)
             for group in self.blocks.continuous
             if not self.blocks.cyclic.isdisjoint(group)
         }
+
+    @classmethod
+    def fit(cls, system: System, interfaces: Mapping[str, Interface], wiring: Wiring) -> Fit:
+        """States must be saved where steps are repeated."""
+        blocks = find_blocks(interfaces, wiring.links)
+        lost = cannot(
+            [name for name in interfaces if name in blocks.cyclic and not interfaces[name].can_save_state],
+            "in a cycle, and the state that iterative comes back to cannot be saved (canGetAndSetFMUstate is false); "
+            "choose gauss-seidel or jacobi, or break the cycle by a delay",
+        )
+        notes = []
+        able = sorted(name for name in blocks.cyclic if interfaces[name].interpolates_inputs)
+        if able and not system.extrapolation:
+            notes.append(f"{listed(able)} can interpolate inputs: extrapolation = 1 makes iterative second order there")
+        steps = []
+        if blocks.sampled:
+            steps.append(f"steps first, at the values of the step's begin: {', '.join(blocks.sampled)}")
+        for group in blocks.continuous:
+            repeated = not blocks.cyclic.isdisjoint(group)
+            steps.append(f"{'repeats until they agree' if repeated else 'steps once'}: {', '.join(group)}")
+        return Fit(list(lost), notes, steps)
+
+    # ---------------------------------------------------------------- on the way
 
     def _find_exchanged(self, group: Sequence[str]) -> tuple[list[int], list[int]]:
         """Places of the values that one of the group gives to another or itself.
@@ -115,16 +131,11 @@ class Iterative:
         guessed = {k for k, early in passed if early}
         return sorted(guessed), sorted({k for k, _ in passed} - guessed)
 
-    def advance(self, time: float, length: float) -> None:
-        """Take one step from ``time`` of ``length``, both in s.
-
-        Raises:
-            CouplingError: it does not converge.
-            FmuError: an FMU failed.
-        """
+    def take(self, number: int, time: float, length: float) -> None:
+        """Take a step, as `FixedStep.take` says."""
         exchange, end = self.exchange, time + length
         for name in self.blocks.sampled:
-            self.write(name, time, length)
+            self.coupling.write(name, time, length)
             exchange.slaves[name].step(time, length)
             exchange.read_finite(exchange.slaves[name], end, direct=True)
         for group in self.blocks.continuous:
@@ -138,7 +149,7 @@ class Iterative:
 
     def _sweep(self, group: Sequence[str], time: float, length: float, *, final: bool) -> None:
         for name in group:
-            self.write(name, time, length)
+            self.coupling.write(name, time, length)
             self.exchange.slaves[name].step(time, length, final=final)
             self.exchange.read_finite(self.exchange.slaves[name], time + length)
 
@@ -150,7 +161,7 @@ class Iterative:
         unknowns = slice(sum(exchange.kinds[k] == "Real" for k in guessed))
         states = [slave.save() for slave in slaves]
         try:
-            next_guess = _ACCELERATIONS[self.acceleration](self.relaxation)
+            next_guess = ACCELERATIONS[self.acceleration](self.relaxation)
             wrong: list[int] = []
             sizes: list[float] = []
             error = scale = np.zeros(0)
@@ -225,6 +236,18 @@ class Iterative:
             "simulation.relaxation"
         )
 
+    def report(self) -> dict[str, Any]:
+        """Iterations and the worst residual."""
+        tally = self.tally
+        mean = tally.iterations / tally.steps if tally.steps else 0.0
+        return {
+            "iterations_per_step": mean,
+            "most_iterations": tally.most,
+            "worst_residual_per_tolerance": tally.residual,
+            "summary": f"{mean:.3g} iterations per step, at most {tally.most}; worst residual {tally.residual:.2g} of "
+            "the tolerance",
+        }
+
 
 def _largest(errors: Vector) -> float:
     return float(errors.max(initial=0.0))
@@ -233,64 +256,3 @@ def _largest(errors: Vector) -> float:
 _HOPELESS, _GROWN = 1e12, 10.0
 """How many times farther apart than at first values are that nothing will bring together, or that are getting away."""
 _SHOWN = 3
-
-
-# -------------------------------------------------------------------- from what was tried to what is tried next
-
-
-def _relaxed(relaxation: float) -> Callable[[Vector, Vector], Vector]:
-    """Part of the way, or more than all of it."""
-    return lambda guess, reached: guess + relaxation * (reached - guess)
-
-
-def _aitken(relaxation: float) -> Callable[[Vector, Vector], Vector]:
-    """Aitken's dynamic relaxation (Irons and Tuck 1969; Küttler and Wall 2008, eq. 44)."""
-    factor, before = relaxation, None
-
-    def following(guess: Vector, reached: Vector) -> Vector:
-        nonlocal factor, before
-        residual = reached - guess
-        if before is not None:
-            change = residual - before
-            size = float(change @ change)
-            if size > 0.0:
-                factor *= -float(before @ change) / size
-        before = residual
-        return np.asarray(guess + factor * residual)
-
-    return following
-
-
-def _anderson(relaxation: float) -> Callable[[Vector, Vector], Vector]:
-    """Anderson's method (Anderson 1965; Walker and Ni 2011, algorithm AA): the best combination of former iterates."""
-    guesses: list[Vector] = []
-    residuals: list[Vector] = []
-
-    def following(guess: Vector, reached: Vector) -> Vector:
-        residual = reached - guess
-        guesses.append(guess)
-        residuals.append(residual)
-        del guesses[: -_DEPTH - 1], residuals[: -_DEPTH - 1]
-        if len(residuals) == 1:
-            return np.asarray(guess + relaxation * residual)
-        steps = np.diff(np.array(guesses), axis=0).T
-        changes = np.diff(np.array(residuals), axis=0).T
-        if not np.isfinite(changes).all():
-            return np.full_like(guess, np.nan)
-        weights = np.linalg.lstsq(changes, residual, rcond=1e-14)[0]
-        return np.asarray(guess + relaxation * residual - (steps + relaxation * changes) @ weights)
-
-    return following
-
-
-_ACCELERATIONS: Mapping[str, Callable[[float], Callable[[Vector, Vector], Vector]]] = {
-    "none": _relaxed,
-    "aitken": _aitken,
-    "anderson": _anderson,
-}
-
-
-def describe(tally: Tally) -> dict[str, Any]:
-    """For the record of the run."""
-    mean = tally.iterations / tally.steps if tally.steps else 0.0
-    return {"iterations_per_step": mean, "most_iterations": tally.most, "worst_residual_per_tolerance": tally.residual}

@@ -8,9 +8,10 @@ import sys
 import numpy as np
 import pytest
 import typer
-from railcosim.orchestrator import System
+from railcosim.orchestrator import System, load, run
 from railcosim.orchestrator.cli import analysis as cli_analysis
 from railcosim.orchestrator.errors import ScenarioError
+from railcosim.orchestrator.isolation import isolate
 from railcosim.orchestrator.linearization.blocks import differences
 from railcosim.orchestrator.linearization.closed_loop import Linearization, linearize
 from railcosim.orchestrator.linearization.modes import stability
@@ -427,3 +428,20 @@ def test_an_unstable_loop_ends_with_1(orchestrate, tmp_path):
     assert done.exit_code == 1
     assert "unstable: 1 mode grows" in done.output
     assert orchestrate(*arguments, "--quiet").output == ""
+
+
+@needs_native
+def test_whole_numbers_reach_their_inputs_after_compiled_steps():
+    """CAILC takes the trip's number: what the kernel leaves as doubles must be whole again for calls from Python."""
+    system = load("cailc")
+    model = linearize(system, 20 * system.step, kind="native")
+    assert np.isfinite(model.a).all()
+    assert model.values["train.position"] == run(system, stop_time=20 * system.step)["train.position"][-1]
+
+
+@needs_native
+def test_isolated_instances_give_the_same_model():
+    system = load("comfort_cruise")
+    plain, isolated = linearize(system, 1.0), linearize(isolate(system, ["train"]), 1.0)
+    assert (plain.a.tolist(), plain.b.tolist()) == (isolated.a.tolist(), isolated.b.tolist())
+    assert plain.values == isolated.values

@@ -489,7 +489,7 @@ NAMES = (
 def arguments(workspace, odd):
     """What the kernel is called with for a ring, by name."""
     master = instantiated(ring(odd, 3), workspace)
-    plan = [array.copy() for array in CompiledLoop(master)._plan]
+    plan = [array.copy() for array in CompiledLoop(master.coupling, master.algorithm)._plan]
     values = np.array(master.values)
     changes = np.zeros(1, compiled._CHANGES)
     rows = np.empty((8, len(values) + 1))

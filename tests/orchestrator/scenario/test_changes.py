@@ -126,7 +126,7 @@ def test_sample_times_follow_the_step(change):
             "two.toml:5: simulation.stop_time: 120 s is not a whole number of steps of 0.7 s (--step 0.7); ",
         ),
         ({"stop_time": -5}, "--stop -5: the stop time, -5 s, must be later than the start, 0 s"),
-        ({"algorithm": "euler"}, "--algorithm euler: there is no algorithm 'euler'; there are gauss-seidel, jacobi"),
+        ({"algorithm": "euler"}, "--algorithm euler: there is no algorithm 'euler'; there are adaptive, gauss-seidel"),
     ],
 )
 def test_what_is_said_about_a_mistake_on_the_command_line(changes, message):

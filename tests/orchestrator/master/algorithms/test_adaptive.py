@@ -9,7 +9,6 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from railcosim.orchestrator.errors import CouplingError, FmuError, ScenarioError
 from railcosim.orchestrator.fmi.binding.loaded import LoadedSlave
-from railcosim.orchestrator.master.algorithms import adaptive
 from railcosim.orchestrator.master.algorithms.adaptive import _fit
 from railcosim.orchestrator.run.checking import check
 from railcosim.orchestrator.run.execution import execute, run
@@ -309,7 +308,6 @@ def test_the_record_tells_how_it_went(mine, tmp_path):
     assert told["coupling"]["adaptive"] == outcome.coupling["adaptive"]
     assert told["algorithm"] == "adaptive"
     assert told["order"] == ["spring", "mass"]
-    assert adaptive.describe(adaptive.Tally())["shortest_step"] is None
 
 
 # -------------------------------------------------------------------- rows of uneven distance

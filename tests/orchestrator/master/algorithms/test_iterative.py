@@ -11,7 +11,10 @@ from railcosim.orchestrator.errors import CouplingError, FmuError
 from railcosim.orchestrator.fmi.binding.loaded import LoadedSlave
 from railcosim.orchestrator.fmi.plain import PlainSlave
 from railcosim.orchestrator.master.algorithms import iterative
-from railcosim.orchestrator.master.algorithms.iterative import _ACCELERATIONS, find_blocks
+from railcosim.orchestrator.master.algorithms.acceleration import ACCELERATIONS
+from railcosim.orchestrator.master.algorithms.iterative import find_blocks
+from railcosim.orchestrator.master.coupling import Coupling
+from railcosim.orchestrator.master.settings import DEFAULT
 from railcosim.orchestrator.run.execution import execute, run
 from railcosim.orchestrator.system import Connection, System
 from railcosim.orchestrator.wiring.resolution import Link
@@ -105,7 +108,7 @@ def mine(components):
 
 def iterate(name, step, start, count, relaxation=1.0):
     """The guesses of a method on x = step(x)."""
-    following, guess = _ACCELERATIONS[name](relaxation), np.array(start, dtype=float)
+    following, guess = ACCELERATIONS[name](relaxation), np.array(start, dtype=float)
     guesses = [guess]
     for _ in range(count):
         guess = following(guess, step(guess))
@@ -380,10 +383,12 @@ def test_saved_states_are_given_back(mine, monkeypatch, fails):
 
 
 def test_what_is_told_of_the_iterations():
-    tally = iterative.Tally(steps=4, iterations=10, most=5, residual=0.5)
-    assert iterative.describe(tally) == {
+    it = iterative.Iterative(Coupling({}, [], [], DEFAULT, is_sweeping=True, is_of_end=True))
+    assert it.report()["iterations_per_step"] == 0.0
+    it.tally = iterative.Tally(steps=4, iterations=10, most=5, residual=0.5)
+    assert it.report() == {
         "iterations_per_step": 2.5,
         "most_iterations": 5,
         "worst_residual_per_tolerance": 0.5,
+        "summary": "2.5 iterations per step, at most 5; worst residual 0.5 of the tolerance",
     }
-    assert iterative.describe(iterative.Tally())["iterations_per_step"] == 0.0

@@ -1,0 +1,84 @@
+"""Whether the master algorithm that a system asks for can be had with its FMUs; every refusal names them."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+
+from ..errors import did_you_mean
+from ..fmi import Interface
+from ..system import System
+from ..wiring import Wiring
+from .algebraic_loops import find_loops
+from .algorithms import ALGORITHMS
+from .algorithms.refusals import listed
+
+
+def check_coupling(system: System, interfaces: Mapping[str, Interface], wiring: Wiring) -> list[str]:
+    """What is wrong with algorithm, steps and tolerances, one sentence each."""
+    return [
+        *_check_rates(system),
+        *_check_tolerances(system, interfaces),
+        *ALGORITHMS[system.algorithm].fit(system, interfaces, wiring).problems,
+    ]
+
+
+def _check_rates(system: System) -> Iterable[str]:
+    duration = system.stop_time - system.start_time
+    for instance in system.instances.values():
+        if instance.step is None or instance.step == system.step:
+            continue
+        place = f"{instance.origin}: " if instance.origin else ""
+        if not ALGORITHMS[system.algorithm].takes_own_steps:
+            able = " and ".join(name for name, one in ALGORITHMS.items() if one.takes_own_steps)
+            yield f"{place}{instance.name} has a step of its own, which goes with {able} only"
+        elif system.algebraic_loops == "solve":
+            yield f"{place}{instance.name} has a step of its own, with which algebraic_loops = 'solve' does not go"
+        own = f"{place}{instance.name}: its step = {instance.step:g} s"
+        if not _is_multiple(instance.step, system.step):
+            yield f"{own} is not a whole multiple of the system's, {system.step:g} s"
+        elif not _is_multiple(duration, instance.step):
+            yield f"{own} does not divide the run of {duration:g} s into whole steps"
+
+
+def _is_multiple(length: float, step: float) -> bool:
+    count = length / step
+    return count > 0.5 and abs(count - round(count)) <= 1e-6
+
+
+def _check_tolerances(system: System, interfaces: Mapping[str, Interface]) -> Iterable[str]:
+    known = [
+        f"{name}.{variable}"
+        for name, interface in interfaces.items()
+        for variable in (*(v.name for v in interface.of("output") if v.type == "Real"), *interface.arrays)
+    ]
+    for signal in system.tolerances:
+        if signal not in known:
+            origin = system.origins.get(f"simulation.tolerances.{signal}", "")
+            place = f"{origin}: " if origin else ""
+            yield f"{place}simulation.tolerances: {signal!r} is no Real output{did_you_mean(signal, known)}"
+    if system.min_step is not None and not ALGORITHMS[system.algorithm].varies_step:
+        able = " and ".join(name for name, one in ALGORITHMS.items() if one.varies_step)
+        yield f"simulation.min_step is for {able}; the algorithm is {system.algorithm}"
+
+
+def describe_coupling(system: System, interfaces: Mapping[str, Interface], wiring: Wiring) -> list[str]:
+    """What a user should know of the coupling though it is no error: loops, and inputs that are held all the same."""
+    notes, algorithm = [], ALGORITHMS[system.algorithm]
+    for loop in find_loops(interfaces, wiring.links):
+        if system.algebraic_loops == "solve":
+            how = "it is solved at each communication point"
+        elif algorithm.solves_loops:
+            how = "it is solved by the iterations"
+        else:
+            how = (
+                "it is solved at initialization and acts one step late from then on; algebraic_loops = 'solve' solves "
+                "it at each communication point"
+            )
+        notes.append(f"algebraic loop through {listed(loop)}: {how}")
+    notes += algorithm.fit(system, interfaces, wiring).notes
+    if system.extrapolation:
+        held = [n for n, x in interfaces.items() if any(link.target[0] == n for link in wiring.links)]
+        held = [n for n in held if not interfaces[n].interpolates_inputs]
+        if held:
+            notes.append(f"inputs of {listed(held)} are held over a step: canInterpolateInputs is false")
+    return notes

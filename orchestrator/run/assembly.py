@@ -1,0 +1,40 @@
+"""From a checked system to a master of its instances: the one way to set up whatever steps them."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+
+from ..fmi import Slave
+from ..isolation import instantiate
+from ..master import Master, Settings
+from .checking import Checked
+
+
+@contextmanager
+def assembled(checked: Checked, *, threads: int = 1) -> Iterator[Master]:
+    """A master of all instances, each in a process of its own if it asks for that; they are freed at the end.
+
+    Args:
+        checked: the system, found fit to run.
+        threads: how many step instances in parallel.
+
+    Raises:
+        FmuError: an instance cannot be loaded or instantiated.
+    """
+    system, wiring = checked.system, checked.wiring
+    slaves: dict[str, Slave] = {}
+    try:
+        for name, model in checked.models.items():
+            slaves[name] = instantiate(model, system.instances[name])
+        yield Master(
+            slaves,
+            checked.order.sequence,
+            wiring.links,
+            wiring.starts,
+            system.algorithm,
+            settings=Settings.of(system, threads),
+        )
+    finally:
+        for slave in slaves.values():
+            slave.free()
