@@ -7,10 +7,7 @@ and ``orchestrate describe`` all derive from it. On an instance the attribute of
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from typing import TYPE_CHECKING, Any, Literal, Self, overload
-
-if TYPE_CHECKING:
-    from .component import Component
+from typing import Any, Literal, Self, overload
 
 ScalarType = type[float] | type[int] | type[bool] | type[str]
 Distribution = Literal["normal", "uniform"]
@@ -28,8 +25,8 @@ class Declaration:
     @overload
     def __get__(self, instance: None, owner: type) -> Self: ...
     @overload
-    def __get__(self, instance: Component, owner: type) -> Any: ...
-    def __get__(self, instance: Component | None, owner: type) -> Any:
+    def __get__(self, instance: object, owner: type) -> Any: ...
+    def __get__(self, instance: object, owner: type) -> Any:
         # A non-data descriptor: the value in the instance's __dict__ wins, at the speed of a plain attribute.
         if instance is None:
             return self
