@@ -22,8 +22,9 @@ import platformdirs
 from ..components import CATALOGUE, Component, ComponentError, Simulation
 from ..components.spelling import did_you_mean
 from . import native_fmu, python_fmu, toolchain
-from .description import Kind, write
+from .description import write
 from .identity import source_digest
+from .kinds import FmuKind
 
 _EPOCH = (1980, 1, 1, 0, 0, 0)
 """The earliest time a zip can hold: archives of equal content are equal files."""
@@ -35,6 +36,7 @@ class Plain:
 
     component: type[Component]
     arguments: Mapping[str, Any]
+    digest: str
     description: bytes
 
     def instantiate(self) -> Simulation:
@@ -69,7 +71,7 @@ def build(
     reference: str,
     arguments: Mapping[str, Any] | None = None,
     *,
-    kind: Kind = "python",
+    kind: FmuKind = "python",
     platforms: Sequence[str] = (),
     folder: Path | None = None,
 ) -> Path:
@@ -110,7 +112,7 @@ def read_arguments(arguments: Mapping[str, Any] | None) -> dict[str, Any]:
     return given
 
 
-def build_component(component: Component, kind: Kind = "python", platforms: Sequence[str] = ()) -> Path:
+def build_component(component: Component, kind: FmuKind = "python", platforms: Sequence[str] = ()) -> Path:
     """The same for a component at hand; its values become the FMU's start values."""
     name, digest = type(component).__name__, source_digest(component, kind)
     if kind == "python":
@@ -150,7 +152,8 @@ def plain(reference: str, arguments: Mapping[str, Any] | None = None, *, folder:
     cls = resolve(reference, folder)
     given = read_arguments(arguments)
     component = cls(**given)
-    return Plain(cls, given, write(component, "python", source_digest(component, "python")))
+    digest = source_digest(component, "python")
+    return Plain(cls, given, digest, write(component, "python", digest))
 
 
 def cache_folder() -> Path:

@@ -6,7 +6,7 @@ import importlib.metadata
 import json
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Any, Literal
+from typing import Any
 
 import numpy as np
 from lxml import etree
@@ -14,18 +14,15 @@ from lxml import etree
 from ..components.component import Component, ComponentError
 from ..components.declarations import Input, Memory, Parameter, State
 from ..components.tracing import Names, TracingError, dependencies, initial_dependencies, rate_dependencies
+from .annotation import TOOL, Annotation
+from .annotation import write as write_annotation
+from .kinds import NOTE_OF_KIND, FmuKind
 from .units import BASE, parse
 from .variables import ScalarVariable, scalar_variables
 
-Kind = Literal["python", "native"]
-TOOL = "railcosim"
 SOURCE = "all.c"
 """The source file of a native FMU that includes the others. Named after the model it could hide one of them."""
 _ELEMENT = {float: "Real", int: "Integer", bool: "Boolean", str: "String"}
-NOTE_OF_KIND: dict[Kind, str] = {
-    "python": "runs in the importing process's Python: needs Python 3.11+ and NumPy there",
-    "native": "compiled C: needs nothing but the C library",
-}
 _LOG_CATEGORIES = {
     "logStatusError": "what went wrong; always sent",
     "logStatusWarning": "what is doubtful; always sent",
@@ -64,7 +61,7 @@ def structure(component: Component) -> Structure:
         return Structure(None, None, None, names)
 
 
-def write(component: Component, kind: Kind, digest: str) -> bytes:
+def write(component: Component, kind: FmuKind, digest: str) -> bytes:
     """The model description of a component's FMU.
 
     Args:
@@ -118,9 +115,7 @@ def write(component: Component, kind: Kind, digest: str) -> bytes:
         for name, description in _LOG_CATEGORIES.items():
             etree.SubElement(categories, "Category", name=name, description=description)
     etree.SubElement(root, "DefaultExperiment", startTime="0", stepSize=_number(default_step(component)))
-    annotations = etree.SubElement(root, "VendorAnnotations")
-    tool = etree.SubElement(annotations, "Tool", name=TOOL)
-    etree.SubElement(tool, "component", **_annotation(component, kind, digest))
+    write_annotation(_annotation(component, kind, digest), root)
     block = etree.SubElement(root, "ModelVariables")
     for variable in variables:
         _write_variable(block, variable, component, traced)
@@ -156,23 +151,22 @@ def arguments(component: Component) -> str:
         ) from error
 
 
-def _annotation(component: Component, kind: Kind, digest: str) -> dict[str, str]:
+def _annotation(component: Component, kind: FmuKind, digest: str) -> Annotation:
     cls = type(component)
-    optional = [n for s in component.of(Input) if s.declaration.optional for n in s.scalars]  # type: ignore[attr-defined]
-    fields = {
-        "name": cls.__name__,
-        "arguments": arguments(component),
-        "digest": digest,
-        "kind": kind,
-        "kindNote": NOTE_OF_KIND[kind],
-        "source": cls.source,
-        "note": cls.note,
-        "requires": " ".join(cls.requires),
-        "optionalInputs": " ".join(optional),
-        "recommendedStep": "" if cls.recommended_step is None else _number(cls.recommended_step),
-        "sampled": "true" if component.is_sampled else "",
-    }
-    return {name: value for name, value in fields.items() if value}
+    inputs = ((slot, slot.declaration) for slot in component.of(Input))
+    return Annotation(
+        component=cls.__name__,
+        arguments=json.loads(arguments(component)),
+        digest=digest,
+        kind=kind,
+        kind_note=NOTE_OF_KIND[kind],
+        source=cls.source,
+        note=cls.note,
+        requires=cls.requires,
+        optional_inputs=tuple(n for s, d in inputs if isinstance(d, Input) and d.optional for n in s.scalars),
+        recommended_step=cls.recommended_step,
+        sampled=component.is_sampled,
+    )
 
 
 @dataclass(frozen=True)

@@ -15,7 +15,7 @@ from ..components import ComponentError
 from ..components.tracing import TracingError
 from . import toolchain
 from .build import build, native_problem, resolve
-from .description import Kind
+from .kinds import FmuKind
 from .toolchain import CompilerError
 
 CHECKSUMS = "SHA256SUMS"
@@ -80,7 +80,7 @@ def package(
     arguments: Mapping[str, Any],
     kind: Literal["auto", "native", "python"],
     platforms: Sequence[str] = (),
-) -> tuple[Path, Kind, str]:
+) -> tuple[Path, FmuKind, str]:
     """The FMU of a component in the cache, its kind, and why it is not native if that was left open."""
     if kind != "auto":
         return build(reference, arguments, kind=kind, platforms=platforms), kind, ""

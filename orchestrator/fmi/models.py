@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Literal
 
 from ...fmus.build import Plain, build, plain
+from ...fmus.kinds import Kind, ModelKind
 from ...fmus.release import package
 from ..errors import FmuFileError, ScenarioError
 from ..system import Instance, System
@@ -17,9 +17,6 @@ from .interface import Interface
 from .plain import PlainSlave
 from .reader import read_interface
 from .slave import Slave
-
-Kind = Literal["auto", "native", "python", "plain"]
-KINDS: tuple[Kind, ...] = ("auto", "native", "python", "plain")
 
 
 @dataclass(frozen=True)
@@ -36,7 +33,7 @@ class Model:
     """
 
     interface: Interface
-    kind: str
+    kind: ModelKind
     folder: Path
     path: Path | None
     digest: str
@@ -93,7 +90,7 @@ def _load(instance: Instance, workspace: Workspace, kind: Kind) -> Model:
         component = plain(instance.model, instance.build)
         folder = workspace.write_description(component.description)
         interface = read_interface(folder, instance.model)
-        return Model(interface, kind, folder, None, str(interface.vendor.get("digest", "")), component)
+        return Model(interface, kind, folder, None, component.digest, component)
     if kind == "auto":
         return _load_best(instance, workspace)
     return load_fmu(build(instance.model, instance.build, kind=kind), workspace, kind)
@@ -106,7 +103,7 @@ def _load_best(instance: Instance, workspace: Workspace) -> Model:
     return replace(model, note=f"running Python FMUs, not native ones: {problem}") if problem else model
 
 
-def load_fmu(path: Path, workspace: Workspace, kind: str = "fmu") -> Model:
+def load_fmu(path: Path, workspace: Workspace, kind: ModelKind = "fmu") -> Model:
     """Unpack and read one FMU file.
 
     Raises:

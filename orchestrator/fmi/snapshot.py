@@ -53,7 +53,7 @@ def take_snapshot(slave: Slave, states: Sequence[str]) -> Snapshot:
         "native": NativeSnapshot,
         "python": PythonSnapshot,
     }
-    return kinds.get(slave.interface.vendor.get("kind", ""), ForeignSnapshot)(slave, states)
+    return kinds.get(slave.interface.own_kind or "", ForeignSnapshot)(slave, states)
 
 
 def state_names(slave: Slave) -> list[str]:
@@ -64,7 +64,7 @@ def state_names(slave: Slave) -> list[str]:
     """
     interface = slave.interface
     kept = [v.name for v in interface.variables.values() if v.type == "Real" and v.causality in ("local", "output")]
-    if not isinstance(slave, PlainSlave) and interface.vendor.get("kind") == "native":
+    if not isinstance(slave, PlainSlave) and interface.own_kind == "native":
         return [name for name in kept if interface.variables[name].variability == "discrete"]
     saved = slave.simulation.save() if isinstance(slave, PlainSlave) else _read_json(slave)
     return [name for name in kept if name.partition("[")[0] in saved["values"]]

@@ -34,7 +34,7 @@ def check_coupling(system: System, interfaces: Mapping[str, Interface], wiring: 
 
 
 def _check_adaptive(system: System, interfaces: Mapping[str, Interface], wiring: Wiring) -> Iterable[str]:
-    sampled = [name for name, interface in interfaces.items() if interface.vendor.get("sampled")]
+    sampled = [name for name, interface in interfaces.items() if interface.sampled]
     yield from _cannot(
         sampled, "sampled at points of its own, which adaptive cannot step over; choose gauss-seidel or iterative"
     )

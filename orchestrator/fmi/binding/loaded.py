@@ -98,7 +98,7 @@ class LoadedSlave(ABC):
         self._library = None
         self.hear_as(id(self), name.encode())
         # pythonfmu passes even its errors on only while debug logging is on; others then flood us with details.
-        self._talks = bool(interface.vendor) or "pythonfmu" in interface.generator.lower()
+        self._talks = interface.annotation is not None or "pythonfmu" in interface.generator.lower()
         try:
             self._library = open_library(library(folder, interface, interface.model), self.SIGNATURES, self._prefix())
             self.functions, self._addresses = self._library.functions, self._library.addresses
