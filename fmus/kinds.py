@@ -6,8 +6,10 @@ from typing import Literal
 
 FmuKind = Literal["native", "python"]
 """What a component is packaged as: compiled C, or its Python behind a wrapper."""
+PackagingKind = Literal["auto", "native", "python"]
+"""What a user asks for where an FMU is to be made: ``"auto"`` is native where that is possible."""
 Kind = Literal["auto", "native", "python", "plain"]
-"""What a user asks for: ``"auto"`` is native where that is possible, ``"plain"`` Python objects without packaging."""
+"""What a user asks for where a system is to run: ``"plain"`` is Python objects without packaging."""
 ModelKind = Literal["fmu", "native", "python", "plain"]
 """What a model is: ``"fmu"`` a file that the user gave, the others made here of a component."""
 

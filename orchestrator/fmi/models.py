@@ -5,9 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 from pathlib import Path
 
-from ...fmus.build import Plain, build, plain
+from ...fmus.build import Plain, package, plain
 from ...fmus.kinds import Kind, ModelKind
-from ...fmus.release import package
 from ..errors import FmuFileError, ScenarioError
 from ..system import Instance, System
 from .archive import Workspace
@@ -91,16 +90,9 @@ def _load(instance: Instance, workspace: Workspace, kind: Kind) -> Model:
         folder = workspace.write_description(component.description)
         interface = read_interface(folder, instance.model)
         return Model(interface, kind, folder, None, component.digest, component)
-    if kind == "auto":
-        return _load_best(instance, workspace)
-    return load_fmu(build(instance.model, instance.build, kind=kind), workspace, kind)
-
-
-def _load_best(instance: Instance, workspace: Workspace) -> Model:
-    """A native FMU where one can be made here, a Python FMU with a note that says why not elsewhere."""
-    path, kind, problem = package(instance.model, instance.build, "auto")
-    model = load_fmu(path, workspace, kind)
-    return replace(model, note=f"running Python FMUs, not native ones: {problem}") if problem else model
+    path, made, problem = package(instance.model, instance.build, kind)
+    note = f"running Python FMUs, not native ones: {problem}" if problem else ""
+    return replace(load_fmu(path, workspace, made), note=note)
 
 
 def load_fmu(path: Path, workspace: Workspace, kind: ModelKind = "fmu") -> Model:

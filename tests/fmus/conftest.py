@@ -15,7 +15,8 @@ from fmpy.logging import addLoggerProxy
 from lxml import etree
 from railcosim.components import CATALOGUE
 from railcosim.components.component import Component
-from railcosim.fmus.build import build, build_component, resolve
+from railcosim.fmus.build import build, build_component
+from railcosim.fmus.references import resolve
 
 SAMPLES = Path(__file__).parents[1] / "components" / "samples.py"
 

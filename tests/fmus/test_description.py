@@ -11,7 +11,8 @@ from fmpy.validation import validate_fmu
 from lxml import etree
 from railcosim.components import ComponentError
 from railcosim.components.declarations import Input, Memory, Output, Parameter, State, Tape
-from railcosim.fmus.build import build, resolve
+from railcosim.fmus.build import build
+from railcosim.fmus.references import resolve
 from railcosim.fmus.units import BASE, parse
 from railcosim.fmus.variables import scalar_variables
 

@@ -14,10 +14,11 @@ from fmpy.util import read_ref_opt_file
 from fmpy.validation import validate_fmu
 from railcosim.components import CATALOGUE, ComfortCruise, ComponentError, Gust, PointMassTrain
 from railcosim.fmus import documentation, toolchain
-from railcosim.fmus.build import build, native_problem, resolve
+from railcosim.fmus.build import build, native_problem
 from railcosim.fmus.documentation import page
 from railcosim.fmus.formulas import Formulas
 from railcosim.fmus.reference_signals import STEPS, reference_signals
+from railcosim.fmus.references import resolve
 
 ROOT = Path(__file__).parents[2]
 KINDS = ("native", "python")

@@ -4,8 +4,9 @@ import sys
 
 import pytest
 from railcosim.components import ComfortCruise, Component, ComponentError, Output
-from railcosim.fmus.build import build, resolve
+from railcosim.fmus.build import build
 from railcosim.fmus.embed import embedded_files
+from railcosim.fmus.references import resolve
 
 HEAD = "from railcosim.components import Component, Output\n"
 GIVES = "\n\nclass C(Component):\n    y = Output('1')\n\n    def outputs(self):\n        return {{'y': {}}}\n"

@@ -21,7 +21,8 @@ from hypothesis import HealthCheck, given, reject, settings
 from hypothesis import strategies as st
 from railcosim.components import CATALOGUE, ComponentError, Simulation
 from railcosim.components.declarations import Input, Memory, Parameter, Size, State, Tape
-from railcosim.fmus.build import build, resolve
+from railcosim.fmus.build import build
+from railcosim.fmus.references import resolve
 from railcosim.fmus.variables import scalar_variables
 from railcosim.orchestrator import load, run
 

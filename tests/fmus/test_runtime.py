@@ -21,7 +21,8 @@ import pytest
 from railcosim.components import ComfortCruise, PointMassTrain
 from railcosim.components.declarations import Parameter
 from railcosim.components.tape import TapeDeck, smooth
-from railcosim.fmus.build import build, resolve
+from railcosim.fmus.build import build
+from railcosim.fmus.references import resolve
 
 SAMPLES = Path(__file__).parent / "native_samples.py"
 MIXED, FUNCTIONS = f"{SAMPLES}:Mixed", f"{SAMPLES}:Functions"
