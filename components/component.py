@@ -77,6 +77,12 @@ class Component:
         ComponentError: an unknown name, a value of the wrong shape or type, a size below its minimum.
     """
 
+    __slots__ = ("__dict__", "__weakref__", "build_arguments", "slots")
+    build_arguments: Values
+    """`Size` and `Data` by name, as they were given."""
+    slots: dict[str, Slot]
+    """The declared variables by name."""
+
     source: ClassVar[str] = ""
     """Where the equations come from: author, year, equation numbers."""
     equations: ClassVar[tuple[str, ...]] = ()
@@ -102,7 +108,6 @@ class Component:
 
     time: float = 0.0
     """Simulation time in s, available everywhere."""
-    _step: float | None = None
 
     def __init_subclass__(cls, **kwargs: Any) -> None:
         super().__init_subclass__(**kwargs)
@@ -128,14 +133,14 @@ class Component:
         unknown = [name for name in values if name not in cls.declarations and name != "time"]
         if unknown:
             raise ComponentError(f"{cls.__name__} has no {nearest(unknown[0], [*cls.declarations, 'time'])}")
-        place = self.__dict__
-        self.build_arguments: Values = {}
+        place = self.present_values
+        self.build_arguments = {}
         for name, declaration in cls.declarations.items():
             if isinstance(declaration, Size | Data):
                 given = values.pop(name, declaration.default)
                 self.build_arguments[name] = given
                 place[name] = _build_argument(cls, declaration, given)
-        self.slots: dict[str, Slot] = {}
+        self.slots = {}
         for name, declaration in cls.declarations.items():
             if isinstance(declaration, Variable):
                 slot = self._slot(declaration)
@@ -173,11 +178,23 @@ class Component:
     # ---------------------------------------------------------------- what the runtime needs to know
 
     @property
+    def present_values(self) -> Values:
+        """What the equations read on ``self``, by name and alive: a runtime that drives the component writes here.
+
+        It holds build arguments as converted, variables other than outputs, random numbers, and ``time`` once a
+        runtime has set it. While ``update`` runs it holds ``step``, the length of the sample in s. Values are not
+        checked: the constructor and `Simulation.set` are for people.
+        """
+        return self.__dict__
+
+    @property
     def step(self) -> float:
         """Length of the sample in s; only ``update`` may ask, because elsewhere it is not known."""
-        if self._step is None:
-            raise ComponentError(f"{type(self).__name__}: self.step is known only inside update()")
-        return self._step
+        try:
+            length: float = self.present_values["step"]
+        except KeyError:
+            raise ComponentError(f"{type(self).__name__}: self.step is known only inside update()") from None
+        return length
 
     def of(self, *kinds: type[Declaration]) -> Iterator[Slot]:
         """The slots declared as one of ``kinds``, in order of declaration."""
@@ -209,7 +226,7 @@ class Component:
     def _given(self, name: str, value: Any) -> Any:
         owner = type(self).__name__
         if name not in self.slots:  # a random number, given to look at one case
-            return convert(Slot(name, Variable(), "1", np.shape(self.__dict__[name]), 0.0), value, owner)
+            return convert(Slot(name, Variable(), "1", np.shape(self.present_values[name]), 0.0), value, owner)
         if isinstance(self.slots[name].declaration, Output):
             raise ComponentError(f"{owner}.{name} is computed and cannot be set")
         return convert(self.slots[name], value, owner)
@@ -319,8 +336,7 @@ def _check_declarations(cls: type[Component]) -> None:
             raise ComponentError(f"{where}: hold must be a Parameter of the same component")
         if isinstance(declaration, State | Tape) and declaration.type is not float:
             raise ComponentError(f"{where}: a {type(declaration).__name__} is a real number")
-        taken = hasattr(Component, name) or name in ("slots", "build_arguments")
-        if taken and not isinstance(vars(Component).get(name), Declaration):
+        if hasattr(Component, name) and not isinstance(vars(Component).get(name), Declaration):
             raise ComponentError(f"{where}: the name belongs to Component; choose another")
 
 

@@ -27,7 +27,7 @@ class Declaration:
     @overload
     def __get__(self, instance: object, owner: type) -> Any: ...
     def __get__(self, instance: object, owner: type) -> Any:
-        # A non-data descriptor: the value in the instance's __dict__ wins, at the speed of a plain attribute.
+        # A non-data descriptor: a value of the instance wins, at the speed of a plain attribute.
         if instance is None:
             return self
         raise AttributeError(

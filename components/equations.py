@@ -27,13 +27,13 @@ class Equations:
     """One component's methods, with time and values in its attributes.
 
     Args:
-        component: its ``__dict__`` holds the present values; the equations read them there.
+        component: its present values are read and written as time goes on.
     """
 
     def __init__(self, component: Component) -> None:
         self.component = component
         self.name = type(component).__name__
-        self.values: dict[str, Any] = component.__dict__
+        self.values: dict[str, Any] = component.present_values
         self.states = tuple(component.of(State))
         self.memory = tuple(component.of(Memory))
         self.tapes = tuple(component.of(Tape))
@@ -64,11 +64,11 @@ class Equations:
 
     def update(self, period: float) -> Values:
         """Next memory and tape row, and the states to re-initialise, of a sample of ``period`` seconds."""
-        self.values["_step"] = period
+        self.values["step"] = period
         try:
             return self._cast("update", self._call("update"))
         finally:
-            del self.values["_step"]
+            del self.values["step"]
 
     def integrate(self, begin: float, length: float) -> None:
         """Classical Runge-Kutta in equal sub-steps no longer than ``max_step``, inputs and memory held."""

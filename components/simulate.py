@@ -48,7 +48,7 @@ class Simulation:
         self.name = type(component).__name__
         self.phase: Phase = "instantiated"
         self._equations = Equations(component)
-        self._values = component.__dict__
+        self._values = component.present_values
         self._given = {name: self._values[name] for name in component.slots if name in self._values}
         self._held_names = self._feedthrough_names() if component.is_sampled else frozenset()
         self._computed_starts = self._computed_start_names()

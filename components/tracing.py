@@ -83,7 +83,7 @@ def initial_dependencies(component: Component) -> tuple[dict[str, Names], dict[s
     for slot in probe.of(State, Memory):
         if slot.scalars and slot.scalars[0] in computed:
             cells = [Traced(computed[name]) for name in slot.scalars]
-            probe.__dict__[slot.name] = _cells(cells, slot.shape)
+            probe.present_values[slot.name] = _cells(cells, slot.shape)
     return computed, _collect(component, "outputs", probe.outputs, Output)
 
 
@@ -100,12 +100,12 @@ def _traced_copy(component: Component) -> Component:
         if slot.type is str:  # a text is not traced: equations may compare it
             continue
         cells = [Traced(_TAPE_SOURCES if isinstance(slot.declaration, Tape) else frozenset({n})) for n in slot.scalars]
-        probe.__dict__[slot.name] = _cells(cells, slot.shape)
+        probe.present_values[slot.name] = _cells(cells, slot.shape)
     for name, noise in probe.noises.items():
-        shape = np.shape(probe.__dict__[name])
+        shape = np.shape(probe.present_values[name])
         sources = frozenset({"time", "seed", noise.hold.name})
-        probe.__dict__[name] = _cells([Traced(sources) for _ in range(math.prod(shape))], shape)
-    probe.__dict__["time"] = Traced(frozenset({"time"}))
+        probe.present_values[name] = _cells([Traced(sources) for _ in range(math.prod(shape))], shape)
+    probe.present_values["time"] = Traced(frozenset({"time"}))
     return probe
 
 

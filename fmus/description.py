@@ -128,7 +128,7 @@ def write(component: Component, kind: FmuKind, digest: str) -> bytes:
 
 def default_step(component: Component) -> float:
     """The communication step in s for whoever has no other wish."""
-    values = component.__dict__
+    values = component.present_values
     return float(type(component).recommended_step or values.get("sample_time") or values.get("max_step") or 0.1)
 
 
@@ -254,7 +254,7 @@ def _write_variable(block: Any, variable: ScalarVariable, component: Component, 
             if value is not None:
                 element.set(bound, _number(value) if slot.type is float else str(int(value)))
     if initial != "calculated":
-        value = component.__dict__[slot.name]
+        value = component.present_values[slot.name]
         element.set("start", _text(value if variable.element is None else np.ravel(value)[variable.element]))
 
 

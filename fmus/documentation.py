@@ -82,13 +82,13 @@ def _equations(cls: type[Component]) -> str:
 
 
 def _start(component: Component, name: str, element: int | None) -> str:
-    value = component.__dict__[name]
+    value = component.present_values[name]
     return html.escape(str(value if element is None else np.ravel(value)[element]))
 
 
 def _stepping(component: Component) -> list[str]:
     """What the importing tool must do about step and order, one sentence or two for each."""
-    longest, values = type(component).recommended_step, component.__dict__
+    longest, values = type(component).recommended_step, component.present_values
     lines = [f"Recommended communication step: {longest:g} s or shorter."] if longest else []
     if component.is_sampled:
         period = values["sample_time"]

@@ -52,7 +52,7 @@ def _packaging(kind: FmuKind) -> bytes:
 
 def given_values(component: Component) -> str:
     """Build arguments and the values that differ from the declared start values, as JSON."""
-    values = component.__dict__
+    values = component.present_values
     kept = (slot for slot in component.slots.values() if slot.name in values)
     changed = {s.name: np.asarray(values[s.name]).tolist() for s in kept if not np.array_equal(values[s.name], s.start)}
     return json.dumps(json.loads(arguments(component)) | changed, sort_keys=True)

@@ -144,7 +144,9 @@ def test_known_dependencies_hold_at_a_few_points(described):
         probe = cls(**values)
         if start:
             probe = cls(**values | probe.initial())
-        return {name: np.ravel(v) for name, v in {**vars(probe), **probe.outputs()}.items() if name in probe.slots}
+        return {
+            name: np.ravel(v) for name, v in {**probe.present_values, **probe.outputs()}.items() if name in probe.slots
+        }
 
     settable = [s for s in component.slots.values() if s.scalars[0] in found and not isinstance(s.declaration, Output)]
     for _ in range(3):
