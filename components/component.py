@@ -4,9 +4,10 @@ from __future__ import annotations
 
 import inspect
 import math
-from collections.abc import Iterator, Mapping
+from abc import ABC
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
-from typing import Any, ClassVar
+from typing import Any, ClassVar, Literal
 
 import numpy as np
 
@@ -29,6 +30,8 @@ from .declarations import (
 from .spelling import nearest
 
 Values = dict[str, Any]
+Method = Literal["initial", "derivatives", "outputs", "update", "keep"]
+"""The methods in which a component's equations stand."""
 MAX_LENGTH = 10_000
 """Longest axis of an array: each element becomes a variable of the FMU, and a slip of the pen would take for ever."""
 
@@ -63,11 +66,12 @@ class Slot:
         return tuple(f"{self.name}[{','.join(str(k + 1) for k in index)}]" for index in np.ndindex(*self.shape))
 
 
-class Component:
+class Component(ABC):
     """Base class of everything that becomes an FMU.
 
-    A subclass declares its interface in the class body and fills in the methods it needs. The methods are pure:
-    they read values from ``self`` and return a dict by name; they change nothing. On values use operators, slices,
+    A subclass declares its interface in the class body and writes those of the methods ``initial``, ``derivatives``,
+    ``outputs``, ``update`` and ``keep`` that it needs. The methods are pure: they read values from ``self`` and return
+    a dict by name; they change nothing. On values use operators, slices,
     reshaping and `maths`, nothing else: the same lines run on floats, arrays and symbols.
 
     Keyword arguments give build arguments and values, so that a formula can be read off in one line:
@@ -93,6 +97,17 @@ class Component:
     """Packages beside NumPy that the equations import; such a component can only become a Python FMU."""
     recommended_step: ClassVar[float | None] = None
     """Longest advisable communication step in s, if the equations have one."""
+
+    initial: Callable[[], Values]
+    """Start values of `State` and `Memory` that follow from parameters, starts and inputs."""
+    derivatives: Callable[[], Values]
+    """Rates of all `State` variables."""
+    outputs: Callable[[], Values]
+    """All `Output` variables, y = g(x, memory, u, t)."""
+    update: Callable[[], Values]
+    """Next `Memory`, this sample's `Tape` row and any re-initialised `State`, from values at the sample's start."""
+    keep: Callable[[], Any]
+    """Whether the trip that just ended may replace the tape's content."""
 
     declarations: ClassVar[Mapping[str, Declaration]] = {}
 
@@ -153,28 +168,6 @@ class Component:
         for name, value in values.items():
             place[name] = convert(_TIME, value, cls.__name__) if name == "time" else self._given(name, value)
 
-    # ---------------------------------------------------------------- equations
-
-    def initial(self) -> Values:
-        """Start values of `State` and `Memory` that follow from parameters, starts and inputs."""
-        return {}
-
-    def derivatives(self) -> Values:
-        """Rates of all `State` variables."""
-        return {}
-
-    def outputs(self) -> Values:
-        """All `Output` variables, y = g(x, memory, u, t)."""
-        return {}
-
-    def update(self) -> Values:
-        """Next `Memory`, this sample's `Tape` row and any re-initialised `State`, from values at the sample's start."""
-        return {}
-
-    def keep(self) -> Any:
-        """Whether the trip that just ended may replace the tape's content."""
-        return True
-
     # ---------------------------------------------------------------- what the runtime needs to know
 
     @property
@@ -226,7 +219,7 @@ class Component:
     def _given(self, name: str, value: Any) -> Any:
         owner = type(self).__name__
         if name not in self.slots:  # a random number, given to look at one case
-            return convert(Slot(name, Variable(), "1", np.shape(self.present_values[name]), 0.0), value, owner)
+            return convert(Slot(name, Input(), "1", np.shape(self.present_values[name]), 0.0), value, owner)
         if isinstance(self.slots[name].declaration, Output):
             raise ComponentError(f"{owner}.{name} is computed and cannot be set")
         return convert(self.slots[name], value, owner)
@@ -242,7 +235,15 @@ class Component:
         return Slot(name, declaration, unit, shape, convert(blank, declaration.start, type(self).__name__))
 
 
-_TIME = Slot("time", Variable("s"), "s", (), 0.0)
+def evaluated(component: Component, method: Method) -> Any:
+    """What one of a component's equation methods returns; nothing changes and every trip is kept where it has none."""
+    equations: Callable[[], Any] | None = getattr(component, method, None)
+    if equations is None:
+        return True if method == "keep" else {}
+    return equations()
+
+
+_TIME = Slot("time", Input("s"), "s", (), 0.0)
 
 
 def convert(slot: Slot, value: Any, owner: str) -> Any:
@@ -336,7 +337,8 @@ def _check_declarations(cls: type[Component]) -> None:
             raise ComponentError(f"{where}: hold must be a Parameter of the same component")
         if isinstance(declaration, State | Tape) and declaration.type is not float:
             raise ComponentError(f"{where}: a {type(declaration).__name__} is a real number")
-        if hasattr(Component, name) and not isinstance(vars(Component).get(name), Declaration):
+        taken = name in Component.__annotations__ or hasattr(Component, name)
+        if taken and not isinstance(vars(Component).get(name), Declaration):
             raise ComponentError(f"{where}: the name belongs to Component; choose another")
 
 

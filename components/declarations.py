@@ -6,6 +6,7 @@ and ``orchestrate describe`` all derive from it. On an instance the attribute of
 
 from __future__ import annotations
 
+from abc import ABC
 from collections.abc import Callable, Sequence
 from typing import Any, Literal, Self, overload
 
@@ -13,11 +14,11 @@ ScalarType = type[float] | type[int] | type[bool] | type[str]
 Distribution = Literal["normal", "uniform"]
 
 
-class Declaration:
+class Declaration(ABC):
     """A named line in a component's interface. On an instance it reads as the value, on the class as itself."""
 
     name: str = ""
-    description: str = ""
+    description: str
 
     def __set_name__(self, owner: type, name: str) -> None:
         self.name = name
@@ -80,7 +81,7 @@ class Data(Declaration):
 Shape = Sequence[int | Size | SizeExpression]
 
 
-class Variable(Declaration):
+class Variable(Declaration, ABC):
     """A declaration that holds values: scalar, or an array of the given shape.
 
     Args:

@@ -20,7 +20,7 @@ from typing import Any, Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from .component import Component, ComponentError, Slot, convert, pack
+from .component import Component, ComponentError, Slot, convert, evaluated, pack
 from .declarations import Input, Memory, Output, Parameter, State, Tape
 from .equations import Equations
 from .spelling import nearest
@@ -96,7 +96,7 @@ class Simulation:
     def terminate(self) -> None:
         """End the run: the tape, with the trip in progress if it is to be kept, goes to its file."""
         if self.phase == "running" and self._deck is not None and self._values["tape_file"]:
-            self._deck.commit(self.component.keep)
+            self._deck.commit(self._equations.keep)
             self._deck.save(Path(self._values["tape_file"]))
         self.phase = "terminated"
 
@@ -215,7 +215,7 @@ class Simulation:
         """One sample, ``elapsed`` seconds after the inputs were read; gives the outputs to be held."""
         values, deck = self._values, self._deck
         if deck is not None:
-            deck.follow(values["trip"], values["trip_time"], self.component.keep)
+            deck.follow(values["trip"], values["trip_time"], self._equations.keep)
         outputs = self._evaluate(elapsed)
         changes = self._equations.update(period)
         if deck is not None:
@@ -265,12 +265,12 @@ class Simulation:
 
     def _computed_start_names(self) -> frozenset[str]:
         """The states and memory that ``initial`` computes."""
-        if type(self.component).initial is Component.initial:
+        if not hasattr(self.component, "initial"):
             return frozenset()
         try:
             traced, _ = initial_dependencies(self.component)
         except TracingError:
-            return frozenset(self.component.initial())
+            return frozenset(evaluated(self.component, "initial"))
         kept = self.component.of(State, Memory)
         return frozenset(slot.name for slot in kept if not traced.keys().isdisjoint(slot.scalars))
 

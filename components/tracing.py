@@ -3,12 +3,11 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
 from typing import Any
 
 import numpy as np
 
-from .component import Component, ComponentError
+from .component import Component, ComponentError, Method, evaluated
 from .declarations import Input, Memory, Output, Parameter, State, Tape
 from .maths import SymbolArray, elementwise
 
@@ -68,23 +67,23 @@ def dependencies(component: Component) -> dict[str, Names]:
         TracingError: the equations treat values as plain numbers; the message names component, method and remedy.
     """
     probe = _traced_copy(component)
-    return _collect(component, "outputs", probe.outputs, Output)
+    return _collect(probe, "outputs", Output)
 
 
 def rate_dependencies(component: Component) -> dict[str, Names]:
     """The same for the rate of each scalar state."""
-    return _collect(component, "derivatives", _traced_copy(component).derivatives, State)
+    return _collect(_traced_copy(component), "derivatives", State)
 
 
 def initial_dependencies(component: Component) -> tuple[dict[str, Names], dict[str, Names]]:
     """The same for the initial state: of what ``initial`` computes, and of the outputs that follow from it."""
     probe = _traced_copy(component)
-    computed = _collect(component, "initial", probe.initial, State, Memory)
+    computed = _collect(probe, "initial", State, Memory)
     for slot in probe.of(State, Memory):
         if slot.scalars and slot.scalars[0] in computed:
             cells = [Traced(computed[name]) for name in slot.scalars]
             probe.present_values[slot.name] = _cells(cells, slot.shape)
-    return computed, _collect(component, "outputs", probe.outputs, Output)
+    return computed, _collect(probe, "outputs", Output)
 
 
 def feedthrough(component: Component) -> dict[str, Names]:
@@ -117,12 +116,10 @@ def _cells(cells: list[Traced], shape: tuple[int, ...]) -> Any:
     return array.reshape(shape).view(SymbolArray)
 
 
-def _collect(
-    component: Component, method: str, call: Callable[[], dict[str, Any]], *kinds: type[Output | State | Memory]
-) -> dict[str, Names]:
+def _collect(component: Component, method: Method, *kinds: type[Output | State | Memory]) -> dict[str, Names]:
     where = f"{type(component).__name__}.{method}"
     try:
-        returned = dict(call())
+        returned = dict(evaluated(component, method))
     except TracingError as error:
         raise TracingError(f"{where}: {error}") from error
     except Exception as error:

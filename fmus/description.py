@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 from lxml import etree
 
-from ..components.component import Component, ComponentError
+from ..components.component import Component, ComponentError, evaluated
 from ..components.declarations import Input, Memory, Parameter, State
 from ..components.tracing import Names, TracingError, dependencies, initial_dependencies, rate_dependencies
 from .annotation import TOOL, Annotation
@@ -56,7 +56,7 @@ def structure(component: Component) -> Structure:
     except TracingError:
         if not component.requires:
             raise
-        started = component.initial()
+        started = evaluated(component, "initial")
         names = frozenset(n for s in component.of(State, Memory) if s.name in started for n in s.scalars)
         return Structure(None, None, None, names)
 

@@ -17,7 +17,7 @@ from typing import Any, NoReturn
 import casadi as ca
 import numpy as np
 
-from ..components.component import Component, ComponentError, Slot
+from ..components.component import Component, ComponentError, Method, Slot, evaluated
 from ..components.declarations import Memory, Output, State, Tape
 from ..components.maths import SymbolArray, elementwise
 from ..components.tracing import TracingError
@@ -285,16 +285,16 @@ class _Tracer:
             results = [derivative[k] for k in range(len(column))]
             return function(f"{self.prefix}_{name}", [*arguments, ("seed", seed)], results)
 
-    def _results(self, method: str, slots: list[Slot]) -> list[Any]:
+    def _results(self, method: Method, slots: list[Slot]) -> list[Any]:
         return self._flat(self._returned(method, slots), slots, method)
 
-    def _call(self, method: str) -> Any:
+    def _call(self, method: Method) -> Any:
         try:
-            return getattr(self.probe, method)()
+            return evaluated(self.probe, method)
         except Exception as error:
             self._refuse(method, error)
 
-    def _returned(self, method: str, slots: list[Slot]) -> dict[str, Any]:
+    def _returned(self, method: Method, slots: list[Slot]) -> dict[str, Any]:
         """What a method returns; only values of these slots."""
         returned = self._call(method)
         if not isinstance(returned, dict):

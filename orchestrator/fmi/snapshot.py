@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import json
 import struct
+from abc import ABC, abstractmethod
 from collections.abc import Callable, Mapping, Sequence
 from typing import Any, Protocol
 
@@ -128,7 +129,7 @@ class PlainSnapshot:
         """Nothing to give back."""
 
 
-class _FmuSnapshot:
+class _FmuSnapshot(ABC):
     """What snapshots of FMUs share: the state that the FMU saves."""
 
     def __init__(self, slave: Slave, states: Sequence[str]) -> None:
@@ -141,6 +142,10 @@ class _FmuSnapshot:
             self._slave.restore(state)
         finally:
             self._slave.forget(state)
+
+    @abstractmethod
+    def restore(self, changes: Mapping[str, float]) -> None:
+        """Bring the instance back to it, with other values for some states."""
 
     def free(self) -> None:
         """Give the saved state back."""

@@ -27,6 +27,7 @@ _SIGNATURES: Signatures = {
     "fmi2EnterInitializationMode": (c_int, c_void_p),
     "fmi2ExitInitializationMode": (c_int, c_void_p),
     "fmi2Terminate": (c_int, c_void_p),
+    "fmi2Reset": (c_int, c_void_p),
     "fmi2DoStep": (c_int, c_void_p, c_double, c_double, c_int),
     "fmi2CancelStep": (c_int, c_void_p),
     **{
