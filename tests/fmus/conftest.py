@@ -37,6 +37,7 @@ def pytest_generate_tests(metafunc):
 @pytest.fixture(scope="session", autouse=True)
 def cache(session_cache):
     """The session's cache: no test may be served by what an earlier version left in the user's."""
+    session_cache.mkdir(parents=True, exist_ok=True)
     with pytest.MonkeyPatch.context() as patch:
         patch.setenv("RAILCOSIM_CACHE", str(session_cache))
         yield
