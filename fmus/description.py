@@ -32,7 +32,7 @@ _LOG_CATEGORIES = {
 
 @dataclass(frozen=True)
 class Structure:
-    """What depends on what, found by running the equations; None where they cannot be traced.
+    """What depends on what, found by running the equations; None where they cannot be depends.
 
     Attributes:
         direct: for each scalar output, the inputs and states it depends on at one instant.
@@ -71,14 +71,14 @@ def write(component: Component, kind: FmuKind, digest: str) -> bytes:
 
     Raises:
         ComponentError: a name that FMI does not allow, build arguments that are not JSON, or equations that cannot be
-            traced.
+            depends.
     """
     cls = type(component)
     variables = scalar_variables(component)
     for name in (cls.__name__, *component.slots):
         if not name.isascii():
             raise ComponentError(f"{cls.__name__}: FMI allows ASCII letters, digits and _ in names; rename {name!r}")
-    traced = structure(component)
+    depends = structure(component)
     root = etree.Element(
         "fmiModelDescription",
         fmiVersion="2.0",
@@ -118,10 +118,10 @@ def write(component: Component, kind: FmuKind, digest: str) -> bytes:
     write_annotation(_annotation(component, kind, digest), root)
     block = etree.SubElement(root, "ModelVariables")
     for variable in variables:
-        _write_variable(block, variable, component, traced)
+        _write_variable(block, variable, component, depends)
     for rate in rates:
         _write_rate(block, rate)
-    _write_structure(root, variables, rates, traced)
+    _write_structure(root, variables, rates, depends)
     text: bytes = etree.tostring(root, xml_declaration=True, encoding="UTF-8", pretty_print=True)
     return text
 
@@ -220,19 +220,19 @@ def _write_units(root: Any, names: set[str]) -> None:
         etree.SubElement(etree.SubElement(block, "Unit", name=name), "BaseUnit", **exponents, **scale, **shift)
 
 
-def initial_kind(variable: ScalarVariable, traced: Structure) -> str | None:
+def initial_kind(variable: ScalarVariable, depends: Structure) -> str | None:
     """FMI ``initial``: only parameters and states that nothing computes are exact; inputs have none."""
     declaration = variable.slot.declaration
     if isinstance(declaration, Input):
         return None
     if isinstance(declaration, Parameter):
         return "exact"
-    if isinstance(declaration, State | Memory) and variable.name not in traced.computed:
+    if isinstance(declaration, State | Memory) and variable.name not in depends.computed:
         return "exact"
     return "calculated"
 
 
-def _write_variable(block: Any, variable: ScalarVariable, component: Component, traced: Structure) -> None:
+def _write_variable(block: Any, variable: ScalarVariable, component: Component, depends: Structure) -> None:
     declaration, slot = variable.slot.declaration, variable.slot
     attributes = {
         "name": variable.name,
@@ -241,7 +241,7 @@ def _write_variable(block: Any, variable: ScalarVariable, component: Component, 
         "causality": variable.causality,
         "variability": variable.variability,
     }
-    initial = initial_kind(variable, traced)
+    initial = initial_kind(variable, depends)
     if initial is not None:
         attributes["initial"] = initial
     element = etree.SubElement(
@@ -259,21 +259,21 @@ def _write_variable(block: Any, variable: ScalarVariable, component: Component, 
 
 
 def _write_structure(
-    root: Any, variables: tuple[ScalarVariable, ...], rates: tuple[Rate, ...], traced: Structure
+    root: Any, variables: tuple[ScalarVariable, ...], rates: tuple[Rate, ...], depends: Structure
 ) -> None:
     """Outputs, Derivatives and InitialUnknowns; states are knowns only where their rates are listed."""
     block = etree.SubElement(root, "ModelStructure")
     index = {v.name: str(v.reference + 1) for v in variables} | {rate.name: str(rate.reference + 1) for rate in rates}
     inputs = {v.name for v in variables if v.causality == "input"}
     states = {rate.state.name for rate in rates}
-    exact = {v.name for v in variables if initial_kind(v, traced) == "exact"}
-    computed = [v.name for v in variables if initial_kind(v, traced) == "calculated"]
+    exact = {v.name for v in variables if initial_kind(v, depends) == "exact"}
+    computed = [v.name for v in variables if initial_kind(v, depends) == "calculated"]
     shown = [v.name for v in variables if v.causality == "output"]
-    of_rates = None if traced.rates is None else {f"der({name})": names for name, names in traced.rates.items()}
+    of_rates = None if depends.rates is None else {f"der({name})": names for name, names in depends.rates.items()}
     unknowns = [name for name in computed if name in shown or name in states]
-    initial = None if traced.initial is None or of_rates is None else {**of_rates, **traced.initial}
+    initial = None if depends.initial is None or of_rates is None else {**of_rates, **depends.initial}
     for tag, members, sources, knowns in (
-        ("Outputs", shown, traced.direct, inputs | states),
+        ("Outputs", shown, depends.direct, inputs | states),
         ("Derivatives", [rate.name for rate in rates], of_rates, inputs | states),
         ("InitialUnknowns", [*unknowns, *(rate.name for rate in rates)], initial, inputs | exact),
     ):

@@ -1,4 +1,4 @@
-"""A component's equations, called, checked and integrated: what `Simulation` runs, without phases.
+"""A component's methods, called, checked and integrated: what `Simulation` runs, without phases.
 
 An exception inside an equation passes unchanged, with the author's own line at its end; what an equation returns is
 checked here against the declarations.
@@ -23,7 +23,7 @@ _ROUNDING = 1e-6
 """Of an interval: a time that is a whole number of holds belongs to the new one whatever the rounding of k * step."""
 
 
-class Equations:
+class Methods:
     """One component's methods, with time and values in its attributes.
 
     Args:
