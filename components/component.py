@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-import difflib
 import inspect
 import math
-from collections.abc import Iterable, Iterator, Mapping
+from abc import ABC
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
-from typing import Any, ClassVar
+from typing import Any, ClassVar, Literal
 
 import numpy as np
 
@@ -27,8 +27,11 @@ from .declarations import (
     Tape,
     Variable,
 )
+from .spelling import nearest
 
 Values = dict[str, Any]
+Method = Literal["initial", "derivatives", "outputs", "update", "keep"]
+"""The methods in which a component's equations stand."""
 MAX_LENGTH = 10_000
 """Longest axis of an array: each element becomes a variable of the FMU, and a slip of the pen would take for ever."""
 
@@ -63,11 +66,12 @@ class Slot:
         return tuple(f"{self.name}[{','.join(str(k + 1) for k in index)}]" for index in np.ndindex(*self.shape))
 
 
-class Component:
+class Component(ABC):
     """Base class of everything that becomes an FMU.
 
-    A subclass declares its interface in the class body and fills in the methods it needs. The methods are pure:
-    they read values from ``self`` and return a dict by name; they change nothing. On values use operators, slices,
+    A subclass declares its interface in the class body and writes those of the methods ``initial``, ``derivatives``,
+    ``outputs``, ``update`` and ``keep`` that it needs. The methods are pure: they read values from ``self`` and return
+    a dict by name; they change nothing. On values use operators, slices,
     reshaping and `maths`, nothing else: the same lines run on floats, arrays and symbols.
 
     Keyword arguments give build arguments and values, so that a formula can be read off in one line:
@@ -76,6 +80,12 @@ class Component:
     Raises:
         ComponentError: an unknown name, a value of the wrong shape or type, a size below its minimum.
     """
+
+    __slots__ = ("__dict__", "__weakref__", "build_arguments", "slots")
+    build_arguments: Values
+    """`Size` and `Data` by name, as they were given."""
+    slots: dict[str, Slot]
+    """The declared variables by name."""
 
     source: ClassVar[str] = ""
     """Where the equations come from: author, year, equation numbers."""
@@ -87,6 +97,17 @@ class Component:
     """Packages beside NumPy that the equations import; such a component can only become a Python FMU."""
     recommended_step: ClassVar[float | None] = None
     """Longest advisable communication step in s, if the equations have one."""
+
+    initial: Callable[[], Values]
+    """Start values of `State` and `Memory` that follow from parameters, starts and inputs."""
+    derivatives: Callable[[], Values]
+    """Rates of all `State` variables."""
+    outputs: Callable[[], Values]
+    """All `Output` variables, y = g(x, memory, u, t)."""
+    update: Callable[[], Values]
+    """Next `Memory`, this sample's `Tape` row and any re-initialised `State`, from values at the sample's start."""
+    keep: Callable[[], Any]
+    """Whether the trip that just ended may replace the tape's content."""
 
     declarations: ClassVar[Mapping[str, Declaration]] = {}
 
@@ -102,7 +123,6 @@ class Component:
 
     time: float = 0.0
     """Simulation time in s, available everywhere."""
-    _step: float | None = None
 
     def __init_subclass__(cls, **kwargs: Any) -> None:
         super().__init_subclass__(**kwargs)
@@ -128,14 +148,14 @@ class Component:
         unknown = [name for name in values if name not in cls.declarations and name != "time"]
         if unknown:
             raise ComponentError(f"{cls.__name__} has no {nearest(unknown[0], [*cls.declarations, 'time'])}")
-        place = self.__dict__
-        self.build_arguments: Values = {}
+        place = self.present_values
+        self.build_arguments = {}
         for name, declaration in cls.declarations.items():
             if isinstance(declaration, Size | Data):
                 given = values.pop(name, declaration.default)
                 self.build_arguments[name] = given
                 place[name] = _build_argument(cls, declaration, given)
-        self.slots: dict[str, Slot] = {}
+        self.slots = {}
         for name, declaration in cls.declarations.items():
             if isinstance(declaration, Variable):
                 slot = self._slot(declaration)
@@ -148,36 +168,26 @@ class Component:
         for name, value in values.items():
             place[name] = convert(_TIME, value, cls.__name__) if name == "time" else self._given(name, value)
 
-    # ---------------------------------------------------------------- equations
-
-    def initial(self) -> Values:
-        """Start values of `State` and `Memory` that follow from parameters, starts and inputs."""
-        return {}
-
-    def derivatives(self) -> Values:
-        """Rates of all `State` variables."""
-        return {}
-
-    def outputs(self) -> Values:
-        """All `Output` variables, y = g(x, memory, u, t)."""
-        return {}
-
-    def update(self) -> Values:
-        """Next `Memory`, this sample's `Tape` row and any re-initialised `State`, from values at the sample's start."""
-        return {}
-
-    def keep(self) -> Any:
-        """Whether the trip that just ended may replace the tape's content."""
-        return True
-
     # ---------------------------------------------------------------- what the runtime needs to know
+
+    @property
+    def present_values(self) -> Values:
+        """What the equations read on ``self``, by name and alive: a runtime that drives the component writes here.
+
+        It holds build arguments as converted, variables other than outputs, random numbers, and ``time`` once a
+        runtime has set it. While ``update`` runs it holds ``step``, the length of the sample in s. Values are not
+        checked: the constructor and `Simulation.set` are for people.
+        """
+        return self.__dict__
 
     @property
     def step(self) -> float:
         """Length of the sample in s; only ``update`` may ask, because elsewhere it is not known."""
-        if self._step is None:
-            raise ComponentError(f"{type(self).__name__}: self.step is known only inside update()")
-        return self._step
+        try:
+            length: float = self.present_values["step"]
+        except KeyError:
+            raise ComponentError(f"{type(self).__name__}: self.step is known only inside update()") from None
+        return length
 
     def of(self, *kinds: type[Declaration]) -> Iterator[Slot]:
         """The slots declared as one of ``kinds``, in order of declaration."""
@@ -209,7 +219,7 @@ class Component:
     def _given(self, name: str, value: Any) -> Any:
         owner = type(self).__name__
         if name not in self.slots:  # a random number, given to look at one case
-            return convert(Slot(name, Variable(), "1", np.shape(self.__dict__[name]), 0.0), value, owner)
+            return convert(Slot(name, Input(), "1", np.shape(self.present_values[name]), 0.0), value, owner)
         if isinstance(self.slots[name].declaration, Output):
             raise ComponentError(f"{owner}.{name} is computed and cannot be set")
         return convert(self.slots[name], value, owner)
@@ -225,7 +235,15 @@ class Component:
         return Slot(name, declaration, unit, shape, convert(blank, declaration.start, type(self).__name__))
 
 
-_TIME = Slot("time", Variable("s"), "s", (), 0.0)
+def evaluated(component: Component, method: Method) -> Any:
+    """What one of a component's equation methods returns; nothing changes and every trip is kept where it has none."""
+    equations: Callable[[], Any] | None = getattr(component, method, None)
+    if equations is None:
+        return True if method == "keep" else {}
+    return equations()
+
+
+_TIME = Slot("time", Input("s"), "s", (), 0.0)
 
 
 def convert(slot: Slot, value: Any, owner: str) -> Any:
@@ -319,7 +337,7 @@ def _check_declarations(cls: type[Component]) -> None:
             raise ComponentError(f"{where}: hold must be a Parameter of the same component")
         if isinstance(declaration, State | Tape) and declaration.type is not float:
             raise ComponentError(f"{where}: a {type(declaration).__name__} is a real number")
-        taken = hasattr(Component, name) or name in ("slots", "build_arguments")
+        taken = name in Component.__annotations__ or hasattr(Component, name)
         if taken and not isinstance(vars(Component).get(name), Declaration):
             raise ComponentError(f"{where}: the name belongs to Component; choose another")
 
@@ -329,10 +347,3 @@ def _has_trip_inputs(cls: type[Component]) -> bool:
     if not (isinstance(trip, Input) and isinstance(trip_time, Input)):
         return False
     return not (trip.shape or trip_time.shape) and trip.type is int and trip_time.type is float
-
-
-def nearest(name: str, known: Iterable[str]) -> str:
-    """A misspelt name in quotes, with the nearest known one, or else with all of them."""
-    known = list(known)
-    close = difflib.get_close_matches(name, known, 1)
-    return f"{name!r}" + (f"; did you mean {close[0]!r}?" if close else f"; it has {', '.join(sorted(known))}")

@@ -6,21 +6,19 @@ and ``orchestrate describe`` all derive from it. On an instance the attribute of
 
 from __future__ import annotations
 
+from abc import ABC
 from collections.abc import Callable, Sequence
-from typing import TYPE_CHECKING, Any, Literal, Self, overload
-
-if TYPE_CHECKING:
-    from .component import Component
+from typing import Any, Literal, Self, overload
 
 ScalarType = type[float] | type[int] | type[bool] | type[str]
 Distribution = Literal["normal", "uniform"]
 
 
-class Declaration:
+class Declaration(ABC):
     """A named line in a component's interface. On an instance it reads as the value, on the class as itself."""
 
     name: str = ""
-    description: str = ""
+    description: str
 
     def __set_name__(self, owner: type, name: str) -> None:
         self.name = name
@@ -28,9 +26,9 @@ class Declaration:
     @overload
     def __get__(self, instance: None, owner: type) -> Self: ...
     @overload
-    def __get__(self, instance: Component, owner: type) -> Any: ...
-    def __get__(self, instance: Component | None, owner: type) -> Any:
-        # A non-data descriptor: the value in the instance's __dict__ wins, at the speed of a plain attribute.
+    def __get__(self, instance: object, owner: type) -> Any: ...
+    def __get__(self, instance: object, owner: type) -> Any:
+        # A non-data descriptor: a value of the instance wins, at the speed of a plain attribute.
         if instance is None:
             return self
         raise AttributeError(
@@ -83,7 +81,7 @@ class Data(Declaration):
 Shape = Sequence[int | Size | SizeExpression]
 
 
-class Variable(Declaration):
+class Variable(Declaration, ABC):
     """A declaration that holds values: scalar, or an array of the given shape.
 
     Args:

@@ -20,9 +20,10 @@ from typing import Any, Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from .component import Component, ComponentError, Slot, convert, nearest, pack
+from .component import Component, ComponentError, Slot, convert, evaluated, pack
 from .declarations import Input, Memory, Output, Parameter, State, Tape
-from .equations import Equations
+from .methods import Methods
+from .spelling import nearest
 from .tape import TapeDeck
 from .tracing import TracingError, feedthrough, initial_dependencies
 
@@ -46,8 +47,8 @@ class Simulation:
         self.component = component
         self.name = type(component).__name__
         self.phase: Phase = "instantiated"
-        self._equations = Equations(component)
-        self._values = component.__dict__
+        self._methods = Methods(component)
+        self._values = component.present_values
         self._given = {name: self._values[name] for name in component.slots if name in self._values}
         self._held_names = self._feedthrough_names() if component.is_sampled else frozenset()
         self._computed_starts = self._computed_start_names()
@@ -84,9 +85,9 @@ class Simulation:
             for k in range(count):
                 self._values["time"] = begin + k * sample
                 held = self._sample(sample, k * sample)
-                self._equations.integrate(begin + k * sample, sample)
+                self._methods.integrate(begin + k * sample, sample)
         else:
-            self._equations.integrate(begin, length)
+            self._methods.integrate(begin, length)
         self._values["time"] = begin + length
         self._fresh = None
         if held:
@@ -95,7 +96,7 @@ class Simulation:
     def terminate(self) -> None:
         """End the run: the tape, with the trip in progress if it is to be kept, goes to its file."""
         if self.phase == "running" and self._deck is not None and self._values["tape_file"]:
-            self._deck.commit(self.component.keep)
+            self._deck.commit(self._methods.keep)
             self._deck.save(Path(self._values["tape_file"]))
         self.phase = "terminated"
 
@@ -214,20 +215,20 @@ class Simulation:
         """One sample, ``elapsed`` seconds after the inputs were read; gives the outputs to be held."""
         values, deck = self._values, self._deck
         if deck is not None:
-            deck.follow(values["trip"], values["trip_time"], self.component.keep)
+            deck.follow(values["trip"], values["trip_time"], self._methods.keep)
         outputs = self._evaluate(elapsed)
-        changes = self._equations.update(period)
+        changes = self._methods.update(period)
         if deck is not None:
             deck.record(self._trip_time(elapsed), changes)
-        values.update((slot.name, changes[slot.name]) for slot in self._equations.memory)
-        values.update((slot.name, changes[slot.name]) for slot in self._equations.states if slot.name in changes)
+        values.update((slot.name, changes[slot.name]) for slot in self._methods.memory)
+        values.update((slot.name, changes[slot.name]) for slot in self._methods.states if slot.name in changes)
         return {name: outputs[name] for name in self._held_names}
 
     def _evaluate(self, elapsed: float = 0.0) -> dict[str, Any]:
-        self._equations.draw()
+        self._methods.draw()
         if self._deck is not None:
             self._values.update(self._deck.read(self._trip_time(elapsed)))
-        return self._equations.evaluate()
+        return self._methods.evaluate()
 
     def _trip_time(self, elapsed: float) -> float:
         """Time along the trip: within a communication step of several samples the tape runs on; a wait stays a wait."""
@@ -242,9 +243,9 @@ class Simulation:
         if self._prepared:
             return
         self._values.update((name, self._given[name]) for name in self._computed_starts)
-        self._equations.draw()
-        self._values.update(self._equations.initial())
-        if self._equations.tapes:
+        self._methods.draw()
+        self._values.update(self._methods.initial())
+        if self._methods.tapes:
             self._deck = self._make_deck()
             path = self._values["tape_file"]
             if path and Path(path).exists():
@@ -255,7 +256,7 @@ class Simulation:
         values = self._values
         return TapeDeck(
             self.name,
-            self._equations.tapes,
+            self._methods.tapes,
             self._given,
             sample_time=values["sample_time"],
             duration=values["tape_duration"],
@@ -264,14 +265,14 @@ class Simulation:
 
     def _computed_start_names(self) -> frozenset[str]:
         """The states and memory that ``initial`` computes."""
-        if type(self.component).initial is Component.initial:
+        if not hasattr(self.component, "initial"):
             return frozenset()
         try:
-            traced, _ = initial_dependencies(self.component)
+            computed, _ = initial_dependencies(self.component)
         except TracingError:
-            return frozenset(self.component.initial())
+            return frozenset(evaluated(self.component, "initial"))
         kept = self.component.of(State, Memory)
-        return frozenset(slot.name for slot in kept if not traced.keys().isdisjoint(slot.scalars))
+        return frozenset(slot.name for slot in kept if not computed.keys().isdisjoint(slot.scalars))
 
     # ---------------------------------------------------------------- checks
 
@@ -290,8 +291,8 @@ class Simulation:
         try:
             direct = feedthrough(self.component)
         except TracingError:
-            return frozenset(slot.name for slot in self._equations.outputs)
-        return frozenset(s.name for s in self._equations.outputs if any(direct[scalar] for scalar in s.scalars))
+            return frozenset(slot.name for slot in self._methods.outputs)
+        return frozenset(s.name for s in self._methods.outputs if any(direct[scalar] for scalar in s.scalars))
 
     def _check_bounds(self, slot: Slot, value: Any) -> None:
         low, high = slot.declaration.minimum, slot.declaration.maximum

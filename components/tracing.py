@@ -1,14 +1,16 @@
-"""Which outputs depend on which inputs, found by running the equations on values that remember where they came from."""
+"""Which outputs depend on which inputs, found by tracing the equations on values that remember where they came from.
+
+To trace is to run the equations on stand-ins for numbers: here on names, in `fmus.trace` on expressions that become C.
+"""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
 from typing import Any
 
 import numpy as np
 
-from .component import Component, ComponentError
+from .component import Component, ComponentError, Method, evaluated
 from .declarations import Input, Memory, Output, Parameter, State, Tape
 from .maths import SymbolArray, elementwise
 
@@ -23,7 +25,7 @@ class TracingError(ComponentError):
     """An equation did something with a value that only works on plain numbers."""
 
 
-class Traced:
+class Sourced:
     """A value that carries the names it was computed from, and stands in for a number in the equations."""
 
     __slots__ = ("names",)
@@ -37,9 +39,9 @@ class Traced:
         # NumPy leaves an operation of an array with a symbol to the symbol, whichever side it stands on.
         if any(isinstance(other, np.ndarray) for other in others):
             return elementwise(self._join, *others)
-        return Traced(self.names.union(*(other.names for other in others if isinstance(other, Traced))))
+        return Sourced(self.names.union(*(other.names for other in others if isinstance(other, Sourced))))
 
-    def apply(self, function: str) -> Traced:
+    def apply(self, function: str) -> Sourced:
         """The result of a unary function of `maths`."""
         return self
 
@@ -67,24 +69,24 @@ def dependencies(component: Component) -> dict[str, Names]:
     Raises:
         TracingError: the equations treat values as plain numbers; the message names component, method and remedy.
     """
-    probe = _traced_copy(component)
-    return _collect(component, "outputs", probe.outputs, Output)
+    probe = _sourced_copy(component)
+    return _collect(probe, "outputs", Output)
 
 
 def rate_dependencies(component: Component) -> dict[str, Names]:
     """The same for the rate of each scalar state."""
-    return _collect(component, "derivatives", _traced_copy(component).derivatives, State)
+    return _collect(_sourced_copy(component), "derivatives", State)
 
 
 def initial_dependencies(component: Component) -> tuple[dict[str, Names], dict[str, Names]]:
     """The same for the initial state: of what ``initial`` computes, and of the outputs that follow from it."""
-    probe = _traced_copy(component)
-    computed = _collect(component, "initial", probe.initial, State, Memory)
+    probe = _sourced_copy(component)
+    computed = _collect(probe, "initial", State, Memory)
     for slot in probe.of(State, Memory):
         if slot.scalars and slot.scalars[0] in computed:
-            cells = [Traced(computed[name]) for name in slot.scalars]
-            probe.__dict__[slot.name] = _cells(cells, slot.shape)
-    return computed, _collect(component, "outputs", probe.outputs, Output)
+            cells = [Sourced(computed[name]) for name in slot.scalars]
+            probe.present_values[slot.name] = _cells(cells, slot.shape)
+    return computed, _collect(probe, "outputs", Output)
 
 
 def feedthrough(component: Component) -> dict[str, Names]:
@@ -94,22 +96,22 @@ def feedthrough(component: Component) -> dict[str, Names]:
     return {name: direct.get(name, frozenset()) for slot in component.output_slots for name in slot.scalars}
 
 
-def _traced_copy(component: Component) -> Component:
+def _sourced_copy(component: Component) -> Component:
     probe = type(component)(**component.build_arguments)
     for slot in probe.of(Input, Parameter, State, Memory, Tape):
         if slot.type is str:  # a text is not traced: equations may compare it
             continue
-        cells = [Traced(_TAPE_SOURCES if isinstance(slot.declaration, Tape) else frozenset({n})) for n in slot.scalars]
-        probe.__dict__[slot.name] = _cells(cells, slot.shape)
+        cells = [Sourced(_TAPE_SOURCES if isinstance(slot.declaration, Tape) else frozenset({n})) for n in slot.scalars]
+        probe.present_values[slot.name] = _cells(cells, slot.shape)
     for name, noise in probe.noises.items():
-        shape = np.shape(probe.__dict__[name])
+        shape = np.shape(probe.present_values[name])
         sources = frozenset({"time", "seed", noise.hold.name})
-        probe.__dict__[name] = _cells([Traced(sources) for _ in range(math.prod(shape))], shape)
-    probe.__dict__["time"] = Traced(frozenset({"time"}))
+        probe.present_values[name] = _cells([Sourced(sources) for _ in range(math.prod(shape))], shape)
+    probe.present_values["time"] = Sourced(frozenset({"time"}))
     return probe
 
 
-def _cells(cells: list[Traced], shape: tuple[int, ...]) -> Any:
+def _cells(cells: list[Sourced], shape: tuple[int, ...]) -> Any:
     if not shape:
         return cells[0]
     array = np.empty(len(cells), dtype=object)
@@ -117,12 +119,10 @@ def _cells(cells: list[Traced], shape: tuple[int, ...]) -> Any:
     return array.reshape(shape).view(SymbolArray)
 
 
-def _collect(
-    component: Component, method: str, call: Callable[[], dict[str, Any]], *kinds: type[Output | State | Memory]
-) -> dict[str, Names]:
+def _collect(component: Component, method: Method, *kinds: type[Output | State | Memory]) -> dict[str, Names]:
     where = f"{type(component).__name__}.{method}"
     try:
-        returned = dict(call())
+        returned = dict(evaluated(component, method))
     except TracingError as error:
         raise TracingError(f"{where}: {error}") from error
     except Exception as error:
@@ -143,6 +143,6 @@ def _collect(
         if cells.shape != slot.shape:
             raise ComponentError(f"{where}: {name!r} has shape {cells.shape}, declared {slot.shape}")
         for scalar, cell in zip(slot.scalars, cells.flat, strict=True):
-            names = cell.names if isinstance(cell, Traced) else frozenset()
+            names = cell.names if isinstance(cell, Sourced) else frozenset()
             found[scalar] = names | texts if slot.type is str else names
     return found

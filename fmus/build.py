@@ -2,28 +2,26 @@
 
 from __future__ import annotations
 
-import contextlib
-import difflib
 import hashlib
-import importlib
 import importlib.util
-import json
 import os
-import sys
 import tempfile
 import zipfile
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from types import ModuleType
 from typing import Any
 
 import platformdirs
 
-from ..components import CATALOGUE, Component, ComponentError, Simulation
+from ..components import Component, Simulation
+from ..components.tracing import TracingError
 from . import native_fmu, python_fmu, toolchain
-from .description import Kind, write
+from .description import write
 from .identity import source_digest
+from .kinds import FmuKind, PackagingKind
+from .references import read_arguments, resolve
+from .toolchain import CompilerError
 
 _EPOCH = (1980, 1, 1, 0, 0, 0)
 """The earliest time a zip can hold: archives of equal content are equal files."""
@@ -35,6 +33,7 @@ class Plain:
 
     component: type[Component]
     arguments: Mapping[str, Any]
+    digest: str
     description: bytes
 
     def instantiate(self) -> Simulation:
@@ -42,34 +41,11 @@ class Plain:
         return Simulation(self.component(**self.arguments))
 
 
-def resolve(reference: str, folder: Path | None = None) -> type[Component]:
-    """The component behind a catalogue name or ``"file.py:Class"``.
-
-    Args:
-        reference: what a scenario or the command line says.
-        folder: where a relative file path starts; the current folder by default.
-
-    Raises:
-        ComponentError: no such name, file or class; the message suggests the nearest one.
-    """
-    path, colon, name = reference.rpartition(":")
-    if not colon or not path.endswith(".py"):
-        if reference in CATALOGUE:
-            return CATALOGUE[reference]
-        raise ComponentError(f"there is no component {_nearest(reference, CATALOGUE)}")
-    module = _load_file((folder or Path()) / path)
-    found = {k: v for k, v in vars(module).items() if isinstance(v, type) and issubclass(v, Component)}
-    own = {k: v for k, v in found.items() if v.__module__ == module.__name__}
-    if name not in own:
-        raise ComponentError(f"{path} has no component {_nearest(name, own)}")
-    return own[name]
-
-
 def build(
     reference: str,
     arguments: Mapping[str, Any] | None = None,
     *,
-    kind: Kind = "python",
+    kind: FmuKind = "python",
     platforms: Sequence[str] = (),
     folder: Path | None = None,
 ) -> Path:
@@ -92,25 +68,7 @@ def build(
     return build_component(component, kind, platforms)
 
 
-def read_arguments(arguments: Mapping[str, Any] | None) -> dict[str, Any]:
-    """Build arguments with data files read: a text that ends in ``.json`` names one.
-
-    Raises:
-        ComponentError: the file is missing or is not JSON.
-    """
-    given = dict(arguments or {})
-    for name, value in given.items():
-        if isinstance(value, str) and value.endswith(".json"):
-            try:
-                given[name] = json.loads(Path(value).read_text(encoding="utf-8"))
-            except OSError as error:
-                raise ComponentError(f"{name}: {value} cannot be read: {error.strerror or error}") from error
-            except ValueError as error:
-                raise ComponentError(f"{name}: {value} is not JSON: {error}") from error
-    return given
-
-
-def build_component(component: Component, kind: Kind = "python", platforms: Sequence[str] = ()) -> Path:
+def build_component(component: Component, kind: FmuKind = "python", platforms: Sequence[str] = ()) -> Path:
     """The same for a component at hand; its values become the FMU's start values."""
     name, digest = type(component).__name__, source_digest(component, kind)
     if kind == "python":
@@ -134,6 +92,31 @@ def _keep(identity: str, name: str, make: Callable[[], Mapping[str, bytes]]) -> 
     return target
 
 
+def package(
+    reference: str,
+    arguments: Mapping[str, Any],
+    kind: PackagingKind = "auto",
+    platforms: Sequence[str] = (),
+) -> tuple[Path, FmuKind, str]:
+    """The FMU of a component in the cache, its kind, and why it is not native if that was left open."""
+    if kind != "auto":
+        return build(reference, arguments, kind=kind, platforms=platforms), kind, ""
+    component = resolve(reference)
+    problem = native_problem(component)
+    if platforms and not component.requires:
+        problem = ""  # asked for by name: what is missing is an error then, not a reason for another kind
+    if not problem:
+        try:
+            return build(reference, arguments, kind="native", platforms=platforms), "native", ""
+        except TracingError as error:
+            problem = str(error).splitlines()[0]
+        except CompilerError as error:
+            if platforms:
+                raise
+            problem = str(error).splitlines()[0]
+    return build(reference, arguments, kind="python"), "python", problem
+
+
 def native_problem(component: type[Component]) -> str:
     """Why a component cannot become a native FMU here, in one line; empty if it can."""
     if component.requires:
@@ -150,7 +133,8 @@ def plain(reference: str, arguments: Mapping[str, Any] | None = None, *, folder:
     cls = resolve(reference, folder)
     given = read_arguments(arguments)
     component = cls(**given)
-    return Plain(cls, given, write(component, "python", source_digest(component, "python")))
+    digest = source_digest(component, "python")
+    return Plain(cls, given, digest, write(component, "python", digest))
 
 
 def cache_folder() -> Path:
@@ -176,65 +160,3 @@ def write_archive(archive: Mapping[str, bytes], target: Path) -> None:
     except BaseException:
         Path(name).unlink(missing_ok=True)
         raise
-
-
-def _load_file(path: Path) -> ModuleType:
-    """Run a user's component file as a module of its own, anew each time, because it may have been edited."""
-    path = path.resolve()
-    if not path.is_file():
-        raise ComponentError(f"there is no file {path}")
-    name = f"railcosim_user_{hashlib.sha256(str(path).encode()).hexdigest()[:16]}"
-    spec = importlib.util.spec_from_file_location(name, path)
-    if spec is None or spec.loader is None:
-        raise ComponentError(f"{path} cannot be read as Python")
-    module = importlib.util.module_from_spec(spec)
-    sys.modules[name] = module
-    try:
-        with _neighbours(path.parent):
-            spec.loader.exec_module(module)
-    except Exception as error:
-        line = _line_in(error, path)
-        raise ComponentError(f"{path}{f':{line}' if line else ''}: {type(error).__name__}: {error}") from error
-    return module
-
-
-@contextlib.contextmanager
-def _neighbours(folder: Path) -> Iterator[None]:
-    """Modules beside a user's file import as they would from its folder, and are forgotten afterwards.
-
-    Otherwise the first ``helper.py`` of a process would serve every component that has a module of that name, and a
-    compiled file left behind could outlive an edit within the same second.
-    """
-    names = (
-        {file.stem for file in folder.glob("*.py")} - sys.stdlib_module_names - {"numpy", __package__.partition(".")[0]}
-    )
-    before = {name: sys.modules.pop(name) for name in names if name in sys.modules}
-    writes_bytecode, sys.dont_write_bytecode = sys.dont_write_bytecode, True
-    sys.path.insert(0, str(folder))
-    importlib.invalidate_caches()
-    try:
-        yield
-    finally:
-        sys.path.remove(str(folder))
-        sys.dont_write_bytecode = writes_bytecode
-        for name in names:
-            sys.modules.pop(name, None)
-        sys.modules.update(before)
-
-
-def _line_in(error: BaseException, path: Path) -> int | None:
-    if isinstance(error, SyntaxError) and error.filename == str(path):
-        return error.lineno
-    line, trace = None, error.__traceback__
-    while trace is not None:
-        if trace.tb_frame.f_code.co_filename == str(path):
-            line = trace.tb_lineno
-        trace = trace.tb_next
-    return line
-
-
-def _nearest(name: str, known: Mapping[str, Any]) -> str:
-    close = difflib.get_close_matches(name, known, 1)
-    if close:
-        return f"{name!r}; did you mean {close[0]!r}?"
-    return f"{name!r}; there is {', '.join(sorted(known)) or 'none'}; one of your own is written file.py:Class"

@@ -6,26 +6,23 @@ import importlib.metadata
 import json
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Any, Literal
+from typing import Any
 
 import numpy as np
 from lxml import etree
 
-from ..components.component import Component, ComponentError
+from ..components.component import Component, ComponentError, evaluated
 from ..components.declarations import Input, Memory, Parameter, State
 from ..components.tracing import Names, TracingError, dependencies, initial_dependencies, rate_dependencies
+from .annotation import TOOL, Annotation
+from .annotation import write as write_annotation
+from .kinds import NOTE_OF_KIND, FmuKind
 from .units import BASE, parse
 from .variables import ScalarVariable, scalar_variables
 
-Kind = Literal["python", "native"]
-TOOL = "railcosim"
 SOURCE = "all.c"
 """The source file of a native FMU that includes the others. Named after the model it could hide one of them."""
 _ELEMENT = {float: "Real", int: "Integer", bool: "Boolean", str: "String"}
-NOTE_OF_KIND: dict[Kind, str] = {
-    "python": "runs in the importing process's Python: needs Python 3.11+ and NumPy there",
-    "native": "compiled C: needs nothing but the C library",
-}
 _LOG_CATEGORIES = {
     "logStatusError": "what went wrong; always sent",
     "logStatusWarning": "what is doubtful; always sent",
@@ -35,7 +32,7 @@ _LOG_CATEGORIES = {
 
 @dataclass(frozen=True)
 class Structure:
-    """What depends on what, found by running the equations; None where they cannot be traced.
+    """What depends on what, found by running the equations; None where they cannot be depends.
 
     Attributes:
         direct: for each scalar output, the inputs and states it depends on at one instant.
@@ -59,12 +56,12 @@ def structure(component: Component) -> Structure:
     except TracingError:
         if not component.requires:
             raise
-        started = component.initial()
+        started = evaluated(component, "initial")
         names = frozenset(n for s in component.of(State, Memory) if s.name in started for n in s.scalars)
         return Structure(None, None, None, names)
 
 
-def write(component: Component, kind: Kind, digest: str) -> bytes:
+def write(component: Component, kind: FmuKind, digest: str) -> bytes:
     """The model description of a component's FMU.
 
     Args:
@@ -74,14 +71,14 @@ def write(component: Component, kind: Kind, digest: str) -> bytes:
 
     Raises:
         ComponentError: a name that FMI does not allow, build arguments that are not JSON, or equations that cannot be
-            traced.
+            depends.
     """
     cls = type(component)
     variables = scalar_variables(component)
     for name in (cls.__name__, *component.slots):
         if not name.isascii():
             raise ComponentError(f"{cls.__name__}: FMI allows ASCII letters, digits and _ in names; rename {name!r}")
-    traced = structure(component)
+    depends = structure(component)
     root = etree.Element(
         "fmiModelDescription",
         fmiVersion="2.0",
@@ -118,22 +115,20 @@ def write(component: Component, kind: Kind, digest: str) -> bytes:
         for name, description in _LOG_CATEGORIES.items():
             etree.SubElement(categories, "Category", name=name, description=description)
     etree.SubElement(root, "DefaultExperiment", startTime="0", stepSize=_number(default_step(component)))
-    annotations = etree.SubElement(root, "VendorAnnotations")
-    tool = etree.SubElement(annotations, "Tool", name=TOOL)
-    etree.SubElement(tool, "component", **_annotation(component, kind, digest))
+    write_annotation(_annotation(component, kind, digest), root)
     block = etree.SubElement(root, "ModelVariables")
     for variable in variables:
-        _write_variable(block, variable, component, traced)
+        _write_variable(block, variable, component, depends)
     for rate in rates:
         _write_rate(block, rate)
-    _write_structure(root, variables, rates, traced)
+    _write_structure(root, variables, rates, depends)
     text: bytes = etree.tostring(root, xml_declaration=True, encoding="UTF-8", pretty_print=True)
     return text
 
 
 def default_step(component: Component) -> float:
     """The communication step in s for whoever has no other wish."""
-    values = component.__dict__
+    values = component.present_values
     return float(type(component).recommended_step or values.get("sample_time") or values.get("max_step") or 0.1)
 
 
@@ -156,23 +151,22 @@ def arguments(component: Component) -> str:
         ) from error
 
 
-def _annotation(component: Component, kind: Kind, digest: str) -> dict[str, str]:
+def _annotation(component: Component, kind: FmuKind, digest: str) -> Annotation:
     cls = type(component)
-    optional = [n for s in component.of(Input) if s.declaration.optional for n in s.scalars]  # type: ignore[attr-defined]
-    fields = {
-        "name": cls.__name__,
-        "arguments": arguments(component),
-        "digest": digest,
-        "kind": kind,
-        "kindNote": NOTE_OF_KIND[kind],
-        "source": cls.source,
-        "note": cls.note,
-        "requires": " ".join(cls.requires),
-        "optionalInputs": " ".join(optional),
-        "recommendedStep": "" if cls.recommended_step is None else _number(cls.recommended_step),
-        "sampled": "true" if component.is_sampled else "",
-    }
-    return {name: value for name, value in fields.items() if value}
+    inputs = ((slot, slot.declaration) for slot in component.of(Input))
+    return Annotation(
+        component=cls.__name__,
+        arguments=json.loads(arguments(component)),
+        digest=digest,
+        kind=kind,
+        kind_note=NOTE_OF_KIND[kind],
+        source=cls.source,
+        note=cls.note,
+        requires=cls.requires,
+        optional_inputs=tuple(n for s, d in inputs if isinstance(d, Input) and d.optional for n in s.scalars),
+        recommended_step=cls.recommended_step,
+        sampled=component.is_sampled,
+    )
 
 
 @dataclass(frozen=True)
@@ -226,19 +220,19 @@ def _write_units(root: Any, names: set[str]) -> None:
         etree.SubElement(etree.SubElement(block, "Unit", name=name), "BaseUnit", **exponents, **scale, **shift)
 
 
-def initial_kind(variable: ScalarVariable, traced: Structure) -> str | None:
+def initial_kind(variable: ScalarVariable, depends: Structure) -> str | None:
     """FMI ``initial``: only parameters and states that nothing computes are exact; inputs have none."""
     declaration = variable.slot.declaration
     if isinstance(declaration, Input):
         return None
     if isinstance(declaration, Parameter):
         return "exact"
-    if isinstance(declaration, State | Memory) and variable.name not in traced.computed:
+    if isinstance(declaration, State | Memory) and variable.name not in depends.computed:
         return "exact"
     return "calculated"
 
 
-def _write_variable(block: Any, variable: ScalarVariable, component: Component, traced: Structure) -> None:
+def _write_variable(block: Any, variable: ScalarVariable, component: Component, depends: Structure) -> None:
     declaration, slot = variable.slot.declaration, variable.slot
     attributes = {
         "name": variable.name,
@@ -247,7 +241,7 @@ def _write_variable(block: Any, variable: ScalarVariable, component: Component, 
         "causality": variable.causality,
         "variability": variable.variability,
     }
-    initial = initial_kind(variable, traced)
+    initial = initial_kind(variable, depends)
     if initial is not None:
         attributes["initial"] = initial
     element = etree.SubElement(
@@ -260,26 +254,26 @@ def _write_variable(block: Any, variable: ScalarVariable, component: Component, 
             if value is not None:
                 element.set(bound, _number(value) if slot.type is float else str(int(value)))
     if initial != "calculated":
-        value = component.__dict__[slot.name]
+        value = component.present_values[slot.name]
         element.set("start", _text(value if variable.element is None else np.ravel(value)[variable.element]))
 
 
 def _write_structure(
-    root: Any, variables: tuple[ScalarVariable, ...], rates: tuple[Rate, ...], traced: Structure
+    root: Any, variables: tuple[ScalarVariable, ...], rates: tuple[Rate, ...], depends: Structure
 ) -> None:
     """Outputs, Derivatives and InitialUnknowns; states are knowns only where their rates are listed."""
     block = etree.SubElement(root, "ModelStructure")
     index = {v.name: str(v.reference + 1) for v in variables} | {rate.name: str(rate.reference + 1) for rate in rates}
     inputs = {v.name for v in variables if v.causality == "input"}
     states = {rate.state.name for rate in rates}
-    exact = {v.name for v in variables if initial_kind(v, traced) == "exact"}
-    computed = [v.name for v in variables if initial_kind(v, traced) == "calculated"]
+    exact = {v.name for v in variables if initial_kind(v, depends) == "exact"}
+    computed = [v.name for v in variables if initial_kind(v, depends) == "calculated"]
     shown = [v.name for v in variables if v.causality == "output"]
-    of_rates = None if traced.rates is None else {f"der({name})": names for name, names in traced.rates.items()}
+    of_rates = None if depends.rates is None else {f"der({name})": names for name, names in depends.rates.items()}
     unknowns = [name for name in computed if name in shown or name in states]
-    initial = None if traced.initial is None or of_rates is None else {**of_rates, **traced.initial}
+    initial = None if depends.initial is None or of_rates is None else {**of_rates, **depends.initial}
     for tag, members, sources, knowns in (
-        ("Outputs", shown, traced.direct, inputs | states),
+        ("Outputs", shown, depends.direct, inputs | states),
         ("Derivatives", [rate.name for rate in rates], of_rates, inputs | states),
         ("InitialUnknowns", [*unknowns, *(rate.name for rate in rates)], initial, inputs | exact),
     ):

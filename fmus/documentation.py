@@ -13,8 +13,9 @@ from ..components import __name__ as _shipped
 from ..components.component import Component, ComponentError
 from ..components.declarations import State
 from ..components.tracing import TracingError, feedthrough
-from .description import NOTE_OF_KIND, Kind, arguments, summary
+from .description import arguments, summary
 from .formulas import Formulas
+from .kinds import NOTE_OF_KIND, FmuKind
 from .reference_signals import EXCITATION, STEPS, reference_signals
 from .variables import scalar_variables
 
@@ -27,7 +28,7 @@ _STYLE = (
 )
 
 
-def files(component: Component, kind: Kind) -> dict[str, bytes]:
+def files(component: Component, kind: FmuKind) -> dict[str, bytes]:
     """Everything an FMU holds for people, by path: ``documentation/`` with signals and licences, and ``model.png``.
 
     Raises:
@@ -40,12 +41,12 @@ def files(component: Component, kind: Kind) -> dict[str, bytes]:
     return archive | {"model.png": (_RESOURCES / "icon.png").read_bytes()}
 
 
-def page(component: Component, kind: Kind) -> str:
+def page(component: Component, kind: FmuKind) -> str:
     """The page as HTML: what the component is, its equations and source, how to step it, and its interface."""
     return _page(component, kind, reference_signals(component))
 
 
-def _page(component: Component, kind: Kind, signals: dict[str, str]) -> str:
+def _page(component: Component, kind: FmuKind, signals: dict[str, str]) -> str:
     cls = type(component)
     rows = "".join(
         f"<tr><td><code>{html.escape(v.name)}</code></td><td>{v.causality}</td><td>{v.variability}</td>"
@@ -81,13 +82,13 @@ def _equations(cls: type[Component]) -> str:
 
 
 def _start(component: Component, name: str, element: int | None) -> str:
-    value = component.__dict__[name]
+    value = component.present_values[name]
     return html.escape(str(value if element is None else np.ravel(value)[element]))
 
 
 def _stepping(component: Component) -> list[str]:
     """What the importing tool must do about step and order, one sentence or two for each."""
-    longest, values = type(component).recommended_step, component.__dict__
+    longest, values = type(component).recommended_step, component.present_values
     lines = [f"Recommended communication step: {longest:g} s or shorter."] if longest else []
     if component.is_sampled:
         period = values["sample_time"]
@@ -135,7 +136,7 @@ def _signals(signals: dict[str, str]) -> str:
     )
 
 
-def _licences(component: Component, kind: Kind) -> dict[str, str]:
+def _licences(component: Component, kind: FmuKind) -> dict[str, str]:
     """The licence texts by file name; ``license.txt`` is where FMI expects the first of them."""
     cls = type(component)
     own = (_RESOURCES / "license.txt").read_text(encoding="utf-8")

@@ -20,7 +20,7 @@ from ..components.component import Component, ComponentError
 _PROJECT = components.__name__.rpartition(".")[0]
 _COMPONENTS = Path(inspect.getfile(components)).parent
 _FMUS = Path(__file__).parent
-_RUNTIME = ("fmus/slave.py", "fmus/variables.py")
+_RUNTIME = ("fmus/pythonfmu_slave.py", "fmus/variables.py")
 
 
 def embedded_files(cls: type[Component]) -> tuple[dict[str, str], str]:

@@ -12,15 +12,17 @@ from pathlib import Path
 import numpy as np
 
 from ..components.component import Component, ComponentError
-from .description import TOOL, Kind, arguments
+from .annotation import TOOL
+from .description import arguments
 from .embed import embedded_files
+from .kinds import FmuKind
 
 _FOLDER = Path(__file__).parent
-_MAKERS: dict[Kind, tuple[str, ...]] = {"python": (TOOL, "pythonfmu"), "native": (TOOL, "casadi")}
+_MAKERS: dict[FmuKind, tuple[str, ...]] = {"python": (TOOL, "pythonfmu"), "native": (TOOL, "casadi")}
 _MADE_BY = ("*.py", "resources/*.png", "resources/*.txt", "runtime/*.[ch]")
 
 
-def source_digest(component: Component, kind: Kind) -> str:
+def source_digest(component: Component, kind: FmuKind) -> str:
     """Hash of what an FMU is made from, without making it: sources, values, and everything that packages them.
 
     Raises:
@@ -34,7 +36,7 @@ def source_digest(component: Component, kind: Kind) -> str:
 
 
 @functools.cache
-def _packaging(kind: Kind) -> bytes:
+def _packaging(kind: FmuKind) -> bytes:
     """The part that is the same for every component: this package, and the versions of those it calls."""
     files = sorted(path for pattern in _MADE_BY for path in _FOLDER.glob(pattern))
     parts = {path.relative_to(_FOLDER).as_posix(): path.read_bytes() for path in files}
@@ -50,7 +52,7 @@ def _packaging(kind: Kind) -> bytes:
 
 def given_values(component: Component) -> str:
     """Build arguments and the values that differ from the declared start values, as JSON."""
-    values = component.__dict__
+    values = component.present_values
     kept = (slot for slot in component.slots.values() if slot.name in values)
     changed = {s.name: np.asarray(values[s.name]).tolist() for s in kept if not np.array_equal(values[s.name], s.start)}
     return json.dumps(json.loads(arguments(component)) | changed, sort_keys=True)

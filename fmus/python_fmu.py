@@ -52,7 +52,7 @@ def _slave_module(package: str, module: str, name: str, arguments: str) -> str:
     return (
         "import ctypes\n\n"
         f"from {package}.{module} import {name}\n"
-        f"from {package}.fmus.slave import Fmi2Slave\n\n"
+        f"from {package}.fmus.pythonfmu_slave import Fmi2Slave\n\n"
         "ctypes.pythonapi.Py_IncRef(ctypes.py_object(globals()))\n\n\n"
         f"class Slave(Fmi2Slave):\n"
         f"    component = {name}\n"

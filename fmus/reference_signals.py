@@ -59,7 +59,7 @@ def reference_signals(component: Component) -> dict[str, str]:
 def _fresh(component: Component) -> Component:
     """Another of the same build arguments and values; it reads and writes no tape."""
     computed = [slot.name for slot in component.of(Output)]
-    values = {name: component.__dict__[name] for name in component.slots if name not in computed}
+    values = {name: component.present_values[name] for name in component.slots if name not in computed}
     if "tape_file" in values:
         values["tape_file"] = ""
     return type(component)(**component.build_arguments, **values)
@@ -68,7 +68,7 @@ def _fresh(component: Component) -> Component:
 def _excitation(component: Component, inputs: list[Slot], time: float, duration: float) -> dict[str, Any]:
     values, count = {}, 0
     for slot in inputs:
-        start = component.__dict__[slot.name]
+        start = component.present_values[slot.name]
         cells = [_excited(slot, x, time, duration, count + k) for k, x in enumerate(np.ravel(start).tolist())]
         values[slot.name] = np.array(cells).reshape(slot.shape) if slot.shape else cells[0]
         count += len(cells)

@@ -9,14 +9,13 @@ import tempfile
 import time
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
-from typing import Any, Literal
+from typing import Any
 
 from ..components import ComponentError
-from ..components.tracing import TracingError
 from . import toolchain
-from .build import build, native_problem, resolve
-from .description import Kind
-from .toolchain import CompilerError
+from .build import package
+from .kinds import PackagingKind
+from .references import resolve
 
 CHECKSUMS = "SHA256SUMS"
 
@@ -26,7 +25,7 @@ def release(
     arguments: Mapping[str, Any],
     directory: Path,
     *,
-    kind: Literal["auto", "native", "python"] = "auto",
+    kind: PackagingKind = "auto",
     platforms: Sequence[str] = (),
     checksums: bool = False,
     tell: Callable[[str], None] = lambda line: None,
@@ -75,38 +74,13 @@ def release(
     return written
 
 
-def package(
-    reference: str,
-    arguments: Mapping[str, Any],
-    kind: Literal["auto", "native", "python"],
-    platforms: Sequence[str] = (),
-) -> tuple[Path, Kind, str]:
-    """The FMU of a component in the cache, its kind, and why it is not native if that was left open."""
-    if kind != "auto":
-        return build(reference, arguments, kind=kind, platforms=platforms), kind, ""
-    component = resolve(reference)
-    problem = native_problem(component)
-    if platforms and not component.requires:
-        problem = ""  # asked for by name: what is missing is an error then, not a reason for another kind
-    if not problem:
-        try:
-            return build(reference, arguments, kind="native", platforms=platforms), "native", ""
-        except TracingError as error:
-            problem = str(error).splitlines()[0]
-        except CompilerError as error:
-            if platforms:
-                raise
-            problem = str(error).splitlines()[0]
-    return build(reference, arguments, kind="python"), "python", problem
-
-
 def default_directory() -> Path:
     """``fmus/dist`` in a checkout, the current folder elsewhere."""
     checkout = Path("fmus/build.py").is_file() and Path("pyproject.toml").is_file()
     return Path("fmus/dist") if checkout else Path()
 
 
-def _check(references: Sequence[str], kind: str, platforms: Sequence[str]) -> None:
+def _check(references: Sequence[str], kind: PackagingKind, platforms: Sequence[str]) -> None:
     if kind == "python" and platforms:
         raise ComponentError("--platforms is for native FMUs; a Python FMU always carries linux64 and win64")
     names: dict[str, str] = {}

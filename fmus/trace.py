@@ -17,7 +17,7 @@ from typing import Any, NoReturn
 import casadi as ca
 import numpy as np
 
-from ..components.component import Component, ComponentError, Slot
+from ..components.component import Component, ComponentError, Method, Slot, evaluated
 from ..components.declarations import Memory, Output, State, Tape
 from ..components.maths import SymbolArray, elementwise
 from ..components.tracing import TracingError
@@ -181,7 +181,7 @@ def layout(component: Component) -> Layout:
         return (references[0], len(references)) if references else (len(variables), 0)
 
     columns = sum(len(slot.scalars) for slot in component.of(Tape))
-    cells = sum(int(np.size(component.__dict__[name])) for name in component.noises)
+    cells = sum(int(np.size(component.present_values[name])) for name in component.noises)
     count = len(variables)
     return Layout(count, place(Output), place(State), place(Memory), (count, columns), (count + columns, cells))
 
@@ -222,7 +222,7 @@ class _Tracer:
         self._fill()
 
     def _fill(self) -> None:
-        place = self.probe.__dict__
+        place = self.probe.present_values
         references = {v.name: v.reference for v in scalar_variables(self.probe)}
         for slot in self.probe.slots.values():
             if slot.type is str:
@@ -251,9 +251,9 @@ class _Tracer:
         computed = [slot for slot in kept if slot.name in started]
         initial = self._flat(started, computed, "initial")
         remembered = [*self.probe.of(Memory), *self.probe.of(Tape)]
-        self.probe.__dict__["_step"] = Symbol(self.clock[1])
+        self.probe.present_values["step"] = Symbol(self.clock[1])
         updated = self._returned("update", [*remembered, *self.probe.of(State)])
-        del self.probe.__dict__["_step"]
+        del self.probe.present_values["step"]
         again = [slot for slot in self.probe.of(State) if slot.name in updated]
         update = self._flat(updated, [*remembered, *again], "update")
         keep = [_expression(self._call("keep"))]
@@ -285,16 +285,16 @@ class _Tracer:
             results = [derivative[k] for k in range(len(column))]
             return function(f"{self.prefix}_{name}", [*arguments, ("seed", seed)], results)
 
-    def _results(self, method: str, slots: list[Slot]) -> list[Any]:
+    def _results(self, method: Method, slots: list[Slot]) -> list[Any]:
         return self._flat(self._returned(method, slots), slots, method)
 
-    def _call(self, method: str) -> Any:
+    def _call(self, method: Method) -> Any:
         try:
-            return getattr(self.probe, method)()
+            return evaluated(self.probe, method)
         except Exception as error:
             self._refuse(method, error)
 
-    def _returned(self, method: str, slots: list[Slot]) -> dict[str, Any]:
+    def _returned(self, method: Method, slots: list[Slot]) -> dict[str, Any]:
         """What a method returns; only values of these slots."""
         returned = self._call(method)
         if not isinstance(returned, dict):

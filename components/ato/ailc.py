@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 from ..component import Values
 from .learning import LearningAto
 
@@ -23,6 +25,9 @@ class Ailc(LearningAto):
         r" $v_\mathrm{r}$, reference_acceleration $a_\mathrm{r}$, learning_gain $\Gamma$ and mass $M$.",
     )
     recommended_step = 0.05
+
+    def keep(self) -> Any:
+        return self._is_numbered()
 
     def outputs(self) -> Values:
         errors = self._errors()

@@ -95,7 +95,7 @@ class Cailc(LearningAto):
 
     def keep(self) -> Any:
         """A trip that ended in an emergency is not learned from."""
-        return logical_and(self.recorded_trip > 0.5, logical_not(logical_or(self.emergency, self.refused)))
+        return logical_and(self._is_numbered(), logical_not(logical_or(self.emergency, self.refused)))
 
     def outputs(self) -> Values:
         errors = self._errors()

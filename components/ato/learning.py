@@ -25,8 +25,8 @@ class LearningAto(AtoController, ABC):
     learned = Tape("1", 0.0, shape=(3,), description="estimates of the trip before at this instant")
     recorded_trip = Memory("1", 0, type=int, description="the trip that is being recorded")
 
-    def keep(self) -> Any:
-        """A trip is learned from if it was a trip of this controller: those before trip 1 are rehearsals."""
+    def _is_numbered(self) -> Any:
+        """Whether the recorded trip is one to learn from: those before trip 1 are rehearsals."""
         return self.recorded_trip > 0.5
 
     def _corrected(self, chi: Any) -> list[Any]:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from abc import ABC
+from abc import ABC, abstractmethod
 from collections.abc import Sequence
 from typing import Any, NamedTuple
 
@@ -92,9 +92,9 @@ class ConsistCruise(Estimator, ABC):
     conditions_met = Output("1", bool, description="whether the conditions of the design hold")
     failed_condition = Output("1", int, description="the first condition that does not hold; 0: none")
 
+    @abstractmethod
     def _head_jerk(self, ahead: Ahead, own: Ahead) -> Any:
         """Jerk command of the head; ``own`` has its own motion, with a jerk that is still to be found."""
-        raise NotImplementedError
 
     def initial(self) -> Values:
         first = self._first(self.position, self.speed)

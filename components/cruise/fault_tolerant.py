@@ -9,7 +9,7 @@ from ..declarations import Parameter
 from ..maths import where
 from .barrier import push, share, transform, usable
 from .consist_port import Ahead, ConsistCruise
-from .observers import IntermediateEstimatorEquations, StateFaultEstimator
+from .observers import IntermediateFaultEstimator, StateFaultEstimator
 
 _SOURCE = "Zhang & Chen 2022 (arXiv 2211.02242)"
 _COMMAND = (
@@ -84,7 +84,7 @@ class FaultTolerantCruise(StateFaultEstimator, BarrierCruise):
     note = "Reconstructed: formulas, gains and numbers are re-derived to meet the source's statements, not transcribed."
 
 
-class FaultTolerantCruiseIntermediate(IntermediateEstimatorEquations, BarrierCruise):
+class FaultTolerantCruiseIntermediate(IntermediateFaultEstimator, BarrierCruise):
     """The fault-tolerant cruise with the intermediate estimator for an observer (reconstructed): the baseline.
 
     Reconstructed and re-derived like `FaultTolerantCruise`, observer after Zhu et al. 2015. It finds constant

@@ -8,7 +8,7 @@ from typing import Any
 from ..component import Values
 from ..declarations import Input, Memory
 from ..trains.consist import Carriages
-from .observers import Estimator, IntermediateEstimatorEquations, Sample, StateFaultEstimator
+from .observers import Estimator, IntermediateFaultEstimator, Sample, StateFaultEstimator
 
 _carriages = Carriages.carriages
 
@@ -79,7 +79,7 @@ class StateFaultObserver(StateFaultEstimator, Monitor):
     recommended_step = 0.02
 
 
-class IntermediateEstimator(IntermediateEstimatorEquations, Monitor):
+class IntermediateEstimator(IntermediateFaultEstimator, Monitor):
     """Intermediate fault estimator of a train's carriages, for monitoring (re-derived after Zhu et al. 2015).
 
     The baseline for `StateFaultObserver`: it finds constant faults; a periodic fault of angular frequency w leaves the

@@ -10,7 +10,7 @@ Re-derived after Zhang & Chen 2022, eqs. 13-14, and Zhu et al. 2015: the propert
 
 from __future__ import annotations
 
-from abc import ABC
+from abc import ABC, abstractmethod
 from collections.abc import Callable, Sequence
 from typing import Any, NamedTuple
 
@@ -120,29 +120,29 @@ class Estimator(Carriages, ABC):
     actuator_force_estimate = Output("N", shape=(_carriages,), description="estimated force of each actuator")
     fault_estimate = Output("N", shape=(_carriages,), description="estimated fault of each actuator")
 
+    @abstractmethod
     def _poles(self) -> list[Any]:
         """Where the modes of the error are placed, sign turned, in 1/s."""
-        raise NotImplementedError
 
+    @abstractmethod
     def _memory(self) -> list[Any]:
         """The present rows."""
-        raise NotImplementedError
 
+    @abstractmethod
     def _keep(self, kept: Sequence[Sequence[Any]]) -> Values:
         """Rows, by the names of the memory they belong to."""
-        raise NotImplementedError
 
+    @abstractmethod
     def _first(self, position: Any, speed: Any) -> list[list[Any]]:
         """Rows at the start: as measured, with zero acceleration and no fault."""
-        raise NotImplementedError
 
+    @abstractmethod
     def _read(self, kept: Sequence[Any]) -> Estimate:
         """The estimate that rows stand for."""
-        raise NotImplementedError
 
+    @abstractmethod
     def _advance(self, kept: Sequence[Any], sample: Sample, step: Any) -> list[list[Any]]:
         """Rows one sample later."""
-        raise NotImplementedError
 
     def _estimates(self, estimate: Estimate, retardation: Sequence[Any]) -> Values:
         """The outputs that every user of an observer shows."""
@@ -228,7 +228,7 @@ class StateFaultEstimator(Estimator, ABC):
         ]
 
 
-class IntermediateEstimatorEquations(Estimator, ABC):
+class IntermediateFaultEstimator(Estimator, ABC):
     """Intermediate estimator (Zhu et al. 2015): finds constant faults; periodic ones leave a residual.
 
     With the intermediate variable s = f/M - (mu/tau) p and pi = (-p^ + u/M + f^/M)/tau, for each carriage by itself:

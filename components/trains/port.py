@@ -20,7 +20,7 @@ class Train(Component, ABC):
     line_resistance = Input("N/kg", optional=True, description="resistance of slope, curve and tunnel per mass")
 
 
-class DavisResistance(Component):
+class DavisResistance(Component, ABC):
     """Running resistance per mass, R(v) = c0 + c1 v + c2 v^2 (Davis 1926), for components that know their train.
 
     The defaults are the coefficients of the high-speed train in Wang et al. 2020, Table 2.

@@ -10,6 +10,7 @@ from typing import Annotated
 import typer
 
 from ...components import CATALOGUE
+from ...fmus.annotation import Annotation
 from ...fmus.build import build as build_fmu
 from ...fmus.release import default_directory, release
 from ..errors import ScenarioError
@@ -52,15 +53,15 @@ def describe(
     with Workspace() as workspace:
         interface = load_fmu(path, workspace).interface
     out = console.console()
-    vendor = interface.vendor
+    annotation = interface.annotation or Annotation()
     console.say(out, interface.model, "bold")
     facts = {
         "": interface.description,
-        "note": vendor.get("note", ""),
-        "source": vendor.get("source", ""),
-        "build arguments": ", ".join(f"{k} = {v!r}" for k, v in vendor.get("arguments", {}).items()),
-        "digest": vendor.get("digest", ""),
-        "kind": f"{vendor['kind']}: {vendor['kind_note']}" if vendor else "",
+        "note": annotation.note,
+        "source": annotation.source,
+        "build arguments": ", ".join(f"{k} = {v!r}" for k, v in annotation.arguments.items()),
+        "digest": annotation.digest,
+        "kind": f"{annotation.kind}: {annotation.kind_note}" if annotation.kind else "",
         "FMI": interface.version,
         "made with": interface.generator,
         "guid": interface.guid,

@@ -16,7 +16,7 @@ OK, FAILED, WRONG_INPUT, FMU_FAILED, INTERRUPTED = 0, 1, 2, 3, 130
 
 
 class KindName(StrEnum):
-    """`loading.KINDS`, as the command line needs them."""
+    """`kinds.KINDS`, as the command line needs them."""
 
     auto = "auto"
     native = "native"

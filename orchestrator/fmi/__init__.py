@@ -6,9 +6,10 @@ wrong and `translation` for other versions), and what can be instantiated is a `
 component as Python objects (`plain`).
 """
 
+from ...fmus.kinds import Kind
 from .archive import Workspace
 from .interface import Interface, Type, Unit, Variable
-from .models import Kind, Model, load_fmu, load_models
+from .models import Model, load_fmu, load_models
 from .slave import Channel, Slave
 from .snapshot import state_names, take_snapshot
 from .translation import is_pedantry

@@ -8,6 +8,9 @@ from dataclasses import dataclass, field
 from functools import cached_property
 from typing import Any, Literal
 
+from ...fmus.annotation import Annotation
+from ...fmus.kinds import FmuKind
+
 Type = Literal["Real", "Integer", "Boolean", "String", "Enumeration"]
 
 
@@ -74,8 +77,7 @@ class Interface:
     Attributes:
         model: the model's name. variables: by name, in the order of the file. units: by name.
         arrays: names of scalars by the bare array name (``"force"`` -> ``"force[1]"``, ...).
-        vendor: our own annotation: component, arguments, digest, optional inputs, recommended step, note; empty for
-            an FMU of another maker.
+        annotation: what one of our own FMUs says beyond the standard; None for one of another maker.
         version: of the FMI standard, ``"1.0"``, ``"2.0"`` or ``"3.0"``.
         left_out: what variables are that the FMU has and we do not take, by name: ``"an array"``, ``"binary"``.
         warnings: what is wrong with the file though it can be used.
@@ -99,14 +101,29 @@ class Interface:
     variable_step: bool = True
     single_instance: bool = False
     needs_tool: bool = False
-    vendor: Mapping[str, Any] = field(default_factory=dict)
+    annotation: Annotation | None = None
     left_out: Mapping[str, str] = field(default_factory=dict)
     warnings: tuple[str, ...] = ()
 
     @cached_property
     def optional_inputs(self) -> frozenset[str]:
         """Inputs that may stay unconnected without a word."""
-        return frozenset(self.vendor.get("optional_inputs", ()))
+        return frozenset(self.annotation.optional_inputs if self.annotation else ())
+
+    @property
+    def own_kind(self) -> FmuKind | None:
+        """How one of our own FMUs is packaged."""
+        return self.annotation.kind if self.annotation else None
+
+    @property
+    def sampled(self) -> bool:
+        """Whether it is one of our sampled blocks."""
+        return self.annotation is not None and self.annotation.sampled
+
+    @property
+    def recommended_step(self) -> float | None:
+        """Longest advisable communication step in s, where one of our own FMUs has one."""
+        return self.annotation.recommended_step if self.annotation else None
 
     @cached_property
     def inputs(self) -> frozenset[str]:

@@ -4,10 +4,9 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Literal
 
-from ...fmus.build import Plain, build, plain
-from ...fmus.release import package
+from ...fmus.build import Plain, package, plain
+from ...fmus.kinds import Kind, ModelKind
 from ..errors import FmuFileError, ScenarioError
 from ..system import Instance, System
 from .archive import Workspace
@@ -17,9 +16,6 @@ from .interface import Interface
 from .plain import PlainSlave
 from .reader import read_interface
 from .slave import Slave
-
-Kind = Literal["auto", "native", "python", "plain"]
-KINDS: tuple[Kind, ...] = ("auto", "native", "python", "plain")
 
 
 @dataclass(frozen=True)
@@ -36,7 +32,7 @@ class Model:
     """
 
     interface: Interface
-    kind: str
+    kind: ModelKind
     folder: Path
     path: Path | None
     digest: str
@@ -93,20 +89,13 @@ def _load(instance: Instance, workspace: Workspace, kind: Kind) -> Model:
         component = plain(instance.model, instance.build)
         folder = workspace.write_description(component.description)
         interface = read_interface(folder, instance.model)
-        return Model(interface, kind, folder, None, str(interface.vendor.get("digest", "")), component)
-    if kind == "auto":
-        return _load_best(instance, workspace)
-    return load_fmu(build(instance.model, instance.build, kind=kind), workspace, kind)
+        return Model(interface, kind, folder, None, component.digest, component)
+    path, made, problem = package(instance.model, instance.build, kind)
+    note = f"running Python FMUs, not native ones: {problem}" if problem else ""
+    return replace(load_fmu(path, workspace, made), note=note)
 
 
-def _load_best(instance: Instance, workspace: Workspace) -> Model:
-    """A native FMU where one can be made here, a Python FMU with a note that says why not elsewhere."""
-    path, kind, problem = package(instance.model, instance.build, "auto")
-    model = load_fmu(path, workspace, kind)
-    return replace(model, note=f"running Python FMUs, not native ones: {problem}") if problem else model
-
-
-def load_fmu(path: Path, workspace: Workspace, kind: str = "fmu") -> Model:
+def load_fmu(path: Path, workspace: Workspace, kind: ModelKind = "fmu") -> Model:
     """Unpack and read one FMU file.
 
     Raises:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import re
 import tempfile
 from collections.abc import Iterable
@@ -13,6 +12,7 @@ from typing import Any, cast
 from fmpy.model_description import ValidationError, read_model_description
 from lxml import etree
 
+from ...fmus.annotation import read as read_annotation
 from ..errors import FmuFileError
 from .interface import Interface, Type, Unit, Variable
 from .repair import repair
@@ -89,7 +89,7 @@ def _interface(description: Any, root: Any, beside: Beside) -> Interface:
         variable_step=bool(simulation.canHandleVariableCommunicationStepSize),
         single_instance=bool(simulation.canBeInstantiatedOnlyOncePerProcess),
         needs_tool=bool(simulation.needsExecutionTool),
-        vendor=_vendor(root),
+        annotation=read_annotation(root),
         left_out=beside.left_out,
     )
 
@@ -228,25 +228,3 @@ def _arrays(variables: dict[str, Variable]) -> dict[str, tuple[str, ...]]:
             found.setdefault(match["array"], []).append((index, name))
     # By index, because a file may list the elements in any order.
     return {array: tuple(n for _, n in sorted(elements)) for array, elements in found.items() if array not in variables}
-
-
-def _vendor(root: Any) -> dict[str, Any]:
-    """Our own annotation, if the FMU is one of ours."""
-    element = root.find("VendorAnnotations/Tool[@name='railcosim']/component")
-    if element is None:
-        return {}
-    fields: dict[str, Any] = dict(element.attrib)
-    step, arguments = fields.get("recommendedStep"), json.loads(fields.get("arguments", "{}"))
-    return {
-        "component": fields.get("name", ""),
-        "arguments": arguments if isinstance(arguments, dict) else {},
-        "digest": fields.get("digest", ""),
-        "kind": fields.get("kind", ""),
-        "kind_note": fields.get("kindNote", ""),
-        "source": fields.get("source", ""),
-        "note": fields.get("note", ""),
-        "requires": tuple(fields.get("requires", "").split()),
-        "optional_inputs": frozenset(fields.get("optionalInputs", "").split()),
-        "recommended_step": float(step) if step else None,
-        "sampled": fields.get("sampled") == "true",
-    }

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import json
 import struct
+from abc import ABC, abstractmethod
 from collections.abc import Callable, Mapping, Sequence
 from typing import Any, Protocol
 
@@ -53,7 +54,7 @@ def take_snapshot(slave: Slave, states: Sequence[str]) -> Snapshot:
         "native": NativeSnapshot,
         "python": PythonSnapshot,
     }
-    return kinds.get(slave.interface.vendor.get("kind", ""), ForeignSnapshot)(slave, states)
+    return kinds.get(slave.interface.own_kind or "", ForeignSnapshot)(slave, states)
 
 
 def state_names(slave: Slave) -> list[str]:
@@ -64,7 +65,7 @@ def state_names(slave: Slave) -> list[str]:
     """
     interface = slave.interface
     kept = [v.name for v in interface.variables.values() if v.type == "Real" and v.causality in ("local", "output")]
-    if not isinstance(slave, PlainSlave) and interface.vendor.get("kind") == "native":
+    if not isinstance(slave, PlainSlave) and interface.own_kind == "native":
         return [name for name in kept if interface.variables[name].variability == "discrete"]
     saved = slave.simulation.save() if isinstance(slave, PlainSlave) else _read_json(slave)
     return [name for name in kept if name.partition("[")[0] in saved["values"]]
@@ -128,7 +129,7 @@ class PlainSnapshot:
         """Nothing to give back."""
 
 
-class _FmuSnapshot:
+class _FmuSnapshot(ABC):
     """What snapshots of FMUs share: the state that the FMU saves."""
 
     def __init__(self, slave: Slave, states: Sequence[str]) -> None:
@@ -141,6 +142,10 @@ class _FmuSnapshot:
             self._slave.restore(state)
         finally:
             self._slave.forget(state)
+
+    @abstractmethod
+    def restore(self, changes: Mapping[str, float]) -> None:
+        """Bring the instance back to it, with other values for some states."""
 
     def free(self) -> None:
         """Give the saved state back."""

@@ -136,7 +136,7 @@ class Block:
 
         try:
             jacobian, rough = differences(respond, point)
-            if not states and not self.slave.interface.vendor:
+            if not states and not self.slave.interface.annotation:
                 self._refuse_if_it_remembers(respond, point, time + length, length)
             respond(point)
         finally:
@@ -180,14 +180,17 @@ def make_block(slave: Slave, model: Model) -> Block:
     """
     interface = slave.interface
     rates, offers = _derivatives(model)
-    vendor = interface.vendor
     if not any(v.type == "Real" for v in interface.of("input")):
         return Block(slave, "source", {}, ())
-    if offers and not vendor.get("sampled"):
-        note = "" if vendor or rates else f"{slave.name}: {interface.model} lists no states; it is taken to have none"
+    if offers and not interface.sampled:
+        note = (
+            ""
+            if interface.annotation or rates
+            else f"{slave.name}: {interface.model} lists no states; it is taken to have none"
+        )
         return Block(slave, "derivatives", rates, (), note=note)
-    if vendor:
-        native = vendor.get("kind") == "native" and isinstance(slave, FmuSlave)
+    if interface.annotation:
+        native = interface.own_kind == "native" and isinstance(slave, FmuSlave)
         note = "" if native else f"{interface.model} is no native FMU here: finite differences over a step"
         return Block(slave, "differences", rates, tuple(n for n in state_names(slave) if n not in rates), note=note)
     if interface.can_save_state:

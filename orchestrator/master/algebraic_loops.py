@@ -51,7 +51,7 @@ def find_loops(
             continue
         listed = output.dependencies
         fed = inputs.get(instance, set())
-        depends = (fed if interface.vendor or doubtful else set()) if listed is None else fed & listed
+        depends = (fed if interface.annotation or doubtful else set()) if listed is None else fed & listed
         graph.add_edges_from((("input", instance, i), ("output", instance, name)) for i in depends)
     order = {link.source: k for k, link in reversed(list(enumerate(links)))}
     found = []
@@ -72,7 +72,7 @@ def find_feeders(interfaces: Mapping[str, Interface], links: Iterable[Link], mem
         for link in links
         if not link.delay
         and is_direct(interfaces[link.source[0]], interfaces[link.source[0]].variables[link.source[1]])
-        and not interfaces[link.source[0]].vendor.get("sampled")
+        and not interfaces[link.source[0]].sampled
     ]
     graph = nx.DiGraph((link.source[0], link.target[0]) for link in links)
     within = set(members)

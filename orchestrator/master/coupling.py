@@ -49,7 +49,7 @@ class Coupling:
         self.interfaces = {name: slave.interface for name, slave in slaves.items()}
         parted = set(settings.rates)
         if is_of_end:
-            parted |= {name for name, interface in self.interfaces.items() if interface.vendor.get("sampled")}
+            parted |= {name for name, interface in self.interfaces.items() if interface.sampled}
         self.exchange = Exchange(slaves, links, sweeping=is_sweeping, parted=parted)
         order = settings.extrapolation
         self.extrapolator = Extrapolator(self.exchange, links, order, ended=is_of_end) if order else None

@@ -111,8 +111,8 @@ def _is_smooth(exchange: Exchange, link: Link) -> bool:
         and not link.delay
         and output.type == given.type == "Real"
         and "continuous" == output.variability == given.variability
-        and not source.vendor.get("sampled")
-        and not target.vendor.get("sampled")
+        and not source.sampled
+        and not target.sampled
     )
 
 

@@ -114,7 +114,7 @@ def _refused(system: System, checked: Checked, platforms: Sequence[str]) -> list
     }
     problems += [f"{what} cannot be packed: a container has one step, and holds values" for what in lost if lost[what]]
     for name, model in checked.models.items():
-        if model.interface.vendor.get("kind") == "python" or "pythonfmu" in model.interface.generator.lower():
+        if model.interface.own_kind == "python" or "pythonfmu" in model.interface.generator.lower():
             problems.append(
                 f"{name}: {model.interface.model} is a Python FMU, which a host without Python cannot load; only "
                 "native FMUs are packed"

@@ -178,11 +178,11 @@ def _notes(system: System, models: Mapping[str, Model], wiring: Wiring, order: O
         notes.update(dict.fromkeys(interface.warnings))
         silent = [v.name for v in interface.of("output") if v.dependencies is None]
         if silent and interface.of("input"):
-            taken = "all" if interface.vendor else "no"
+            taken = "all" if interface.annotation else "no"
             notes[
                 f"{model} lists no dependencies of {', '.join(silent[:4])}; {taken} direct feed-through is assumed"
             ] = None
-        if interface.needs_tool and not interface.vendor:
+        if interface.needs_tool and not interface.annotation:
             notes[f"{model} says that it needs the tool it was made with ({interface.generator or 'unnamed'})"] = None
     notes.update(dict.fromkeys(isolation_notes(system, models)))
     notes.update(dict.fromkeys(describe_coupling(system, interfaces, wiring)))

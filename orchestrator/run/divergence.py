@@ -170,6 +170,6 @@ def _advice(system: System, interfaces: Mapping[str, Interface], links: Sequence
         ways += ["let inputs move over it by extrapolation = 1"] if moving and not system.extrapolation else []
     elif system.algebraic_loops == "delay" and find_loops(interfaces, links, doubtful=True):
         ways = ['let its algebraic loop be solved at each communication point by algebraic_loops = "solve"']
-    elif all(interface.can_save_state or interface.vendor.get("sampled") for interface in members):
+    elif all(interface.can_save_state or interface.sampled for interface in members):
         ways += ['algorithm = "iterative"' + (" with extrapolation = 1" if moving else "")]
     return f"{', or '.join(ways)}; if it grows alike with any, the system itself is unstable"

@@ -24,7 +24,7 @@ def broken_rules(folder: Path, interface: Interface) -> list[str]:
         return [f"it says that it is one of ours, but is of FMI {interface.version}"]
     root = etree.parse(str(folder / "modelDescription.xml")).getroot()
     broken = [*_variables(root, interface), *_units(interface), *_archive(root, folder)]
-    if interface.vendor.get("kind") == "native":
+    if interface.own_kind == "native":
         broken += _native(root, interface, folder)
     return broken
 

@@ -4,34 +4,29 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from contextlib import contextmanager
-from ctypes import c_double, c_int, c_uint, c_void_p
-from typing import Any, ClassVar
+from ctypes import c_double, c_uint
+from typing import Any
 
 from ..errors import FmuError
-from ..fmi.binding import FmuSlave, Signatures
+from ..fmi.binding import FmuSlave
 from .probes import DoubtfulError, Probe, Task, Tried, compare
 
 _UNKNOWN_REFERENCE = 4_000_000_000
 
 
-class _BareSlave(FmuSlave):
-    """An instance that can be reset, and called wrongly."""
-
-    SIGNATURES: ClassVar[Signatures] = {**FmuSlave.SIGNATURES, "fmi2Reset": (c_int, c_void_p)}
-
-    def accepts(self, name: str, *arguments: Any) -> bool:
-        """Whether a call gets no error; a discard is one, too."""
-        status = self.function(name)(self.pointer, *arguments)
-        try:
-            self.check(name, status)
-        except FmuError:
-            return False
-        return True
+def _accepts(slave: FmuSlave, name: str, *arguments: Any) -> bool:
+    """Whether a call gets no error; a discard is one, too."""
+    status = slave.function(name)(slave.pointer, *arguments)
+    try:
+        slave.check(name, status)
+    except FmuError:
+        return False
+    return True
 
 
 @contextmanager
-def _instance(task: Task) -> Iterator[_BareSlave]:
-    slave = _BareSlave("probe", task.interface, task.folder)
+def _instance(task: Task) -> Iterator[FmuSlave]:
+    slave = FmuSlave("probe", task.interface, task.folder)
     yield slave
     slave.free()
 
@@ -63,7 +58,7 @@ def order(task: Task) -> str:
         with _instance(task) as slave:
             if initialized:
                 Tried(slave, task.step).initialize()
-            if slave.accepts(name, *arguments):
+            if _accepts(slave, name, *arguments):
                 accepted.append(what)
     if accepted:
         raise DoubtfulError(f"accepted without an error: {', '.join(accepted)}")

@@ -88,7 +88,7 @@ def validate(path: Path, *, timeout: float = TIMEOUT) -> Report:
         interface, folder = model.interface, model.folder
         findings = [Finding("archive", "pass", "unpacks, and nothing in it points outside")]
         findings += _described(path, folder, interface.version)
-        if interface.vendor:
+        if interface.annotation:
             broken = broken_rules(folder, interface)
             findings.append(_listed("rules of railcosim", broken, "all kept"))
         findings += _probed(interface, folder, path, timeout)
@@ -146,7 +146,7 @@ def _probe(probe: str, interface: Interface, folder: Path, timeout: float) -> tu
     if probe in probes_fmi2.PROBES and interface.version != "2.0":
         return "skipped", "tried with FMI 2.0 only"
     place = Path(tempfile.mkdtemp(prefix=f"{probe}_", dir=folder.parent))
-    step = interface.default_step or interface.vendor.get("recommended_step") or _DEFAULT_STEP
+    step = interface.default_step or interface.recommended_step or _DEFAULT_STEP
     task = Task(probe, interface, folder, step, answer=place / "answer.json", trying=place / "trying.txt")
     (place / "task").write_bytes(pickle.dumps(task))
     command = [*starting("validation.probe_process"), str(place / "task")]
@@ -195,7 +195,7 @@ def _last_words(path: Path) -> str:
 def _judged(title: str, answer: tuple[Verdict, str], interface: Interface) -> Finding:
     verdict, detail = answer
     # What is doubtful in the FMU of another maker is a defect in ours; a Python FMU's outer shell is pythonfmu's.
-    ours = interface.vendor.get("kind") == "native"
+    ours = interface.own_kind == "native"
     return Finding(title, "fail" if verdict == "warning" and ours else verdict, detail)
 
 

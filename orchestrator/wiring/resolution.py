@@ -192,7 +192,7 @@ def bounded(given: Any, variable: Variable) -> float | int:
 
 def _set_runtime(system: System, instance: Instance, interface: Interface, values: dict[str, Any]) -> None:
     """What the orchestrator sets by itself in our FMUs: the seed, and sample times that follow a changed step."""
-    if not interface.vendor:
+    if not interface.annotation:
         return
     if "seed" in interface.variables and "seed" not in values:
         values["seed"] = instance_seed(system.seed, instance.name)
@@ -291,7 +291,7 @@ def is_direct(interface: Interface, output: Variable) -> bool:
     if output.causality != "output":
         return False
     if output.dependencies is None:
-        return bool(interface.vendor)
+        return interface.annotation is not None
     return not output.dependencies.isdisjoint(interface.inputs)
 
 
@@ -312,7 +312,7 @@ def _check_inputs(system: System, interfaces: Mapping[str, Interface], wiring: W
             and variable.name not in interface.optional_inputs
             and broken.isdisjoint((f"{instance}.{variable.name}", f"{instance}.{variable.name.rpartition('[')[0]}"))
         ]
-        if interface.vendor:
+        if interface.annotation:
             wiring.problems += [
                 f"{_place(system.instances[instance].origin)}{instance}.{variable.name} is a required input and "
                 "nothing feeds it: connect it, or give it a start value to hold it constant"
@@ -364,9 +364,9 @@ def _check_sampling(system: System, interfaces: Mapping[str, Interface], wiring:
     for name, interface in interfaces.items():
         place = _place(system.instances[name].origin)
         sample = wiring.starts[name].get("sample_time")
-        if sample is None and interface.vendor.get("sampled") and "sample_time" in interface.variables:
+        if sample is None and interface.sampled and "sample_time" in interface.variables:
             sample = interface.variables["sample_time"].start
-        if interface.vendor and sample and isinstance(sample, int | float):
+        if interface.annotation and sample and isinstance(sample, int | float):
             own_step = system.instances[name].step or system.step
             if not _is_multiple(own_step, sample):
                 wiring.problems.append(
@@ -374,13 +374,13 @@ def _check_sampling(system: System, interfaces: Mapping[str, Interface], wiring:
                     f"sample_time {sample:g} s: set step or {name}.sample_time"
                 )
         own, step = interface.default_step, system.instances[name].step or system.step
-        if own and not interface.variable_step and not interface.vendor and interface.model not in told:
+        if own and not interface.variable_step and not interface.annotation and interface.model not in told:
             told.add(interface.model)
             if not _is_multiple(step, own):
                 wiring.notes.append(
                     f"{interface.model} cannot vary its step and is made for {own:g} s; it is stepped at {step:g} s"
                 )
-        longest = interface.vendor.get("recommended_step")
+        longest = interface.recommended_step
         if longest and system.step > longest * (1 + 1e-9) and interface.model not in told:
             told.add(interface.model)
             wiring.notes.append(

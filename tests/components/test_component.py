@@ -256,7 +256,7 @@ def test_a_redeclared_parameter_takes_the_new_default():
     assert ComfortCruise().alpha != 0.01
 
 
-@pytest.mark.parametrize("name", ["outputs", "time", "step", "slots", "source", "build_arguments"])
+@pytest.mark.parametrize("name", ["outputs", "time", "step", "slots", "source", "build_arguments", "present_values"])
 def test_names_of_the_base_class_are_taken(name):
     text = message(lambda: type("Bad", (Component,), {name: Parameter("1", 0.0)}))
     assert text.endswith(f".{name}: the name belongs to Component; choose another")
@@ -303,3 +303,13 @@ def test_declarations_read_as_themselves_on_the_class(samples):
     assert isinstance(samples.Slope.profile, Data)
     assert isinstance(samples.Slope.height, Output)
     assert repr(samples.Counter.total) == "<Memory total>"
+
+
+def test_present_values_are_what_the_equations_read():
+    schedule = Schedule(points=2, times=(0.0, 1.0), values=(1.0, 3.0))
+    place = schedule.present_values
+    assert schedule.present_values is place
+    assert set(place) == {"unit", "points", "times", "values", "interpolate"}
+    place["values"] = np.array([5.0, 7.0])
+    place["time"] = 2.0
+    assert schedule.outputs() == {"value": 7.0}

@@ -18,7 +18,7 @@ from railcosim.components import (
     State,
     maths,
 )
-from railcosim.components.tracing import Traced, TracingError, dependencies, feedthrough, initial_dependencies
+from railcosim.components.tracing import Sourced, TracingError, dependencies, feedthrough, initial_dependencies
 
 
 class Probe(Component):
@@ -194,4 +194,4 @@ def test_a_wrong_shape_is_told_while_tracing():
 
 def test_a_traced_value_is_not_hashable():
     with pytest.raises(TypeError):
-        hash(Traced(frozenset()))
+        hash(Sourced(frozenset()))

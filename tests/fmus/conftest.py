@@ -15,7 +15,8 @@ from fmpy.logging import addLoggerProxy
 from lxml import etree
 from railcosim.components import CATALOGUE
 from railcosim.components.component import Component
-from railcosim.fmus.build import build, build_component, resolve
+from railcosim.fmus.build import build, build_component
+from railcosim.fmus.references import resolve
 
 SAMPLES = Path(__file__).parents[1] / "components" / "samples.py"
 
@@ -36,6 +37,7 @@ def pytest_generate_tests(metafunc):
 @pytest.fixture(scope="session", autouse=True)
 def cache(session_cache):
     """The session's cache: no test may be served by what an earlier version left in the user's."""
+    session_cache.mkdir(parents=True, exist_ok=True)
     with pytest.MonkeyPatch.context() as patch:
         patch.setenv("RAILCOSIM_CACHE", str(session_cache))
         yield

@@ -1,4 +1,4 @@
-"""Building: names and arguments, identity, the cache, reproducibility, and where the result runs."""
+"""Building: arguments, identity, the cache, reproducibility, and where the result runs."""
 
 import json
 import os
@@ -12,9 +12,10 @@ from pathlib import Path
 import fmpy
 import numpy as np
 import pytest
-from railcosim.components import ComponentError, simulate
+from railcosim.components import simulate
 from railcosim.fmus import build as build_module
-from railcosim.fmus.build import build, build_component, cache_folder, plain, resolve, write_archive
+from railcosim.fmus.build import build, build_component, cache_folder, plain, write_archive
+from railcosim.fmus.references import resolve
 from railcosim.orchestrator.errors import FmuFileError
 from railcosim.orchestrator.fmi.archive import Workspace
 from railcosim.orchestrator.fmi.models import load_fmu
@@ -48,70 +49,6 @@ def run_python(*arguments, **environment):
         timeout=60,
         check=False,
     )
-
-
-# ---------------------------------------------------------------- names
-
-
-@pytest.mark.parametrize(
-    ("name", "complaint"),
-    [
-        ("ComfortCruse", "there is no component 'ComfortCruse'; did you mean 'ComfortCruise'?"),
-        ("Zeppelin", "there is no component 'Zeppelin'; there is "),
-        ("Zeppelin", "one of your own is written file.py:Class"),
-        ("nowhere.py:C", "nowhere.py"),
-    ],
-)
-def test_an_unknown_name(name, complaint):
-    with pytest.raises(ComponentError) as caught:
-        resolve(name)
-    assert complaint in str(caught.value)
-
-
-def test_an_unknown_class_of_a_file(write_component):
-    path = write_component(USER.replace("class C", "class Controller")).rpartition(":")[0]
-    with pytest.raises(ComponentError, match="has no component 'Controler'; did you mean 'Controller'\\?"):
-        resolve(f"{path}:Controler")
-    with pytest.raises(ComponentError, match="has no component 'Component'; there is Controller"):
-        resolve(f"{path}:Component")
-
-
-@pytest.mark.parametrize(
-    ("text", "complaint"),
-    [
-        ("\n\nx = 1 +\n", ":3: SyntaxError"),
-        ("\nx = 1\nraise RuntimeError('broken')\n", ":3: RuntimeError: broken"),
-        ("\nimport helper\n", ":2: ZeroDivisionError"),
-        ("\nimport not_installed_anywhere\n", ":2: ModuleNotFoundError: No module named 'not_installed_anywhere'"),
-        (
-            "from railcosim.components import Component, Memory\n\n\nclass C(Component):\n    time = Memory('s')\n",
-            ":4: ComponentError: C.time",
-        ),
-    ],
-)
-def test_a_file_that_does_not_load_names_its_line(write_component, text, complaint):
-    reference = write_component(text, helper="\n\n\n1 / 0\n")
-    with pytest.raises(ComponentError) as caught:
-        build(reference)
-    assert f"my_controller.py{complaint}" in str(caught.value)
-
-
-def test_a_syntax_error_in_a_helper_names_the_helper(write_component):
-    with pytest.raises(ComponentError) as caught:
-        build(write_component("\nimport helper\n", helper="\n\n\n\nx = = 1\n"))
-    assert "my_controller.py:2: SyntaxError: invalid syntax (helper.py, line 5)" in str(caught.value)
-
-
-def test_a_relative_path_starts_at_the_folder_given(write_component, tmp_path):
-    write_component(USER)
-    assert resolve("user/my_controller.py:C", tmp_path)().outputs() == {"y": 1.0}
-    assert zipfile.is_zipfile(build("user/my_controller.py:C", folder=tmp_path))
-
-
-def test_a_file_edited_within_the_second_is_read_again(write_component):
-    """Python itself would take the compiled file of the same second and size: none is left behind."""
-    for number in range(3):
-        assert resolve(write_component(USER.replace("1.0", f"{number}.0")))().outputs() == {"y": float(number)}
 
 
 # ---------------------------------------------------------------- build arguments
@@ -402,23 +339,3 @@ def test_it_runs_where_the_project_is_not_installed(sample):
         slot = component.slots[last.partition("[")[0]]
         own = simulate(component, 1.0, 0.125)[slot.name].reshape(9, -1)[:, slot.scalars.index(last)]
         assert [float.fromhex(x) for x in line.split()] == own.tolist()
-
-
-# ---------------------------------------------------------------- data files
-
-
-def test_a_data_file_is_read_and_belongs_to_the_identity(tmp_path):
-    line = tmp_path / "line.json"
-    line.write_text('[{"position": 0.0, "gradient": 0.005}]', encoding="utf-8")
-    first = build("Line", {"profile": str(line)})
-    line.write_text('[{"position": 0.0, "gradient": 0.006}]', encoding="utf-8")
-    assert build("Line", {"profile": str(line)}) != first
-
-
-@pytest.mark.parametrize(("text", "complaint"), [(None, "cannot be read"), ("[1,", "is not JSON")])
-def test_a_data_file_that_cannot_be_used(tmp_path, text, complaint):
-    path = tmp_path / "line.json"
-    if text is not None:
-        path.write_text(text, encoding="utf-8")
-    with pytest.raises(ComponentError, match=complaint):
-        build("Line", {"profile": str(path)})

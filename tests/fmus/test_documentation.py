@@ -5,8 +5,9 @@ from html.parser import HTMLParser
 
 import pytest
 from railcosim.components import ComfortCruise, PointMassTrain
-from railcosim.fmus.build import build, resolve
+from railcosim.fmus.build import build
 from railcosim.fmus.documentation import page
+from railcosim.fmus.references import resolve
 from railcosim.fmus.variables import scalar_variables
 
 VOID = {"meta", "br", "hr", "img", "link"}

@@ -4,8 +4,9 @@ import sys
 
 import pytest
 from railcosim.components import ComfortCruise, Component, ComponentError, Output
-from railcosim.fmus.build import build, resolve
+from railcosim.fmus.build import build
 from railcosim.fmus.embed import embedded_files
+from railcosim.fmus.references import resolve
 
 HEAD = "from railcosim.components import Component, Output\n"
 GIVES = "\n\nclass C(Component):\n    y = Output('1')\n\n    def outputs(self):\n        return {{'y': {}}}\n"
@@ -151,7 +152,7 @@ def test_the_copy_holds_what_is_needed_and_no_more():
     files, module = embedded_files(ComfortCruise)
     assert module == "components.cruise.comfort"
     assert {"components/cruise/comfort.py", "components/cruise/port.py", "components/maths.py"} <= files.keys()
-    assert {"fmus/slave.py", "fmus/variables.py", "__init__.py", "components/__init__.py"} <= files.keys()
+    assert {"fmus/pythonfmu_slave.py", "fmus/variables.py", "__init__.py", "components/__init__.py"} <= files.keys()
     assert not [name for name in files if "gust" in name or "description" in name or "build" in name]
 
 

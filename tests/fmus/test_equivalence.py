@@ -20,8 +20,10 @@ from fmpy.fmi2 import FMU2Slave
 from hypothesis import HealthCheck, given, reject, settings
 from hypothesis import strategies as st
 from railcosim.components import CATALOGUE, ComponentError, Simulation
+from railcosim.components.component import evaluated
 from railcosim.components.declarations import Input, Memory, Parameter, Size, State, Tape
-from railcosim.fmus.build import build, resolve
+from railcosim.fmus.build import build
+from railcosim.fmus.references import resolve
 from railcosim.fmus.variables import scalar_variables
 from railcosim.orchestrator import load, run
 
@@ -129,7 +131,7 @@ def scripts(draw, component):
     places = {name: draw(st.sampled_from(choices)) for name, choices in PLACES.items()}
     has_tape = any(component.of(Tape))
     starts = {}
-    computed = component.initial()
+    computed = evaluated(component, "initial")
     for slot in component.of(Parameter, State, Memory):
         if slot.name not in computed and slot.name != "tape_file" and draw(st.booleans()):
             starts[slot.name] = draw(values(slot))

@@ -12,8 +12,9 @@ import numpy as np
 import pytest
 from lxml import etree
 from railcosim.components import PointMassTrain
-from railcosim.fmus.build import build, resolve
+from railcosim.fmus.build import build
 from railcosim.fmus.description import write
+from railcosim.fmus.references import resolve
 from scipy.integrate import solve_ivp
 
 OK, ERROR = 0, 3

@@ -17,7 +17,8 @@ from lxml import etree
 from railcosim.components import Component, ComponentError, Simulation, simulate
 from railcosim.components.tracing import TracingError
 from railcosim.fmus import native_fmu, toolchain
-from railcosim.fmus.build import build, build_component, resolve
+from railcosim.fmus.build import build, build_component
+from railcosim.fmus.references import resolve
 from railcosim.fmus.toolchain import CompilerError
 
 HERE = Path(__file__).parent
@@ -110,7 +111,7 @@ def test_the_same_component_gives_the_same_bytes(monkeypatch, tmp_path):
 def test_the_code_does_not_depend_on_the_order_of_a_set():
     """In a process of another hash seed."""
     program = (
-        "from railcosim.fmus import native_fmu; from railcosim.fmus.build import resolve; import sys\n"
+        "from railcosim.fmus import native_fmu; from railcosim.fmus.references import resolve; import sys\n"
         f"print(native_fmu.sources(resolve({MIXED!r})(), 'guid'))"
     )
     texts = {

@@ -10,10 +10,10 @@ from pathlib import Path
 import pytest
 from railcosim.components import CATALOGUE, ComponentError
 from railcosim.components.tracing import TracingError
-from railcosim.fmus import release as module
+from railcosim.fmus import build as module
 from railcosim.fmus import toolchain
-from railcosim.fmus.build import native_problem
-from railcosim.fmus.release import CHECKSUMS, default_directory, package, release
+from railcosim.fmus.build import native_problem, package
+from railcosim.fmus.release import CHECKSUMS, default_directory, release
 from railcosim.fmus.toolchain import PLATFORMS, CompilerError
 
 COMMAND = [sys.executable, "-c", "from railcosim.orchestrator.cli.app import main; main()"]

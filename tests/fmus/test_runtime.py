@@ -21,7 +21,8 @@ import pytest
 from railcosim.components import ComfortCruise, PointMassTrain
 from railcosim.components.declarations import Parameter
 from railcosim.components.tape import TapeDeck, smooth
-from railcosim.fmus.build import build, resolve
+from railcosim.fmus.build import build
+from railcosim.fmus.references import resolve
 
 SAMPLES = Path(__file__).parent / "native_samples.py"
 MIXED, FUNCTIONS = f"{SAMPLES}:Mixed", f"{SAMPLES}:Functions"
@@ -811,7 +812,7 @@ def python_deck(gain_errors, cutoff=0.0):
     learner_class = resolve(LEARNER)
     component = learner_class()
     slots = tuple(component.slots[n] for n in ("learned", "pair"))
-    deck = TapeDeck("Learner", slots, component.__dict__, sample_time=0.1, duration=1.0, cutoff=cutoff)
+    deck = TapeDeck("Learner", slots, component.present_values, sample_time=0.1, duration=1.0, cutoff=cutoff)
     for n, error in enumerate(gain_errors):
         half = 0.5 * abs(error)
         deck.record(n * 0.1, {"learned": 0.5 * error, "pair": np.array([7.0 + half, 7.0 + half])})
@@ -983,5 +984,5 @@ def test_bounds_and_starts_are_those_of_the_component(load):
     train = PointMassTrain(speed=12.5, mass=3e5, limit_force=True)
     fmu = load(train).initialize()
     for slot in train.of(Parameter):
-        assert fmu.get(slot.name) == train.__dict__[slot.name]
+        assert fmu.get(slot.name) == train.present_values[slot.name]
     assert fmu.get("speed") == 12.5

@@ -7,7 +7,7 @@ from pathlib import Path
 import fmpy
 import pytest
 from railcosim.components import Component, ComponentError, Input, Output, Parameter, PointMassTrain
-from railcosim.fmus.build import resolve
+from railcosim.fmus.references import resolve
 from railcosim.fmus.tables import model_header
 from railcosim.fmus.trace import trace
 

@@ -5,7 +5,7 @@ Light to import: the process of an isolated FMU needs this and little else.
 
 from .channel import FmuChannel
 from .fmi2 import FmuSlave
-from .libraries import Signatures, forget_paths, library, names_of_platform
+from .libraries import forget_paths, library, names_of_platform
 from .loaded import LoadedSlave
 from .versions import SLAVES, call_name
 
@@ -14,7 +14,6 @@ __all__ = [
     "FmuChannel",
     "FmuSlave",
     "LoadedSlave",
-    "Signatures",
     "call_name",
     "forget_paths",
     "library",

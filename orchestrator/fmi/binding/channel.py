@@ -2,13 +2,35 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from typing import TYPE_CHECKING, Any
+from collections.abc import Mapping, Sequence
+from typing import Any, ClassVar, Protocol
 
 from ...errors import FmuError
+from ..interface import Interface, Type
+from ..slave import Channel
 
-if TYPE_CHECKING:
-    from .loaded import LoadedSlave
+
+class Owner(Protocol):
+    """What a channel needs of the instance whose variables it sets and reads."""
+
+    TYPES: ClassVar[Mapping[str, tuple[str, Any]]]
+    SET: ClassVar[str]
+    GET: ClassVar[str]
+    COUNTS_VALUES: ClassVar[bool]
+    name: str
+    interface: Interface
+    time: float
+    pointer: int
+    functions: dict[str, Any]
+
+    def references(self, names: Sequence[str]) -> Any:
+        """The value references of variables, for C."""
+
+    def function(self, name: str) -> Any:
+        """A function of the library."""
+
+    def check(self, call: str, status: int) -> None:
+        """Raise unless the status of a call is ok or warning."""
 
 
 class FmuChannel:
@@ -22,7 +44,7 @@ class FmuChannel:
         names: the variables.
     """
 
-    def __init__(self, slave: LoadedSlave, kind: str, names: Sequence[str]) -> None:
+    def __init__(self, slave: Owner, kind: str, names: Sequence[str]) -> None:
         suffix, c_type = slave.TYPES[kind]
         count = len(names)
         self._slave, self._kind, self._names = slave, kind, names
@@ -81,3 +103,23 @@ class MixedChannel:
             for place, value in zip(places, channel.get(), strict=True):
                 found[place] = value
         return found
+
+
+class NegatedChannel:
+    """Variables some of which are another's negative: what the library keeps is minus (or not) their value."""
+
+    def __init__(self, plain: Channel, negated: Sequence[bool], kind: Type) -> None:
+        self._plain, self._negated = plain, negated
+        self._is_truth = kind == "Boolean"
+
+    def _turned(self, values: Sequence[Any]) -> list[Any]:
+        pairs = zip(values, self._negated, strict=True)
+        return [((1 - value) if self._is_truth else -value) if negated else value for value, negated in pairs]
+
+    def set(self, values: Sequence[Any]) -> None:
+        """Set all of them."""
+        self._plain.set(self._turned(values))
+
+    def get(self) -> list[Any]:
+        """Read all of them."""
+        return self._turned(self._plain.get())

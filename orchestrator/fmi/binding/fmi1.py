@@ -13,8 +13,6 @@ from fmpy import fmi1
 from fmpy.logging import addLoggerProxy
 from lxml import etree
 
-from ..interface import Type
-from ..slave import Channel
 from .libraries import Signatures
 from .loaded import DISCARD, LOGGER, OK, WARNING, LoadedSlave
 
@@ -55,9 +53,7 @@ class Fmi1Slave(LoadedSlave):
     SET, GET, DO_STEP = "fmiSet", "fmiGet", "fmiDoStep"
     TERMINATE, FREE, CANCEL = "fmiTerminateSlave", "fmiFreeSlaveInstance", "fmiCancelStep"
     INTERPOLATE = "fmiSetRealInputDerivatives"
-
-    def _prefix(self) -> str:
-        return f"{self.interface.identifier}_"
+    PREFIXED = True
 
     def _instantiate(self, folder: Path) -> int | None:
         self._callbacks = fmi1.fmi1CallbackFunctions()
@@ -94,18 +90,18 @@ class Fmi1Slave(LoadedSlave):
     def exit_initialization(self) -> None:
         """Nothing is left to be done."""
 
-    def channel(self, kind: Type, names: Sequence[str]) -> Channel:
-        """Prepare variables of one type for being set or read together."""
-        plain = super().channel(kind, names)
-        negated = [self.interface.variables[name].negated for name in names]
-        return _NegatedChannel(plain, negated, kind) if any(negated) else plain
-
-    def step(self, time: float, length: float, *, final: bool = True) -> None:
-        """Advance from ``time`` by ``length``, both in s."""
-        super().step(time, length, final=True)  # in FMI 1.0 that argument says that the last step was accepted
+    def _announce(self) -> None:
+        pass  # the call that initializes it says it all
 
     def _attempt(self, time: float, part: float, final: bool, *, again: bool) -> int:
+        # In FMI 1.0 the last argument says that the step before was accepted.
         return int(self._do_step(self.pointer, time, part, not again))
+
+    def _is_cut_short(self) -> bool:
+        return False
+
+    def _stops(self, status: int) -> bool:
+        return False
 
     def _last_successful_time(self) -> float | None:
         ask, found = self.functions.get("fmiGetRealStatus"), c_double(math.nan)
@@ -117,29 +113,3 @@ class Fmi1Slave(LoadedSlave):
     ) -> list[float]:
         """The standard has no call for that."""
         raise self.refuse("FMI 1.0 knows no directional derivatives")
-
-    def interpolate(self, names: Sequence[str], orders: Sequence[int], values: Sequence[float]) -> None:
-        """Time derivatives of inputs over the coming step: one name, order (from 1) and value each."""
-        variables = self.interface.variables
-        signed = [-x if variables[name].negated else x for name, x in zip(names, values, strict=True)]
-        super().interpolate(names, orders, signed)
-
-
-class _NegatedChannel:
-    """Variables some of which are another's negative: what the library keeps is minus (or not) their value."""
-
-    def __init__(self, plain: Channel, negated: Sequence[bool], kind: Type) -> None:
-        self._plain, self._negated = plain, negated
-        self._is_truth = kind == "Boolean"
-
-    def _turned(self, values: Sequence[Any]) -> list[Any]:
-        pairs = zip(values, self._negated, strict=True)
-        return [((1 - value) if self._is_truth else -value) if negated else value for value, negated in pairs]
-
-    def set(self, values: Sequence[Any]) -> None:
-        """Set all of them."""
-        self._plain.set(self._turned(values))
-
-    def get(self) -> list[Any]:
-        """Read all of them."""
-        return self._turned(self._plain.get())

@@ -27,6 +27,7 @@ _SIGNATURES: Signatures = {
     "fmi2EnterInitializationMode": (c_int, c_void_p),
     "fmi2ExitInitializationMode": (c_int, c_void_p),
     "fmi2Terminate": (c_int, c_void_p),
+    "fmi2Reset": (c_int, c_void_p),
     "fmi2DoStep": (c_int, c_void_p, c_double, c_double, c_int),
     "fmi2CancelStep": (c_int, c_void_p),
     **{
@@ -93,10 +94,14 @@ class FmuSlave(LoadedSlave):
         """Leave initialization mode."""
         self.call("fmi2ExitInitializationMode")
 
-    def setup(self, start_time: float, stop_time: float) -> None:
-        """Announce the experiment."""
-        super().setup(start_time, stop_time)
-        self.call("fmi2SetupExperiment", 0, 0.0, start_time, *self._end())
+    def _announce(self) -> None:
+        self.call("fmi2SetupExperiment", 0, 0.0, self._span[0], *self._end())
+
+    def _attempt(self, time: float, part: float, final: bool, *, again: bool) -> int:
+        return int(self._do_step(self.pointer, time, part, final))
+
+    def _is_cut_short(self) -> bool:
+        return False
 
     def _last_successful_time(self) -> float | None:
         ask, found = self.functions.get("fmi2GetRealStatus"), c_double(math.nan)

@@ -105,24 +105,16 @@ class Fmi3Slave(LoadedSlave):
         """Leave initialization mode: without an event mode, the first step may follow."""
         self.call("fmi3ExitInitializationMode")
 
-    def step(self, time: float, length: float, *, final: bool = True) -> None:
-        """Advance from ``time`` by ``length``, both in s; not ``final`` where an older state may be restored."""
-        self.time = time
-        status = self._attempt(time, length, final, again=False)
-        if status or self._ends.value or self._is_early.value:
-            self.resume(time, length, status, final)
-        self.time = time + length
+    def _announce(self) -> None:
+        pass  # entering initialization mode says it all
 
     def _attempt(self, time: float, part: float, final: bool, *, again: bool) -> int:
         self._ends.value = self._is_early.value = False
         self._came_to.value = math.nan
         return int(self._do_step(self.pointer, time, part, final, *self._telling))
 
-    def _reached(self, end: float, status: int) -> float | None:
-        stopped = self._ends.value or self._is_early.value
-        if status in (OK, WARNING) and stopped and math.isfinite(self._came_to.value):
-            return self._came_to.value
-        return super()._reached(end, status)
+    def _is_cut_short(self) -> bool:
+        return self._ends.value or self._is_early.value
 
     def _last_successful_time(self) -> float | None:
         return self._came_to.value if math.isfinite(self._came_to.value) else None
@@ -141,7 +133,3 @@ class Fmi3Slave(LoadedSlave):
             "fmi3GetDirectionalDerivative", rows, len(rows), columns, len(columns), given, len(given), found, len(found)
         )
         return list(found)
-
-    def interpolate(self, names: Sequence[str], orders: Sequence[int], values: Sequence[float]) -> None:
-        """The standard has no call for that: it has intermediate updates instead."""
-        raise self.refuse("FMI 3.0 takes no derivatives of inputs")

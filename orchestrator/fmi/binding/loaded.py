@@ -1,6 +1,6 @@
 """What FMUs of every version of FMI share when they are loaded into this process: log, statuses, steps in parts.
 
-The versions differ in names and arguments of their functions: see `fmu`, `fmi1` and `fmi3`.
+The versions differ in names and arguments of their functions: see `fmi1`, `fmi2` and `fmi3`.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ from fmpy.fmi1 import printLogMessage
 from ...errors import FmuError, StoppedError
 from ..interface import Interface, Type
 from ..slave import STATUS, Channel
-from .channel import FmuChannel, MixedChannel
+from .channel import FmuChannel, MixedChannel, NegatedChannel
 from .libraries import Signatures, close_library, library, open_library
 
 OK, WARNING, DISCARD, FATAL, PENDING = 0, 1, 2, 4, 5
@@ -84,8 +84,10 @@ class LoadedSlave(ABC):
     INTERPOLATE: ClassVar[str] = ""
     STATE: ClassVar[tuple[str, str, str, str, str, str]]
     """The functions that get, set, free, measure, serialize and deserialize a saved state."""
-    COUNTS_VALUES = False
+    COUNTS_VALUES: ClassVar[bool] = False
     """Whether functions that set and get want to know the number of values, too."""
+    PREFIXED: ClassVar[bool] = False
+    """Whether the names of its functions begin with the model identifier."""
 
     def __init__(self, name: str, interface: Interface, folder: Path, log: deque[str] | None = None) -> None:
         self.name = name
@@ -98,9 +100,10 @@ class LoadedSlave(ABC):
         self._library = None
         self.hear_as(id(self), name.encode())
         # pythonfmu passes even its errors on only while debug logging is on; others then flood us with details.
-        self._talks = bool(interface.vendor) or "pythonfmu" in interface.generator.lower()
+        self._talks = interface.annotation is not None or "pythonfmu" in interface.generator.lower()
+        prefix = f"{interface.identifier}_" if self.PREFIXED else ""
         try:
-            self._library = open_library(library(folder, interface, interface.model), self.SIGNATURES, self._prefix())
+            self._library = open_library(library(folder, interface, interface.model), self.SIGNATURES, prefix)
             self.functions, self._addresses = self._library.functions, self._library.addresses
             self.pointer = self._instantiate(folder) or self._ask_why(folder)
             if not self.pointer:
@@ -115,10 +118,6 @@ class LoadedSlave(ABC):
         """Once more, with debug logging: what the matter is, many say only then."""
         talks, self._talks = self._talks, True
         return 0 if talks or self.log else self._instantiate(folder) or 0
-
-    def _prefix(self) -> str:
-        """What stands before the names of its functions."""
-        return ""
 
     @abstractmethod
     def _instantiate(self, folder: Path) -> int | None:
@@ -187,11 +186,14 @@ class LoadedSlave(ABC):
         parts: dict[str, list[int]] = {}
         for place, name in enumerate(names):
             parts.setdefault(self.interface.variables[name].fmi_type or kind, []).append(place)
+        channel: Channel
         if len(parts) == 1:
-            return FmuChannel(self, next(iter(parts)), names)
-        return MixedChannel(
-            [(FmuChannel(self, each, [names[k] for k in places]), places) for each, places in parts.items()], len(names)
-        )
+            channel = FmuChannel(self, next(iter(parts)), names)
+        else:
+            own = [(FmuChannel(self, each, [names[k] for k in places]), places) for each, places in parts.items()]
+            channel = MixedChannel(own, len(names))
+        negated = [self.interface.variables[name].negated for name in names]
+        return NegatedChannel(channel, negated, kind) if any(negated) else channel
 
     # ---------------------------------------------------------------- initialization
 
@@ -202,6 +204,11 @@ class LoadedSlave(ABC):
         """
         self.time = start_time
         self._span = (start_time, stop_time + 8.0 * math.ulp(max(abs(start_time), abs(stop_time))))
+        self._announce()
+
+    @abstractmethod
+    def _announce(self) -> None:
+        """Tell the FMU about the experiment, if the standard has a call for that before initialization."""
 
     def _end(self) -> tuple[bool, float]:
         """Whether an end of the experiment was announced, and which, in s."""
@@ -221,8 +228,8 @@ class LoadedSlave(ABC):
     def step(self, time: float, length: float, *, final: bool = True) -> None:
         """Advance from ``time`` by ``length``, both in s; not ``final`` where an older state may be restored."""
         self.time = time
-        status = self._do_step(self.pointer, time, length, final)
-        if status:
+        status = self._attempt(time, length, final, again=False)
+        if status or self._is_cut_short():
             self.resume(time, length, status, final)
         self.time = time + length
 
@@ -266,23 +273,28 @@ class LoadedSlave(ABC):
             return ", and takes steps of one length only: choose another step"
         return f", and takes none from there on, not even one of {part:.2g} s"
 
-    def _attempt(self, time: float, part: float, final: bool, *, again: bool) -> int:
-        """Try a part of a step; ``again`` where a longer one from the same point was discarded."""
-        return int(self._do_step(self.pointer, time, part, final))
-
     def _reached(self, end: float, status: int) -> float | None:
         """How far a step that was to reach ``end`` came; None if it failed."""
         if status in (OK, WARNING):
-            return end
+            reached = self._last_successful_time() if self._is_cut_short() else None
+            return end if reached is None else reached
         return self._last_successful_time() if status == DISCARD else None
 
     @abstractmethod
-    def _last_successful_time(self) -> float | None:
-        """How far a discarded step came; None if the FMU does not say."""
+    def _attempt(self, time: float, part: float, final: bool, *, again: bool) -> int:
+        """Try a step or a part of one; ``again`` where a longer one from the same point was discarded."""
 
+    @abstractmethod
+    def _is_cut_short(self) -> bool:
+        """Whether the last step, though it succeeded, ended before its end."""
+
+    @abstractmethod
+    def _last_successful_time(self) -> float | None:
+        """How far a step came that was discarded or cut short; None if the FMU does not say."""
+
+    @abstractmethod
     def _stops(self, status: int) -> bool:
         """Whether the FMU asks for the end of the simulation."""
-        return False
 
     # ---------------------------------------------------------------- saved states
 
@@ -341,10 +353,13 @@ class LoadedSlave(ABC):
 
     def interpolate(self, names: Sequence[str], orders: Sequence[int], values: Sequence[float]) -> None:
         """Time derivatives of inputs over the coming step: one name, order (from 1) and value each."""
+        if not self.INTERPOLATE:
+            raise self.refuse(f"FMI {self.interface.version} takes no derivatives of inputs")
         if not self.interface.interpolates_inputs:
             raise self.refuse("it does not interpolate its inputs")
-        count = len(names)
-        given = (ctypes.c_int * count)(*orders), (ctypes.c_double * count)(*values)
+        variables, count = self.interface.variables, len(names)
+        signed = [-x if variables[name].negated else x for name, x in zip(names, values, strict=True)]
+        given = (ctypes.c_int * count)(*orders), (ctypes.c_double * count)(*signed)
         self.call(self.INTERPOLATE, self.references(names), count, *given)
 
     # ---------------------------------------------------------------- the end

@@ -86,7 +86,7 @@ class Adaptive(VariableStep):
     @classmethod
     def fit(cls, system: System, interfaces: Mapping[str, Interface], wiring: Wiring) -> Fit:
         """States are saved and steps vary, so nothing may count steps."""
-        sampled = [name for name, interface in interfaces.items() if interface.vendor.get("sampled")]
+        sampled = [name for name, interface in interfaces.items() if interface.sampled]
         others = {name: interface for name, interface in interfaces.items() if name not in sampled}
         problems = [
             *cannot(

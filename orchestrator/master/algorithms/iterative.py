@@ -38,7 +38,7 @@ class Blocks:
 
 def find_blocks(interfaces: Mapping[str, Interface], links: Iterable[Link]) -> Blocks:
     """Sampled components in the order of a sweep; the others in groups that depend on each other, in their order."""
-    sampled = [name for name, interface in interfaces.items() if interface.vendor.get("sampled")]
+    sampled = [name for name, interface in interfaces.items() if interface.sampled]
     links = [link for link in links if not link.delay]
     inner = [link for link in links if {link.source[0], link.target[0]} <= set(sampled)]
     sweep = derive_order(sampled, inner).sequence

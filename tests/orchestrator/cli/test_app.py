@@ -14,11 +14,11 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from railcosim.fmus.kinds import KINDS
 from railcosim.orchestrator import Results, load
 from railcosim.orchestrator.cli import app as cli
 from railcosim.orchestrator.cli.app import call
 from railcosim.orchestrator.cli.options import KindName
-from railcosim.orchestrator.fmi.models import KINDS
 from railcosim.orchestrator.run.execution import execute
 
 COMMAND = [sys.executable, "-c", "from railcosim.orchestrator.cli.app import main; main()"]

@@ -5,6 +5,7 @@ import math
 import re
 
 import pytest
+from railcosim.fmus.annotation import Annotation
 from railcosim.orchestrator.cli import console
 from railcosim.orchestrator.evaluation.metrics import Metric, MetricChange
 from railcosim.orchestrator.evaluation.published import PublishedRow
@@ -132,7 +133,9 @@ def test_an_interface_stands_by_causality_with_what_each_output_depends_on():
         Variable("z", 4, "Real", "output", "continuous", None, None, None, dependencies=frozenset()),
         Variable("w", 5, "Real", "output", "continuous", None, None),
     ]
-    interface = Interface("M", "M", "{1}", {v.name: v for v in variables}, {}, {}, vendor={"optional_inputs": ["u"]})
+    interface = Interface(
+        "M", "M", "{1}", {v.name: v for v in variables}, {}, {}, annotation=Annotation(optional_inputs=("u",))
+    )
     lines = [" ".join(line.split()) for line in shown(console.show_interface, interface)]
     assert [line for line in lines if line in ("Parameters", "Inputs", "Outputs")] == [
         "Parameters",

@@ -2,6 +2,7 @@
 
 import pytest
 from railcosim.fmus.build import build
+from railcosim.fmus.kinds import NOTE_OF_KIND
 from railcosim.orchestrator.errors import FmuFileError
 from railcosim.orchestrator.fmi.interface import Unit
 from railcosim.orchestrator.fmi.models import load_fmu
@@ -61,7 +62,8 @@ def test_variables_units_and_capabilities(reading, xml):
     assert it.units["degC"].offset == 273.15
     assert it.units["odd"].exponents is None
     assert (it.single_instance, it.variable_step, it.needs_tool, it.can_save_state) == (True, True, False, False)
-    assert (it.vendor, it.optional_inputs) == ({}, frozenset())
+    assert (it.annotation, it.own_kind, it.recommended_step) == (None, None, None)
+    assert (it.sampled, it.optional_inputs) == (False, frozenset())
 
 
 def test_our_own_annotation(workspace, components):
@@ -87,9 +89,9 @@ class Mine(Base):
     assert it.scalars("force[2]") == ("force[2]",)
     assert it.scalars("farce") is None
     assert it.optional_inputs == {"wind"}
-    assert it.vendor["component"] == "Mine"
-    assert it.vendor["arguments"] == {"carriages": 3}
-    assert (it.vendor["recommended_step"], it.vendor["sampled"], it.vendor["note"]) == (0.25, True, "reconstructed")
+    assert (it.annotation.component, it.annotation.arguments) == ("Mine", {"carriages": 3})
+    assert (it.recommended_step, it.sampled, it.annotation.note) == (0.25, True, "reconstructed")
+    assert (it.own_kind, it.annotation.kind_note) == ("python", NOTE_OF_KIND["python"])
     assert it.warnings == ()
 
 
@@ -160,7 +162,7 @@ def test_a_second_element_that_names_no_library_leaves_no_gap(reading, xml):
 def test_build_arguments_that_are_none(reading, xml, given):
     ours = f'<VendorAnnotations><Tool name="railcosim"><component arguments="{given}"/></Tool></VendorAnnotations>'
     text = xml["description"]([]).replace("<ModelVariables>", f"{ours}<ModelVariables>")
-    assert reading(text).vendor["arguments"] == {}
+    assert reading(text).annotation.arguments == {}
 
 
 def laughs(encoding):

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from railcosim.fmus.annotation import Annotation
 from railcosim.orchestrator.cli import app as cli
 from railcosim.orchestrator.errors import CouplingError, FmuError
 from railcosim.orchestrator.fmi.binding.fmi2 import FmuSlave
@@ -98,8 +99,8 @@ def output(*dependencies, causality="output"):
     return SimpleNamespace(dependencies=listed, causality=causality)
 
 
-def model(vendor=True, **outputs):
-    return SimpleNamespace(vendor=vendor, variables=outputs)
+def model(ours=True, **outputs):
+    return SimpleNamespace(annotation=Annotation() if ours else None, variables=outputs)
 
 
 def link(source, target, delay=0):
@@ -138,9 +139,9 @@ def test_several_loops_are_told_apart():
     assert find_loops(models, links) == [("a.y", "b.y"), ("c.y", "d.y")]
 
 
-@pytest.mark.parametrize(("vendor", "doubtful", "found"), [(True, False, 1), (False, False, 0), (False, True, 1)])
-def test_what_an_output_without_a_list_counts_as(vendor, doubtful, found):
-    models = {"a": model(vendor=vendor, y=output(None))}
+@pytest.mark.parametrize(("ours", "doubtful", "found"), [(True, False, 1), (False, False, 0), (False, True, 1)])
+def test_what_an_output_without_a_list_counts_as(ours, doubtful, found):
+    models = {"a": model(ours=ours, y=output(None))}
     assert len(find_loops(models, [link("a.y", "a.u")], doubtful=doubtful)) == found
 
 
@@ -291,11 +292,10 @@ def test_what_passes_on_at_once_into_the_loop_is_of_the_same_instant(mine, algor
 
 
 def test_feeders_are_what_passes_on_at_once_and_not_at_samples():
-    def block(**vendor):
-        return SimpleNamespace(vendor=vendor, variables={"y": output("u")}, inputs=frozenset("u"))
+    def block(*dependencies, sampled=False):
+        return SimpleNamespace(sampled=sampled, variables={"y": output(*dependencies)}, inputs=frozenset("u"))
 
-    models = {name: block(name=name) for name in "abcdef"} | {"s": block(sampled=True)}
-    models["m"] = SimpleNamespace(vendor={"name": "m"}, variables={"y": output()}, inputs=frozenset("u"))
+    models = {name: block("u") for name in "abcdef"} | {"s": block("u", sampled=True), "m": block()}
     pairs = [("a", "b"), ("b", "a"), ("c", "a"), ("d", "c"), ("m", "d"), ("e", "m"), ("b", "f"), ("s", "c"), ("e", "s")]
     links = [link(f"{x}.y", f"{y}.u") for x, y in pairs]
     assert find_feeders(models, links, "ab") == {"c", "d"}

@@ -4,6 +4,7 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
+from railcosim.fmus.annotation import Annotation
 from railcosim.orchestrator.errors import CouplingError, FmuError
 from railcosim.orchestrator.run.divergence import explain_divergence, find_growth
 from railcosim.orchestrator.system import Connection, System
@@ -142,7 +143,7 @@ def model(direct=False, **of):
         )
         for name in ("x", "y", "z")
     }
-    facts = {"vendor": {"component": "Ours"}, "can_save_state": True, "interpolates_inputs": True}
+    facts = {"annotation": Annotation(), "sampled": False, "can_save_state": True, "interpolates_inputs": True}
     return SimpleNamespace(variables=variables, **facts | of)
 
 
@@ -203,7 +204,7 @@ def test_a_steady_factor_is_told_and_no_other():
         ({"can_save_state": False}, "s; take a smaller step; if"),
         ({"interpolates_inputs": False}, 'smaller step, or algorithm = "iterative"; if'),
         (
-            {"can_save_state": False, "vendor": {"sampled": True}},
+            {"can_save_state": False, "sampled": True},
             'or algorithm = "iterative" with extrapolation = 1; if',
         ),
         (

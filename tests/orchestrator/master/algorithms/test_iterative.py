@@ -177,7 +177,7 @@ def test_anderson_of_infinite_residuals_gives_no_guess():
 
 def facts(sampled=()):
     """Interfaces by name, of which blocks need to know one thing only."""
-    return lambda names: {n: SimpleNamespace(vendor={"sampled": n in sampled}) for n in names}
+    return lambda names: {n: SimpleNamespace(sampled=n in sampled) for n in names}
 
 
 def link(source, target, delay=0):

@@ -1,4 +1,4 @@
-"""A component's equations, called, checked and integrated: what `Simulation` runs, without phases.
+"""A component's methods, called, checked and integrated: what `Simulation` runs, without phases.
 
 An exception inside an equation passes unchanged, with the author's own line at its end; what an equation returns is
 checked here against the declarations.
@@ -7,13 +7,13 @@ checked here against the declarations.
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Set
 from typing import Any
 
 import numpy as np
 
 from . import noise
-from .component import Component, ComponentError, Slot, Values, pack
+from .component import Component, ComponentError, Method, Slot, Values, evaluated, pack
 from .declarations import Memory, Output, State, Tape
 
 _KINDS = {float: "iuf", int: "iu", bool: "b", str: ""}
@@ -23,17 +23,17 @@ _ROUNDING = 1e-6
 """Of an interval: a time that is a whole number of holds belongs to the new one whatever the rounding of k * step."""
 
 
-class Equations:
+class Methods:
     """One component's methods, with time and values in its attributes.
 
     Args:
-        component: its ``__dict__`` holds the present values; the equations read them there.
+        component: its present values are read and written as time goes on.
     """
 
     def __init__(self, component: Component) -> None:
         self.component = component
         self.name = type(component).__name__
-        self.values: dict[str, Any] = component.__dict__
+        self.values: dict[str, Any] = component.present_values
         self.states = tuple(component.of(State))
         self.memory = tuple(component.of(Memory))
         self.tapes = tuple(component.of(Tape))
@@ -41,13 +41,13 @@ class Equations:
         self._noises = tuple(component.noises.items())
         self._array_states = tuple(slot for slot in self.states if slot.shape)
         self._kept = {slot.name: slot for slot in (*self.memory, *self.states)}
-        self._may_return = {
+        self._may_return: dict[Method, dict[str, Slot]] = {
             "outputs": {slot.name: slot for slot in self.outputs},
             "initial": self._kept,
             "update": self._kept | {slot.name: slot for slot in self.tapes},
             "derivatives": {slot.name: slot for slot in self.states},
         }
-        self._must_return = {
+        self._must_return: dict[Method, Set[str]] = {
             "outputs": self._may_return["outputs"].keys(),
             "initial": frozenset[str](),
             "update": {slot.name for slot in (*self.memory, *self.tapes)},
@@ -64,11 +64,15 @@ class Equations:
 
     def update(self, period: float) -> Values:
         """Next memory and tape row, and the states to re-initialise, of a sample of ``period`` seconds."""
-        self.values["_step"] = period
+        self.values["step"] = period
         try:
             return self._cast("update", self._call("update"))
         finally:
-            del self.values["_step"]
+            del self.values["step"]
+
+    def keep(self) -> Any:
+        """Whether the trip that just ended is kept."""
+        return evaluated(self.component, "keep")
 
     def integrate(self, begin: float, length: float) -> None:
         """Classical Runge-Kutta in equal sub-steps no longer than ``max_step``, inputs and memory held."""
@@ -111,8 +115,8 @@ class Equations:
                 )
         return rates
 
-    def _call(self, method: str) -> Values:
-        returned = getattr(self.component, method)()
+    def _call(self, method: Method) -> Values:
+        returned = evaluated(self.component, method)
         if not isinstance(returned, dict):
             raise ComponentError(f"{self.name}.{method} returns {returned!r}; it must return a dict")
         must = self._must_return[method]
@@ -125,7 +129,7 @@ class Equations:
                 raise ComponentError(f"{self.name}.{method} returns no value of {sorted(must - returned.keys())}")
         return returned
 
-    def _cast(self, method: str, returned: Values) -> Values:
+    def _cast(self, method: Method, returned: Values) -> Values:
         slots = self._may_return[method]
         result = {}
         for name, value in returned.items():

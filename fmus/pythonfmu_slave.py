@@ -141,7 +141,7 @@ class Fmi2Slave:
             else:
                 if name not in arrays:
                     self.simulation.check_settable(self.simulation.component.slots[name])
-                    arrays[name] = self.simulation.component.__dict__[name].copy()
+                    arrays[name] = self.simulation.component.present_values[name].copy()
                 arrays[name].flat[element] = kind(value)
         for name, array in arrays.items():
             self.simulation.set(name, array)
@@ -176,7 +176,7 @@ class Fmi2Slave:
         names = self._real_inputs
         if all(map(names.__contains__, references)) and all(map(math.isfinite, values)):
             # Nearly every call of a run: scalar inputs, which `Simulation.set` would check one by one to no effect.
-            place = self.simulation.component.__dict__
+            place = self.simulation.component.present_values
             for reference, value in zip(references, values, strict=True):
                 place[names[reference]] = value
             self.simulation.invalidate()

@@ -1,0 +1,89 @@
+"""Our vendor annotation in ``modelDescription.xml``: what FMI has no place for, written and read back in one file."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import Any
+
+from lxml import etree
+
+from .kinds import NOTE_OF_KIND, FmuKind
+
+TOOL = "railcosim"
+
+
+@dataclass(frozen=True)
+class Annotation:
+    """What one of our FMUs says about itself.
+
+    Attributes:
+        component: class name.
+        arguments: build arguments by name.
+        digest: hash of everything the FMU is made from.
+        kind: how it is packaged; None where it does not say. kind_note: what that asks of the importing program.
+        source: where the equations come from.
+        note: what a user must know.
+        requires: packages that it imports.
+        optional_inputs: names of inputs that may stay unconnected.
+        recommended_step: longest advisable communication step in s.
+        sampled: whether it acts at samples.
+    """
+
+    component: str = ""
+    arguments: Mapping[str, Any] = field(default_factory=dict)
+    digest: str = ""
+    kind: FmuKind | None = None
+    kind_note: str = ""
+    source: str = ""
+    note: str = ""
+    requires: tuple[str, ...] = ()
+    optional_inputs: tuple[str, ...] = ()
+    recommended_step: float | None = None
+    sampled: bool = False
+
+
+def write(annotation: Annotation, root: Any) -> None:
+    """Add the annotation to a model description that has none."""
+    step = annotation.recommended_step
+    fields = {
+        "name": annotation.component,
+        "arguments": json.dumps(annotation.arguments, sort_keys=True),
+        "digest": annotation.digest,
+        "kind": annotation.kind or "",
+        "kindNote": annotation.kind_note,
+        "source": annotation.source,
+        "note": annotation.note,
+        "requires": " ".join(annotation.requires),
+        "optionalInputs": " ".join(annotation.optional_inputs),
+        "recommendedStep": "" if step is None else repr(float(step)),
+        "sampled": "true" if annotation.sampled else "",
+    }
+    tool = etree.SubElement(etree.SubElement(root, "VendorAnnotations"), "Tool", name=TOOL)
+    etree.SubElement(tool, "component", **{name: value for name, value in fields.items() if value})
+
+
+def read(root: Any) -> Annotation | None:
+    """The annotation in a model description; None in one of another maker.
+
+    Raises:
+        ValueError: build arguments that are not JSON, or a step that is no number.
+    """
+    element = root.find(f"VendorAnnotations/Tool[@name='{TOOL}']/component")
+    if element is None:
+        return None
+    step, arguments = element.get("recommendedStep"), json.loads(element.get("arguments", "{}"))
+    return Annotation(
+        component=element.get("name", ""),
+        arguments=arguments if isinstance(arguments, dict) else {},
+        digest=element.get("digest", ""),
+        kind=next((kind for kind in NOTE_OF_KIND if kind == element.get("kind")), None),
+        kind_note=element.get("kindNote", ""),
+        source=element.get("source", ""),
+        note=element.get("note", ""),
+        requires=tuple(element.get("requires", "").split()),
+        optional_inputs=tuple(element.get("optionalInputs", "").split()),
+        recommended_step=float(step) if step else None,
+        sampled=element.get("sampled") == "true",
+    )

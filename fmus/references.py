@@ -1,0 +1,118 @@
+"""What a user names: a component of the catalogue or of a file, and the data it is built with."""
+
+from __future__ import annotations
+
+import contextlib
+import hashlib
+import importlib
+import importlib.util
+import json
+import sys
+from collections.abc import Iterator, Mapping
+from pathlib import Path
+from types import ModuleType
+from typing import Any
+
+from ..components import CATALOGUE, Component, ComponentError
+from ..components.spelling import did_you_mean
+
+
+def resolve(reference: str, folder: Path | None = None) -> type[Component]:
+    """The component behind a catalogue name or ``"file.py:Class"``.
+
+    Args:
+        reference: what a scenario or the command line says.
+        folder: where a relative file path starts; the current folder by default.
+
+    Raises:
+        ComponentError: no such name, file or class; the message suggests the nearest one.
+    """
+    path, colon, name = reference.rpartition(":")
+    if not colon or not path.endswith(".py"):
+        if reference in CATALOGUE:
+            return CATALOGUE[reference]
+        raise ComponentError(f"there is no component {_nearest(reference, CATALOGUE)}")
+    module = _load_file((folder or Path()) / path)
+    found = {k: v for k, v in vars(module).items() if isinstance(v, type) and issubclass(v, Component)}
+    own = {k: v for k, v in found.items() if v.__module__ == module.__name__}
+    if name not in own:
+        raise ComponentError(f"{path} has no component {_nearest(name, own)}")
+    return own[name]
+
+
+def read_arguments(arguments: Mapping[str, Any] | None) -> dict[str, Any]:
+    """Build arguments with data files read: a text that ends in ``.json`` names one.
+
+    Raises:
+        ComponentError: the file is missing or is not JSON.
+    """
+    given = dict(arguments or {})
+    for name, value in given.items():
+        if isinstance(value, str) and value.endswith(".json"):
+            try:
+                given[name] = json.loads(Path(value).read_text(encoding="utf-8"))
+            except OSError as error:
+                raise ComponentError(f"{name}: {value} cannot be read: {error.strerror or error}") from error
+            except ValueError as error:
+                raise ComponentError(f"{name}: {value} is not JSON: {error}") from error
+    return given
+
+
+def _load_file(path: Path) -> ModuleType:
+    """Run a user's component file as a module of its own, anew each time, because it may have been edited."""
+    path = path.resolve()
+    if not path.is_file():
+        raise ComponentError(f"there is no file {path}")
+    name = f"railcosim_user_{hashlib.sha256(str(path).encode()).hexdigest()[:16]}"
+    spec = importlib.util.spec_from_file_location(name, path)
+    if spec is None or spec.loader is None:
+        raise ComponentError(f"{path} cannot be read as Python")
+    module = importlib.util.module_from_spec(spec)
+    sys.modules[name] = module
+    try:
+        with _neighbours(path.parent):
+            spec.loader.exec_module(module)
+    except Exception as error:
+        line = _line_in(error, path)
+        raise ComponentError(f"{path}{f':{line}' if line else ''}: {type(error).__name__}: {error}") from error
+    return module
+
+
+@contextlib.contextmanager
+def _neighbours(folder: Path) -> Iterator[None]:
+    """Modules beside a user's file import as they would from its folder, and are forgotten afterwards.
+
+    Otherwise the first ``helper.py`` of a process would serve every component that has a module of that name, and a
+    compiled file left behind could outlive an edit within the same second.
+    """
+    names = (
+        {file.stem for file in folder.glob("*.py")} - sys.stdlib_module_names - {"numpy", __package__.partition(".")[0]}
+    )
+    before = {name: sys.modules.pop(name) for name in names if name in sys.modules}
+    writes_bytecode, sys.dont_write_bytecode = sys.dont_write_bytecode, True
+    sys.path.insert(0, str(folder))
+    importlib.invalidate_caches()
+    try:
+        yield
+    finally:
+        sys.path.remove(str(folder))
+        sys.dont_write_bytecode = writes_bytecode
+        for name in names:
+            sys.modules.pop(name, None)
+        sys.modules.update(before)
+
+
+def _line_in(error: BaseException, path: Path) -> int | None:
+    if isinstance(error, SyntaxError) and error.filename == str(path):
+        return error.lineno
+    line, trace = None, error.__traceback__
+    while trace is not None:
+        if trace.tb_frame.f_code.co_filename == str(path):
+            line = trace.tb_lineno
+        trace = trace.tb_next
+    return line
+
+
+def _nearest(name: str, known: Mapping[str, Any]) -> str:
+    there = f"; there is {', '.join(sorted(known)) or 'none'}; one of your own is written file.py:Class"
+    return f"{name!r}{did_you_mean(name, known) or there}"
