@@ -15,7 +15,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from railcosim.orchestrator import Results, load
-from railcosim.orchestrator.cli import app as cli
+from railcosim.orchestrator.cli import runs
 from railcosim.orchestrator.cli.app import call
 from railcosim.orchestrator.cli.options import AlgorithmName, KindName
 from railcosim.orchestrator.fmi.models import KINDS
@@ -187,7 +187,7 @@ def test_verify_step_prints_each_metric_at_half_the_step_and_the_difference(smal
 
 def test_the_second_run_is_recorded_at_the_same_points(small: Path) -> None:
     first = execute(load(small / "small.toml"), kind="plain")
-    second = cli._at_half_the_step(first, KindName.plain, quiet=True)
+    second = runs._at_half_the_step(first, KindName.plain, quiet=True)
     assert second is not None
     assert second.system.step == 0.05
     assert second.seconds["steps"] == 40
