@@ -9,8 +9,6 @@ import typer
 
 from ..comparison import compare as compare_systems
 from ..comparison import read_directions, variants
-from . import console
-from .comparison import show_comparison
 from .options import (
     FAILED,
     FMU_FAILED,
@@ -28,6 +26,7 @@ from .options import (
     With,
     load_system,
 )
+from .printing import and_figures, open_console, say, show_comparison, show_progress
 
 Scenarios = Annotated[
     list[str], typer.Argument(metavar="SCENARIO...", help="Shipped scenarios (see 'orchestrate list'), or .toml files.")
@@ -83,7 +82,7 @@ def compare(
         output=directory,
         figures=not no_figures,
         directions=read_directions(directions or (), metrics),
-        progress=lambda name, start: console.progress(name, quiet, start),
+        progress=lambda name, start: show_progress(name, quiet, start),
     )
     show_comparison(comparison, quiet)
     if comparison.interrupted:
@@ -131,14 +130,15 @@ def linearize(
         draw_linear,
         stability,
         string_stability,
+        write_linear,
     )
     from ..linearization import linearize as linearize_system  # noqa: PLC0415
-    from .linear import show_linear, write_linear  # noqa: PLC0415
+    from .printing.linear import show_linear  # noqa: PLC0415
 
     if duration is not None and not 0.0 < duration < float("inf"):
         raise typer.BadParameter("it must be a positive time in s.", param_hint="'--duration'")
     system = load_system(scenario, preset, settings, builds, swaps, step=step)
-    with console.progress(system.name, quiet, system.start_time) as progress:
+    with show_progress(system.name, quiet, system.start_time) as progress:
         model = linearize_system(
             system,
             at,
@@ -154,8 +154,7 @@ def linearize(
     write_linear(directory, model, found, passings)
     figures = [] if no_figures else draw_linear(model, found, passings, directory, duration=duration)
     if not quiet:
-        out = console.console()
+        out = open_console()
         show_linear(out, model, found, passings)
-        drawn = f", {len(figures)} figure{'s' * (len(figures) > 1)}" if figures else ""
-        console.say(out, f"Files in {directory}: linear.json{drawn}", whole=True)
+        say(out, f"Files in {directory}: linear.json{and_figures(len(figures))}", whole=True)
     raise typer.Exit(OK if found.verdict == "stable" else FAILED)

@@ -16,9 +16,8 @@ from ...fmus.release import default_directory, release
 from ..errors import ScenarioError
 from ..fmi import Workspace, load_fmu
 from ..packing import pack as pack_system
-from ..validation import TIMEOUT, show_report
+from ..validation import TIMEOUT
 from ..validation import validate as validate_fmu
-from . import console
 from .options import (
     FAILED,
     OK,
@@ -35,6 +34,7 @@ from .options import (
     build_arguments,
     load_system,
 )
+from .printing import open_console, say, show_interface, show_notes, show_report
 from .skeleton import write_skeleton
 
 
@@ -52,9 +52,9 @@ def describe(
     path = Path(model) if model.endswith(".fmu") else build_fmu(model, arguments)
     with Workspace() as workspace:
         interface = load_fmu(path, workspace).interface
-    out = console.console()
+    out = open_console()
     annotation = interface.annotation or Annotation()
-    console.say(out, interface.model, "bold")
+    say(out, interface.model, "bold")
     facts = {
         "": interface.description,
         "note": annotation.note,
@@ -70,10 +70,10 @@ def describe(
     }
     for label, fact in facts.items():
         if fact:
-            console.say(out, f"{label}: {fact}" if label else fact)
+            say(out, f"{label}: {fact}" if label else fact)
     for warning in interface.warnings:
-        console.say(out, f"warning: {warning}", "yellow")
-    console.show_interface(out, interface)
+        say(out, f"warning: {warning}", "yellow")
+    show_interface(out, interface)
 
 
 def build(
@@ -132,11 +132,10 @@ def pack(
     """Write one FMU that holds a whole scenario, for another tool to run as a block."""
     system = load_system(scenario, preset, settings, builds, swaps, stop=stop, step=step, algorithm=algorithm)
     packed = pack_system(system, output, expose=expose or (), platforms=(platforms or "").split(","))
-    out = console.console()
-    for note in console.folded(packed.notes):
-        console.say(out, f"note: {note}", "yellow")
+    out = open_console()
+    show_notes(out, packed.notes)
     shown = f"{len(packed.exposed)} variables, for {', '.join(packed.platforms)}"
-    console.say(out, f"{packed.path}: {len(system.instances)} FMUs as one, {shown}", whole=True)
+    say(out, f"{packed.path}: {len(system.instances)} FMUs as one, {shown}", whole=True)
 
 
 def validate(
@@ -148,7 +147,7 @@ def validate(
     Exit codes: 0 nothing failed; 1 something did; 2 the file is no FMU that could be used.
     """
     report = validate_fmu(fmu, timeout=timeout)
-    show_report(console.console(), report)
+    show_report(open_console(), report)
     raise typer.Exit(OK if report.passed else FAILED)
 
 

@@ -15,20 +15,18 @@ import numpy as np
 
 from ..errors import ScenarioError
 from ..figures import (
-    COLOURS,
     DASHES,
-    STYLE,
     Curve,
-    bands_of,
+    colour,
+    colour_and_dashes,
     curves_of,
-    draw_band,
+    draw_curves,
     file_name,
-    level_of,
+    legend,
+    page,
     panels_of,
-    set_ranges,
+    share_x,
     texts_of,
-    x_label_of,
-    y_label_of,
 )
 from ..run import Results
 
@@ -55,73 +53,53 @@ def draw_compared(figures: Sequence[Mapping[str, Any]], runs: Mapping[str, Resul
     Returns:
         The files.
     """
-    import matplotlib as mpl  # noqa: PLC0415
-    from matplotlib.backends.backend_agg import FigureCanvasAgg  # noqa: PLC0415
-    from matplotlib.figure import Figure  # noqa: PLC0415
-
     paths: list[Path] = []
     for figure in figures:
         path = directory / file_name("", figure["title"], paths)
         panels = panels_of(figure)
-        shared = all(panel.get("x") == panels[0].get("x") for panel in panels)
-        with mpl.rc_context(STYLE):
-            height = 4.4 if len(panels) == 1 else 0.7 + 2.6 * len(panels)
-            canvas = Figure(figsize=(9.0, height), dpi=100, layout="constrained")
-            FigureCanvasAgg(canvas)
-            canvas.suptitle(figure["title"], x=0.01, ha="left", fontsize=11.5, fontweight="bold")
-            axes = canvas.subplots(len(panels), 1, sharex=shared, squeeze=False)[:, 0]
-            drawn = [
-                _draw_panel(ax, panel, runs, not shared or ax is axes[-1])
-                for ax, panel in zip(axes, panels, strict=True)
-            ]
-            if any(drawn):
-                canvas.savefig(path, metadata={"Software": None})
-                paths.append(path)
+        shared = share_x(panels)
+        found = [_lines(panel, runs) for panel in panels]
+        if not any(found):
+            continue
+        height = 4.4 if len(panels) == 1 else 0.7 + 2.6 * len(panels)
+        with page(figure["title"], len(panels), path, size=(9.0, height), share_x=shared) as axes:
+            for ax, panel, lines in zip(axes, panels, found, strict=True):
+                _draw_panel(ax, panel, lines, runs, not shared or ax is axes[-1])
+        paths.append(path)
     return paths
 
 
-def _draw_panel(ax: Axes, panel: Mapping[str, Any], runs: Mapping[str, Results], x_label: bool) -> bool:
-    names = list(runs)
+def _lines(panel: Mapping[str, Any], runs: Mapping[str, Results]) -> list[_Line]:
+    """The curves of all runs; a setpoint that all variants share is there once."""
     lines: list[_Line] = []
     for k, results in enumerate(runs.values()):
         for curve in _known_curves(panel, results):
             same = [one for one in lines if one.curve.label == curve.label]
-            # A setpoint that all variants share is drawn once.
             if not any(_equal(one.curve, curve) for one in same):
                 lines.append(_Line(k, curve))
+    return lines
+
+
+def _draw_panel(
+    ax: Axes, panel: Mapping[str, Any], lines: Sequence[_Line], runs: Mapping[str, Results], x_label: bool
+) -> None:
     if not lines:
         ax.set_visible(False)
-        return False
+        return
+    names = list(runs)
     labels = list(dict.fromkeys(line.curve.label for line in lines))
     by_variant = len(labels) == 1 or len(names) > len(DASHES)
-    scale = float(panel.get("scale", 1.0))
-    for line in lines:
-        style = _style(line.variant, labels.index(line.curve.label), len(labels), by_variant)
-        ax.plot(line.curve.x, scale * line.curve.y, **style)
-    first = next(iter(runs.values()))
-    for band in bands_of(panel):
-        draw_band(ax, [scale * level_of(end, first) for end in band])
-    ax.set_title(panel.get("title", ""))
-    ax.set_ylabel(panel.get("y_label", y_label_of(panel, [line.curve for line in lines])))
-    if x_label:
-        ax.set_xlabel(panel.get("x_label", x_label_of(panel, first)))
-    set_ranges(ax, panel)
+    styled = [
+        (line.curve, _style(line.variant, labels.index(line.curve.label), len(labels), by_variant)) for line in lines
+    ]
+    draw_curves(ax, panel, styled, next(iter(runs.values())), x_label=x_label)
     _legend(ax, labels, names, {line.variant for line in lines}, by_variant)
-    return True
 
 
 def _style(variant: int, label: int, labels: int, by_variant: bool) -> dict[str, Any]:
     if by_variant:
-        return {"color": COLOURS[variant % len(COLOURS)], "linestyle": DASHES[variant // len(COLOURS) % 4]}
-    return {"color": _colour(label, labels), "linestyle": DASHES[variant % 4], "linewidth": _WIDTHS[variant % 4]}
-
-
-def _colour(label: int, labels: int) -> Any:
-    if labels <= len(COLOURS):
-        return COLOURS[label]
-    import matplotlib as mpl  # noqa: PLC0415
-
-    return mpl.colormaps["viridis"](0.92 * label / (labels - 1))
+        return colour_and_dashes(variant)
+    return {"color": colour(label, labels), "linestyle": DASHES[variant % 4], "linewidth": _WIDTHS[variant % 4]}
 
 
 def _legend(ax: Axes, labels: Sequence[str], names: Sequence[str], drawn: set[int], by_variant: bool) -> None:
@@ -130,19 +108,12 @@ def _legend(ax: Axes, labels: Sequence[str], names: Sequence[str], drawn: set[in
 
     handles = []
     if not by_variant:
-        handles += [Line2D([], [], color=_colour(k, len(labels)), label=x) for k, x in enumerate(labels)]
+        handles += [Line2D([], [], color=colour(k, len(labels)), label=x) for k, x in enumerate(labels)]
     for k, name in enumerate(names):
         if k in drawn:
             style = _style(k, 0, 1, by_variant) | ({} if by_variant else {"color": "#444444"})
             handles.append(Line2D([], [], label=name, **style))
-    ax.legend(
-        handles=handles,
-        loc="upper left",
-        bbox_to_anchor=(1.01, 1.02),
-        borderaxespad=0.0,
-        handlelength=2.6,
-        ncols=1 + (len(handles) - 1) // 14,
-    )
+    legend(ax, len(handles), handles=handles, handlelength=2.6)
 
 
 def _known_curves(panel: Mapping[str, Any], results: Results) -> list[Curve]:

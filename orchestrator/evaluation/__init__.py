@@ -1,6 +1,6 @@
 """What recorded signals mean: expressions, metrics, requirements, reference values."""
 
-from .expressions import Expression, Signals, evaluate_constant, parse
+from .expressions import Expression, evaluate_constant, parse
 from .metrics import (
     COMFORT_TITLE,
     FUNCTIONS,
@@ -15,6 +15,7 @@ from .metrics import (
 )
 from .published import PUBLISHED_KEYS, PublishedRow, check_published, judge_published, split_metric
 from .requirements import Verdict, check_requirements, judge_requirements, parse_requirement
+from .signals import Signals
 from .syntax import Call, Node, Number, Operation, Reference
 
 __all__ = [

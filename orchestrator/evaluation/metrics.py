@@ -13,8 +13,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import ExpressionError, WindowError
-from .expressions import ELEMENTWISE, Expression, Function, Signals, parse
+from .expressions import Expression, parse
+from .functions import ELEMENTWISE, Function
 from .platoon import PLATOON
+from .signals import Signals
 from .syntax import Call, Node, Number, Operation, Reference
 from .time_windows import Window, scalar, time_windows, window_of
 

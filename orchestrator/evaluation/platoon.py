@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import ExpressionError, WindowError
-from .expressions import Signals
+from .signals import Signals
 from .time_windows import Window, scalar, window_of
 
 Array = NDArray[np.float64]

@@ -14,8 +14,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import ExpressionError, WindowError, did_you_mean
-from .expressions import CONSTANTS, Expression, Scope, Signals, evaluate, evaluate_constant, parse
+from .calculation import Scope, evaluate
+from .expressions import Expression, evaluate_constant, parse
+from .functions import CONSTANTS
 from .metrics import EVERY_STEP, FUNCTIONS
+from .signals import Signals
 from .syntax import Call, Name, Node, Number, Operation, Reference, walk
 from .time_windows import select
 

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import ExpressionError, WindowError
-from .expressions import Signals
+from .signals import Signals
 
 Array = NDArray[np.float64]
 

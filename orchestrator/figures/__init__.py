@@ -1,41 +1,27 @@
-"""Pictures of recorded signals, as a scenario's `[[figures]]` ask for them."""
+"""Pictures of recorded signals, as a scenario's `[[figures]]` ask for them; and the style of every other picture."""
 
-from .drawing import (
-    COLOURS,
-    DASHES,
-    PANEL_KEYS,
-    STYLE,
-    Curve,
-    bands_of,
-    check_figures,
-    curves_of,
-    draw,
-    draw_band,
-    file_name,
-    level_of,
-    panels_of,
-    set_ranges,
-    texts_of,
-    x_label_of,
-    y_label_of,
-)
+from .checking import check_figures
+from .curves import Curve, bracketed, curves_of
+from .drawing import draw, draw_curves, file_name
+from .panels import PANEL_KEYS, panels_of, share_x, texts_of
+from .style import COLOURS, DASHES, colour, colour_and_dashes, legend, page
 
 __all__ = [
     "COLOURS",
     "DASHES",
     "PANEL_KEYS",
-    "STYLE",
     "Curve",
-    "bands_of",
+    "bracketed",
     "check_figures",
+    "colour",
+    "colour_and_dashes",
     "curves_of",
     "draw",
-    "draw_band",
+    "draw_curves",
     "file_name",
-    "level_of",
+    "legend",
+    "page",
     "panels_of",
-    "set_ranges",
+    "share_x",
     "texts_of",
-    "x_label_of",
-    "y_label_of",
 ]

@@ -3,6 +3,7 @@
 from .closed_loop import Linearization, linearize
 from .figures import draw_linear
 from .modes import Mode, Stability, stability
+from .record import write_linear
 from .responses import Passing, default_input, string_stability
 
 __all__ = [
@@ -15,4 +16,5 @@ __all__ = [
     "linearize",
     "stability",
     "string_stability",
+    "write_linear",
 ]

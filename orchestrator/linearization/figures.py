@@ -5,12 +5,13 @@ from __future__ import annotations
 import itertools
 import re
 from collections.abc import Sequence
+from contextlib import AbstractContextManager
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ..figures import COLOURS, DASHES, STYLE
+from ..figures import COLOURS, DASHES, bracketed, colour, legend, page
 from .blocks import Array
 from .closed_loop import Linearization
 from .modes import Stability
@@ -86,53 +87,20 @@ def _families(model: Linearization) -> dict[str, list[tuple[str, Array, str]]]:
     return dict(list(found.items())[:_MOST_FAMILIES])
 
 
-class _Canvas:
-    """A figure in the style of all others, saved when it is done."""
-
-    def __init__(self, title: str, panels: int, path: Path) -> None:
-        import matplotlib as mpl  # noqa: PLC0415
-        from matplotlib.backends.backend_agg import FigureCanvasAgg  # noqa: PLC0415
-        from matplotlib.figure import Figure  # noqa: PLC0415
-
-        self.path = path
-        self._context: Any = mpl.rc_context(STYLE)
-        self._context.__enter__()
-        height = 4.2 if panels == 1 else 1.0 + 2.2 * panels
-        self._figure = Figure(figsize=(8.5, height), dpi=100, layout="constrained")
-        FigureCanvasAgg(self._figure)
-        self._figure.suptitle(title, x=0.01, ha="left", fontsize=10.5, fontweight="bold")
-        self.axes: list[Axes] = list(self._figure.subplots(panels, 1, squeeze=False)[:, 0])
-
-    def __enter__(self) -> _Canvas:
-        return self
-
-    def __exit__(self, kind: type[BaseException] | None, *_: object) -> None:
-        if kind is None:
-            self._figure.savefig(self.path, metadata={"Software": None})
-        self._context.__exit__(None, None, None)
-
-
-def _colour(k: int, count: int) -> Any:
-    if count <= len(COLOURS):
-        return COLOURS[k]
-    import matplotlib as mpl  # noqa: PLC0415
-
-    return mpl.colormaps["viridis"](0.92 * k / (count - 1))
+def _page(title: str, panels: int, path: Path) -> AbstractContextManager[list[Axes]]:
+    height = 4.2 if panels == 1 else 1.0 + 2.2 * panels
+    return page(title, panels, path, size=(8.5, height), title_size=10.5)
 
 
 def _legend(ax: Axes, count: int) -> None:
     if count > 1 and ax.get_legend_handles_labels()[0]:
-        ax.legend(loc="upper left", bbox_to_anchor=(1.01, 1.02), borderaxespad=0.0, ncols=1 + (count - 1) // 14)
-
-
-def _bracketed(unit: str) -> str:
-    return f" [{unit.replace('m/s2', 'm/s²')}]" if unit else ""
+        legend(ax, count)
 
 
 def _poles(stability: Stability, title: str, path: Path) -> Path:
     """Eigenvalues in the s plane; of a pair both. Modes that are gone after one step have no place in it."""
-    with _Canvas(f"{title}: eigenvalues", 1, path) as canvas:
-        ax = canvas.axes[0]
+    with _page(f"{title}: eigenvalues", 1, path) as axes:
+        ax = axes[0]
         for seen, mark, label in ((True, "x", "seen in the outputs"), (False, "+", "not seen")):
             poles = [m.pole for m in stability.modes if m.seen == seen and abs(m.pole) < np.inf]
             both = np.array(poles + [p.conjugate() for p in poles if p.imag])
@@ -154,15 +122,15 @@ def _steps(model: Linearization, index: int, duration: float, title: str, direct
     families = _families(model)
     times, found = step_response(model, index, duration)
     path = directory / f"step-{re.sub(r'[^a-z0-9]+', '-', name.lower()).strip('-')}.png"
-    with _Canvas(f"{title}: step of 1 {unit} at {name}", len(families), path) as canvas:
-        for ax, (panel, curves) in zip(canvas.axes, families.items(), strict=True):
+    with _page(f"{title}: step of 1 {unit} at {name}", len(families), path) as axes:
+        for ax, (panel, curves) in zip(axes, families.items(), strict=True):
             for k, (label, row, _) in enumerate(curves):
                 style: Any = {"drawstyle": "steps-post"} if model.step is not None and len(times) < 200 else {}
-                ax.plot(times, row @ found, label=label, color=_colour(k, len(curves)), **style)
-            ax.set_ylabel(f"{panel}{_bracketed(curves[0][2])}")
+                ax.plot(times, row @ found, label=label, color=colour(k, len(curves)), **style)
+            ax.set_ylabel(f"{panel} {bracketed(curves[0][2])}".rstrip())
             ax.margins(x=0.01)
             _legend(ax, len(curves))
-        canvas.axes[-1].set_xlabel("time after the step [s]")
+        axes[-1].set_xlabel("time after the step [s]")
     return path
 
 
@@ -170,38 +138,38 @@ def _bode(model: Linearization, title: str, path: Path) -> Path:
     index, frequencies = default_input(model), default_frequencies(model)
     response = FrequencyResponse(model)(frequencies, index)
     families = {k: v for k, v in _families(model).items() if any(np.abs(row @ response).any() for _, row, _ in v)}
-    with _Canvas(f"{title}: frequency response to {model.inputs[index]}", 2 * len(families), path) as canvas:
+    with _page(f"{title}: frequency response to {model.inputs[index]}", 2 * len(families), path) as axes:
         for k, (panel, curves) in enumerate(families.items()):
-            size, phase = canvas.axes[2 * k : 2 * k + 2]
+            size, phase = axes[2 * k : 2 * k + 2]
             for n, (label, row, _) in enumerate(curves):
                 g = row @ response
                 if not np.abs(g).any():
                     continue
-                style: Any = {"label": label, "color": _colour(n, len(curves)), "linestyle": DASHES[0]}
+                style: Any = {"label": label, "color": colour(n, len(curves)), "linestyle": DASHES[0]}
                 size.loglog(frequencies, np.abs(g), **style)
                 phase.semilogx(frequencies, np.degrees(np.unwrap(np.angle(g))), **style)
-            size.set_ylabel(f"{panel}\n|G|{_bracketed(curves[0][2])}")
+            size.set_ylabel(f"{panel}\n|G| {bracketed(curves[0][2])}".rstrip())
             phase.set_ylabel("phase [°]")
             _legend(size, len(curves))
             for ax in (size, phase):
                 ax.margins(x=0.01)
-        canvas.axes[-1].set_xlabel("angular frequency [rad/s]")
+        axes[-1].set_xlabel("angular frequency [rad/s]")
     return path
 
 
 def _string(model: Linearization, passings: Sequence[Passing], title: str, path: Path) -> Path:
     quantities = list(dict.fromkeys(passing.quantity for passing in passings))
     heading = f"{title}: string stability under {model.inputs[default_input(model)]}"
-    with _Canvas(heading, len(quantities), path) as canvas:
-        for ax, quantity in zip(canvas.axes, quantities, strict=True):
+    with _page(heading, len(quantities), path) as axes:
+        for ax, quantity in zip(axes, quantities, strict=True):
             mine = [passing for passing in passings if passing.quantity == quantity]
             for k, passing in enumerate(mine):
-                colour = _colour(k, len(mine))
-                ax.loglog(passing.frequencies, passing.size, label=passing.pair, color=colour)
-                ax.plot(passing.at, passing.peak, "o", color=colour, markersize=4)
+                shade = colour(k, len(mine))
+                ax.loglog(passing.frequencies, passing.size, label=passing.pair, color=shade)
+                ax.plot(passing.at, passing.peak, "o", color=shade, markersize=4)
             ax.axhline(1.0, color="#444444", linewidth=1.2, linestyle=(0, (6, 3)))
             ax.set_ylabel(f"|T| of {quantity}")
             ax.margins(x=0.01)
             _legend(ax, max(2, len(mine)))
-        canvas.axes[-1].set_xlabel("angular frequency [rad/s]")
+        axes[-1].set_xlabel("angular frequency [rad/s]")
     return path

@@ -1,9 +1,10 @@
 """Whether anybody's FMU keeps the standard: read, compared with our own rules where it is ours, and tried."""
 
-from .report import TIMEOUT, show_report, validate
+from .report import TIMEOUT, Finding, Report, validate
 
 __all__ = [
     "TIMEOUT",
-    "show_report",
+    "Finding",
+    "Report",
     "validate",
 ]

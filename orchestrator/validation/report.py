@@ -17,9 +17,6 @@ from typing import Literal
 import fmpy
 from fmpy.validation import validate_fmu
 from lxml import etree
-from rich.console import Console
-from rich.table import Table
-from rich.text import Text
 
 from ..errors import FmuFileError
 from ..fmi import Interface, Workspace, is_pedantry, load_fmu
@@ -197,26 +194,3 @@ def _judged(title: str, answer: tuple[Verdict, str], interface: Interface) -> Fi
     # What is doubtful in the FMU of another maker is a defect in ours; a Python FMU's outer shell is pythonfmu's.
     ours = interface.own_kind == "native"
     return Finding(title, "fail" if verdict == "warning" and ours else verdict, detail)
-
-
-# -------------------------------------------------------------------- the verdict
-
-
-_COLOURS: dict[Verdict, str] = {"pass": "green", "warning": "yellow", "fail": "bold red", "skipped": "dim"}
-
-
-def show_report(out: Console, report: Report) -> None:
-    """Print one row a check, and the verdict in a line."""
-    table = Table(box=None, pad_edge=False, padding=(0, 2, 0, 0), header_style="underline")
-    for column in ("check", "verdict", "what was found"):
-        table.add_column(column, overflow="fold", no_wrap=column != "what was found")
-    for finding in report.findings:
-        verdict = Text(finding.verdict, style=_COLOURS[finding.verdict])
-        table.add_row(Text(finding.check), verdict, Text(finding.detail))
-    out.print(Text(f"{report.path}: {report.interface.model}", style="bold"))
-    out.print(table)
-    counts = {verdict: sum(finding.verdict == verdict for finding in report.findings) for verdict in _COLOURS}
-    told = ", ".join(f"{count} {verdict}" for verdict, count in counts.items() if count)
-    out.print(
-        Text(f"{'valid' if report.passed else 'not valid'}: {told}", style="green" if report.passed else "bold red")
-    )

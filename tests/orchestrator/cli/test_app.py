@@ -16,7 +16,7 @@ import numpy as np
 import pytest
 from railcosim.fmus.kinds import KINDS
 from railcosim.orchestrator import Results, load
-from railcosim.orchestrator.cli import app as cli
+from railcosim.orchestrator.cli import runs
 from railcosim.orchestrator.cli.app import call
 from railcosim.orchestrator.cli.options import KindName
 from railcosim.orchestrator.run.execution import execute
@@ -186,7 +186,7 @@ def test_verify_step_prints_each_metric_at_half_the_step_and_the_difference(smal
 
 def test_the_second_run_is_recorded_at_the_same_points(small: Path) -> None:
     first = execute(load(small / "small.toml"), kind="plain")
-    second = cli._at_half_the_step(first, KindName.plain, quiet=True)
+    second = runs._at_half_the_step(first, KindName.plain, quiet=True)
     assert second is not None
     assert second.system.step == 0.05
     assert second.seconds["steps"] == 40

@@ -10,7 +10,7 @@ import pytest
 from hypothesis import strategies as st
 from lxml import etree
 from railcosim.fmus.build import plain
-from railcosim.orchestrator.cli.console import show_interface
+from railcosim.orchestrator.cli.printing import show_interface
 from railcosim.orchestrator.errors import FmuFileError, RailcosimError
 from railcosim.orchestrator.fmi.archive import Workspace
 from railcosim.orchestrator.fmi.reader import read_interface

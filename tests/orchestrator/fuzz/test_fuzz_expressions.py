@@ -19,7 +19,7 @@ from railcosim.orchestrator.evaluation.metrics import (
     unit_of,
 )
 from railcosim.orchestrator.evaluation.requirements import check_requirements, judge_requirements
-from railcosim.orchestrator.figures.drawing import check_figures, draw
+from railcosim.orchestrator.figures import check_figures, draw
 from railcosim.orchestrator.run.results import Results
 
 SIGNALS = (

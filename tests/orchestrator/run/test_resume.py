@@ -13,6 +13,7 @@ import numpy as np
 import pytest
 from railcosim.orchestrator import load
 from railcosim.orchestrator.cli import app as cli
+from railcosim.orchestrator.cli import runs
 from railcosim.orchestrator.run import checkpoint, results
 from railcosim.orchestrator.run.execution import execute, resume, run
 from railcosim.orchestrator.run.results import Results
@@ -303,7 +304,7 @@ def test_an_interrupted_run_says_how_to_go_on(orchestrate, scenario, tmp_path, m
 
     out = tmp_path / "out"
     with monkeypatch.context() as patch:
-        patch.setattr(cli.console, "progress", pressing)
+        patch.setattr(runs, "show_progress", pressing)
         code, said, _ = orchestrate("run", scenario, "--kind", "plain", "--checkpoint-every", 1, "-o", out)
     assert code == 130
     assert "interrupted at t = 2.6 s of 4 s\n" in said

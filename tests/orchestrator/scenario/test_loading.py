@@ -226,7 +226,7 @@ def test_the_mistakes_of_the_documentation_are_told_as_it_says():
 
 def test_the_tables_of_the_documentation_name_every_key():
     from railcosim.orchestrator.evaluation.published import PUBLISHED_KEYS
-    from railcosim.orchestrator.figures.drawing import PANEL_KEYS
+    from railcosim.orchestrator.figures import PANEL_KEYS
     from railcosim.orchestrator.master import ALGORITHMS
     from railcosim.orchestrator.scenario.events import EVENT_KEYS
     from railcosim.orchestrator.scenario.reader import CONNECTION_KEYS, INSTANCE_KEYS, TOP_KEYS

@@ -1,0 +1,28 @@
+"""What the commands print: on a terminal in colour, in a pipe or file without.
+
+`linear` is for the command that needs it to import: it brings SciPy.
+"""
+
+from .comparison import show_comparison
+from .console import and_figures, counted, folded, open_console, say, show_notes
+from .interface import show_interface
+from .outcome import show_run
+from .progress import show_progress
+from .validation import show_report
+from .verdicts import show_published, summary
+
+__all__ = [
+    "and_figures",
+    "counted",
+    "folded",
+    "open_console",
+    "say",
+    "show_comparison",
+    "show_interface",
+    "show_notes",
+    "show_progress",
+    "show_published",
+    "show_report",
+    "show_run",
+    "summary",
+]

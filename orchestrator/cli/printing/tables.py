@@ -1,0 +1,77 @@
+"""What the tables have in common: look, verdicts, numbers, and the reasons that stand below them."""
+
+from __future__ import annotations
+
+import math
+import sys
+from collections.abc import Iterable, Sequence
+from typing import Any
+
+from rich.console import Console
+from rich.measure import Measurement
+from rich.table import Table
+from rich.text import Text
+
+from .console import say
+
+_COLOURS = {
+    "pass": "green",
+    "fail": "bold red",
+    "inconclusive": "yellow",
+    "reproduced": "green",
+    "missed": "bold red",
+    "not judged": "dim",
+    "warning": "yellow",
+    "skipped": "dim",
+}
+PLAIN: Any = {"box": None, "pad_edge": False, "padding": (0, 2, 0, 0), "header_style": "underline"}
+SIDE_BY_SIDE = 8
+"""How many columns, or names in a line, a reader still takes in."""
+
+
+def table(title: str, columns: Sequence[str], *, right: Sequence[str] = (), fold: Sequence[str] = ()) -> Table:
+    """An empty table.
+
+    Args:
+        title: above it; may be empty.
+        columns: their heads.
+        right: which of them are aligned to the right.
+        fold: which of them may take several lines a row.
+    """
+    made = Table(title=Text(f"\n{title}", style="bold") if title else None, title_justify="left", **PLAIN)
+    for head in columns:
+        wraps = head in fold
+        made.add_column(
+            Text(head),
+            justify="right" if head in right else "left",
+            overflow="fold" if wraps else "ellipsis",
+            no_wrap=not wraps,
+        )
+    return made
+
+
+def fits(out: Console, made: Table) -> bool:
+    """Whether a table can be shown without folding anything."""
+    return Measurement.get(out, out.options.update(width=sys.maxsize), made).maximum <= out.width
+
+
+def verdict(word: str) -> Text:
+    """A verdict in its colour."""
+    return Text(word, style=_COLOURS.get(word, ""))
+
+
+def number(value: float, unit: str) -> str:
+    """A metric's value; no time is ``never``, and no value a dash."""
+    if math.isnan(value):
+        return "-"
+    return "never" if math.isinf(value) and unit == "s" else f"{value:.6g}"
+
+
+def show_reasons(out: Console, word: str, reasons: Iterable[tuple[str, str]]) -> None:
+    """Under a table: why some of its rows have no value or verdict, each reason once."""
+    by_reason: dict[str, list[str]] = {}
+    for name, reason in reasons:
+        by_reason.setdefault(reason, []).append(name)
+    for reason, names in by_reason.items():
+        shown = ", ".join(dict.fromkeys(names)) if len(names) <= SIDE_BY_SIDE else f"{len(names)} rows"
+        say(out, f"{word}: {reason} ({shown})", "yellow" if word == "no value" else "dim")

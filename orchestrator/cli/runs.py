@@ -1,0 +1,177 @@
+"""The commands of ``orchestrate`` that run a scenario, or draw what a run has left: run, reproduce, plot."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated, Any
+
+import typer
+
+from ..comparison import published_cases
+from ..errors import ScenarioError
+from ..evaluation import PublishedRow
+from ..figures import check_figures, draw
+from ..isolation import isolate
+from ..run import ROWS_FILE, Results, Run, at_half_the_step, execute, go_on, read_checkpoint, recover_rows
+from .options import (
+    FAILED,
+    INTERRUPTED,
+    OK,
+    Algorithm,
+    Isolate,
+    Kind,
+    KindName,
+    Preset,
+    Quiet,
+    Set,
+    Step,
+    Stop,
+    Swap,
+    With,
+    load_system,
+)
+from .printing import open_console, say, show_progress, show_published, show_run, summary
+
+
+def run(
+    scenario: Annotated[
+        str | None,
+        typer.Argument(metavar="SCENARIO", help="A shipped scenario (see 'orchestrate list'), or a .toml file."),
+    ] = None,
+    *,
+    preset: Preset = None,
+    settings: Set = None,
+    builds: With = None,
+    swaps: Swap = None,
+    stop: Stop = None,
+    step: Step = None,
+    algorithm: Algorithm = None,
+    kind: Kind = KindName.auto,
+    isolated: Isolate = None,
+    threads: Annotated[
+        int,
+        typer.Option(
+            min=1,
+            help="Threads that step in parallel: jacobi, FMI 2.0 FMUs; for many or heavy ones on idle cores.",
+        ),
+    ] = 1,
+    checkpoint_every: Annotated[
+        float | None,
+        typer.Option(metavar="T", help="Write a checkpoint about every T s of the run, to go on from by --resume."),
+    ] = None,
+    resume_from: Annotated[
+        Path | None,
+        typer.Option("--resume", metavar="DIR", help="Go on with the run in DIR from its last checkpoint."),
+    ] = None,
+    verify_step: Annotated[
+        bool, typer.Option("--verify-step", help="Run again at half the step and print each metric's difference.")
+    ] = False,
+    output: Annotated[
+        Path | None, typer.Option("--output", "-o", help="Directory for the results; results/<scenario> by default.")
+    ] = None,
+    no_figures: Annotated[bool, typer.Option("--no-figures", help="Draw nothing.")] = False,
+    quiet: Quiet = False,
+) -> None:
+    """Run a scenario: results, metrics, verdicts, figures.
+
+    Exit codes: 0 fine; 1 a requirement failed or a published value was missed; 2 the input is wrong; 3 an FMU failed,
+    or what the FMUs exchange does not settle (what was computed is on disk);
+    130 interrupted by Ctrl-C (what was computed is on disk).
+    """
+    how: Any = {"figures": not no_figures, "threads": threads, "checkpoint_every": checkpoint_every}
+    if resume_from is not None:
+        given = (scenario, preset, settings or None, builds or None, swaps or None, step, algorithm, isolated or None)
+        if any(x is not None for x in (*given, output)) or kind is not KindName.auto or verify_step:
+            raise ScenarioError(
+                "--resume takes the run as its directory has it: give no scenario and no change but --stop; --threads, "
+                "--checkpoint-every, --no-figures and --quiet may stand with it"
+            )
+        point = read_checkpoint(resume_from)
+        with show_progress(point.system.name, quiet, point.system.start_time, point.time) as progress:
+            outcome = go_on(resume_from, stop_time=stop, progress=progress, **how)
+    else:
+        if scenario is None:
+            raise ScenarioError("name a scenario (see 'orchestrate list'), or a run to go on with by --resume DIR")
+        system = load_system(scenario, preset, settings, builds, swaps, stop=stop, step=step, algorithm=algorithm)
+        system = isolate(system, isolated or ())
+        directory = output or Path("results") / "-".join(filter(None, (system.name, preset)))
+        with show_progress(system.name, quiet, system.start_time) as progress:
+            outcome = execute(system, kind=kind.value, output=directory, progress=progress, **how)
+    second = _at_half_the_step(outcome, kind, quiet) if verify_step else None
+    show_run(outcome, second, quiet)
+    for ended in (outcome, second):
+        if ended is not None and ended.status == "failed" and ended.error is not None:
+            raise ended.error
+    raise typer.Exit(_exit_code(outcome, second))
+
+
+def _at_half_the_step(outcome: Run, kind: KindName, quiet: bool) -> Run | None:
+    """The same run at half the step, in memory; None where there is nothing to compare it with."""
+    if outcome.status != "completed":
+        return None
+    system = outcome.system
+    with show_progress(f"{system.name} at half the step", quiet, system.start_time) as progress:
+        return execute(at_half_the_step(system), kind=kind.value, progress=progress)
+
+
+def _exit_code(outcome: Run, second: Run | None) -> int:
+    if "interrupted" in (outcome.status, second and second.status):
+        return INTERRUPTED
+    return FAILED if outcome.failed else OK
+
+
+def reproduce(
+    paper: Annotated[
+        str | None, typer.Argument(help="A scenario's name or a word of its source, such as Wang; all by default.")
+    ] = None,
+    kind: Kind = KindName.auto,
+    quiet: Quiet = False,
+) -> None:
+    """Run every published case and print one table.
+
+    Claim, published and measured value, tolerance and verdict, under the command that shows them. Exit code 1 if a
+    published value was missed.
+    """
+    groups: dict[str, list[PublishedRow]] = {}
+    for case in published_cases(paper):
+        title = case.command.removeprefix("orchestrate run ")
+        with show_progress(title, quiet, case.system.start_time) as progress:
+            outcome = execute(case.system, kind=kind.value, progress=progress)
+        if outcome.error is not None:
+            raise outcome.error
+        if outcome.status == "interrupted":
+            raise KeyboardInterrupt
+        groups[case.command] = outcome.published
+    out = open_console()
+    show_published(out, groups)
+    missed = False
+    for line, bad in summary([], [row for rows in groups.values() for row in rows]):
+        missed |= bad
+        say(out, line, "bold red" if bad else "green")
+    raise typer.Exit(FAILED if missed else OK)
+
+
+def plot(
+    results: Annotated[Path, typer.Argument(help="The directory of a run.")],
+    signals: Annotated[
+        list[str] | None,
+        typer.Argument(help="Expressions such as 'train[:].speed'; without, the run's figures."),
+    ] = None,
+    output: Annotated[Path | None, typer.Option("--output", "-o", help="Where to draw; RESULTS by default.")] = None,
+) -> None:
+    """Draw a run's figures again, or chosen signals.
+
+    Of a run that was killed, or still goes on, it writes results.csv as well.
+    """
+    results = results.parent if results.is_file() else results
+    loaded = Results.load(results)
+    problems = [] if signals else check_figures(loaded.figures, [*loaded.names(), *loaded.parameters])
+    if problems:
+        raise ScenarioError(problems)
+    if (results / ROWS_FILE).is_file():
+        print(recover_rows(results))
+    figures = [{"title": ", ".join(signals), "y": signals}] if signals else loaded.figures
+    directory = output or results
+    directory.mkdir(parents=True, exist_ok=True)
+    for path in draw(figures, loaded, directory):
+        print(path)

@@ -1,0 +1,61 @@
+"""The commands of ``orchestrate`` that look at scenarios without running them: list, check."""
+
+from __future__ import annotations
+
+from ...components import CATALOGUE
+from ...fmus.description import summary
+from ..fmi import Workspace
+from ..master import ALGORITHMS
+from ..run import check as check_system
+from ..run import describe_stepping
+from ..scenario import load, shipped
+from ..wiring import describe_topology
+from .options import Algorithm, Preset, Scenario, Set, Swap, With, load_system
+from .printing import counted, open_console, say, show_notes
+
+
+def list_all() -> None:
+    """List the shipped scenarios, components and master algorithms."""
+    out = open_console()
+    say(out, "Scenarios (orchestrate run NAME)", "bold")
+    for name, title in shipped():
+        say(out, f"  {name}: {title}")
+        presets = load(name).presets
+        if presets:
+            say(out, f"      presets: {', '.join(presets)}", "dim")
+    say(out, "Components (orchestrate describe NAME)", "bold")
+    for name, component in CATALOGUE.items():
+        say(out, f"  {name}: {summary(component)}")
+    say(out, "Master algorithms (orchestrate run SCENARIO --algorithm NAME)", "bold")
+    for name, algorithm in ALGORITHMS.items():
+        say(out, f"  {name}: {algorithm.summary()}")
+
+
+def check(
+    scenario: Scenario,
+    *,
+    preset: Preset = None,
+    settings: Set = None,
+    builds: With = None,
+    swaps: Swap = None,
+    algorithm: Algorithm = None,
+) -> None:
+    """Find what is wrong before a run, and show how the run would step."""
+    system = load_system(scenario, preset, settings, builds, swaps, algorithm=algorithm)
+    out = open_console()
+    with Workspace() as workspace:
+        checked = check_system(system, workspace)
+    say(out, system.title or system.name, "bold")
+    connections = len(checked.wiring.links)
+    facts = f"{len(system.instances)} instances, {connections} scalar connections, step {system.step:g} s"
+    say(out, facts, "dim")
+    for line in describe_stepping(checked):
+        say(out, line)
+    for connection in system.connections:
+        if connection.delay:
+            points = counted(connection.delay, "communication point")
+            say(out, f"delay: {connection.target} receives {connection.source} {points} later")
+    for line in describe_topology({name: model.interface for name, model in checked.models.items()}, checked.wiring):
+        say(out, line)
+    show_notes(out, checked.notes)
+    say(out, "no errors", "green")

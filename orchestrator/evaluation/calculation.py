@@ -1,0 +1,145 @@
+"""The value of an expression: its names looked up in a scope, its nodes calculated.
+
+Indices are 1-based and slices include both ends.
+"""
+
+import re
+from collections.abc import Collection, Mapping
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+
+from ..errors import ExpressionError, did_you_mean
+from .functions import ARITHMETIC, LOGIC, Function, Value, call_problem, logical, where
+from .signals import Signals
+from .syntax import Call, Group, Name, Node, Number, Operation, Reference, Span
+
+INDEX = r"(\d{1,9})(?!\d)"
+"""The number in an index as a pattern; Python does not convert numbers of thousands of digits."""
+
+
+@dataclass(frozen=True)
+class Scope:
+    """What the names of one expression stand for during one evaluation."""
+
+    text: str
+    signals: Signals
+    functions: Mapping[str, Function]
+    constants: Mapping[str, Any]
+
+    def error(self, message: str) -> ExpressionError:
+        """An error that quotes the expression."""
+        return ExpressionError(f"'{self.text}': {message}")
+
+    @cached_property
+    def names(self) -> frozenset[str]:
+        """Recorded signals and parameters."""
+        recorded, fixed = frozenset(self.signals.names()), self.signals.parameters
+        return recorded | frozenset(fixed) if fixed else recorded
+
+    def integer(self, node: Node) -> int:
+        """The value of an index."""
+        with np.errstate(all="ignore"):
+            value = float(evaluate(node, self))
+        if not value.is_integer():
+            raise self.error(f"an index must be a whole number, not {value:g}")
+        return int(value)
+
+    def signal(self, name: str) -> Value:
+        """A recorded signal (T,), else a parameter ()."""
+        if name in self.signals.names():
+            recorded = np.asarray(self.signals[name])
+            if recorded.dtype.kind not in "bifu":
+                raise self.error(f"'{name}' is a text; expressions work on numbers")
+            return recorded
+        value = self.signals.parameters[name]
+        if isinstance(value, str):
+            raise self.error(f"'{name}' is a text ('{value}'); expressions work on numbers")
+        return np.asarray(value, dtype=np.float64)
+
+    def reference(self, reference: Reference) -> Value:
+        """One signal (T,), or the rows (n, T) of a slice; parameters alone make one column."""
+        found = self.resolve(reference)
+        if not found:
+            raise self.error(unknown_signal(reference, self.names))
+        values = [self.signal(name) for name in found]
+        if not reference.stacked:
+            return values[0]
+        length = max(value.size for value in values)
+        return np.stack([np.broadcast_to(value, (length,)) for value in values])
+
+    def resolve(self, reference: Reference) -> list[str]:
+        """The full names a reference stands for, in the order of their indices; empty when there are none."""
+        names: list[str] = []
+        spans: list[tuple[float, float]] = []
+        for name, indices in reference.parts:
+            texts = []
+            for index in indices:
+                if isinstance(index, Span):
+                    first, last = (self.integer(end) if end else None for end in (index.first, index.last))
+                    spans.append((1 if first is None else first, np.inf if last is None else last))
+                texts.append(":" if isinstance(index, Span) else str(self.integer(index)))
+            names.append(name + (f"[{','.join(texts)}]" if texts else ""))
+        full = ".".join(names)
+        if not spans:
+            return [full] if full in self.names else []
+        pattern = re.compile(re.escape(full).replace(":", INDEX))
+        found = [(tuple(map(int, match.groups())), match[0]) for match in map(pattern.fullmatch, self.names) if match]
+        return [n for ks, n in sorted(found) if all(a <= k <= b for k, (a, b) in zip(ks, spans, strict=True))]
+
+
+def unknown_signal(reference: Reference, names: Collection[str]) -> str:
+    """What to say about a reference that stands for nothing."""
+    family = re.escape(re.sub(r"\[[^\]]*\]", "[:]", reference.text)).replace(r":\]", r"[\d,]+\]")
+    near = [name for name in names if re.fullmatch(family, name)]
+    if near:
+        near.sort(key=lambda name: [(len(k), k) for k in re.findall(r"\d+", name)])
+        return f"there is no '{reference.text}'; there are '{near[0]}' to '{near[-1]}'"
+    written = re.findall(r"\[[^\]]*\]", reference.text)
+
+    def as_written(name: str) -> str:
+        indices = iter(written)
+        return re.sub(r"\[[^\]]*\]", lambda _: next(indices, "[i]"), name)
+
+    nearest = did_you_mean(reference.text, {as_written(name) for name in names}) or "; 'describe' lists an instance"
+    return f"there is no signal or parameter '{reference.text}'{nearest}"
+
+
+def evaluate(node: Node, scope: Scope) -> Value:  # noqa: PLR0911 (one a kind of node)
+    """The value of one node: a number, or an array (T,) or (n, T)."""
+    match node:
+        case Number(value=value):
+            return np.asarray(value)
+        case Name(name=name):
+            if name not in scope.constants:
+                raise scope.error(f"'{name}' is not known here{did_you_mean(name, scope.constants)}")
+            return np.asarray(scope.constants[name])
+        case Reference():
+            return scope.reference(node)
+        case Call(name=name, arguments=arguments, keywords=keywords):
+            if problem := call_problem(node, scope.functions):
+                raise scope.error(problem)
+            function = scope.functions[name]
+            values = [_argument(argument, scope) for argument in arguments]
+            named = dict(zip(keywords, values[len(values) - len(keywords) :], strict=True))
+            first = [scope.signals] if function.takes_signals else []
+            return np.asarray(function.call(*first, *values[: len(values) - len(keywords)], **named))
+        case Operation(operator="if", operands=(condition, then, otherwise)):
+            return where(evaluate(condition, scope), evaluate(then, scope), evaluate(otherwise, scope))
+        case Operation(operator=operator, operands=operands):
+            values = [evaluate(operand, scope) for operand in operands]
+            if operator in ARITHMETIC:  # on booleans NumPy's would be logical
+                return np.asarray(ARITHMETIC[operator](*(np.asarray(value, dtype=np.float64) for value in values)))
+            result = values[0] if len(values) > 1 else logical(LOGIC[operator], values[0])
+            for value in values[1:]:
+                result = logical(LOGIC[operator], result, value)
+            return result
+    raise scope.error("a list is only understood as an argument")
+
+
+def _argument(node: Node, scope: Scope) -> Any:
+    if isinstance(node, Group):
+        return [_argument(item, scope) for item in node.items]
+    return np.asarray(evaluate(node, scope), dtype=np.float64)

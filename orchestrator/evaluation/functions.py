@@ -1,0 +1,98 @@
+"""The constants, operators and element-wise functions of expressions; reducers over time stand in `metrics`.
+
+NaN survives comparisons and logic, so that it can never pass as "false".
+"""
+
+import inspect
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any, TypeAlias
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..errors import did_you_mean
+from .syntax import Call, Group
+
+CONSTANTS = {"pi": np.pi, "inf": np.inf, "nan": np.nan, "true": True, "false": False}
+Value: TypeAlias = NDArray[Any]
+
+
+@dataclass(frozen=True)
+class Function:
+    """A function expressions may call. With `takes_signals` its first argument is the run, which the user omits."""
+
+    call: Callable[..., Any]
+    unit: str = ""  # of the result: a unit, "same" as the first argument, "per s" of it, or unknown
+    takes_signals: bool = False
+    reduces: bool = False  # over time, to one number
+
+    @cached_property
+    def arguments(self) -> inspect.Signature:
+        """The arguments a user writes."""
+        if isinstance(self.call, np.ufunc):  # these carry no signature of their own
+            names = ("x",) if self.call.nin == 1 else ("a", "b")
+            return inspect.Signature([inspect.Parameter(name, inspect.Parameter.POSITIONAL_ONLY) for name in names])
+        signature = inspect.signature(self.call)
+        return signature.replace(parameters=list(signature.parameters.values())[int(self.takes_signals) :])
+
+
+def logical(operation: Callable[..., Value], *operands: Value) -> Value:
+    """A comparison or logical operation whose result is NaN wherever an operand is."""
+    numbers = np.broadcast_arrays(*(np.asarray(x, dtype=np.float64) for x in operands))
+    unknown = np.logical_or.reduce([np.isnan(x) for x in numbers])
+    result = operation(*numbers)
+    return np.where(unknown, np.nan, result) if unknown.any() else np.asarray(result)
+
+
+def where(condition: Value, then: Value, otherwise: Value) -> Value:
+    """`then` where the condition holds, `otherwise` elsewhere, NaN where the condition is NaN."""
+    unknown = np.isnan(np.asarray(condition, dtype=np.float64))
+    result = np.where(condition, then, otherwise)
+    return np.where(unknown, np.nan, result) if unknown.any() else result
+
+
+ARITHMETIC: dict[str, Callable[..., Value]] = {
+    "+": np.add, "-": np.subtract, "*": np.multiply, "/": np.true_divide, "**": np.power,
+    "negative": np.negative, "positive": np.positive,
+}  # fmt: skip
+LOGIC: dict[str, Callable[..., Value]] = {
+    "<": np.less, "<=": np.less_equal, ">": np.greater, ">=": np.greater_equal, "==": np.equal, "!=": np.not_equal,
+    "and": np.logical_and, "or": np.logical_or, "not": np.logical_not,
+}  # fmt: skip
+ELEMENTWISE: dict[str, Function] = {
+    "abs": Function(np.abs, unit="same"),
+    "sign": Function(np.sign),
+    "floor": Function(np.floor),
+    "sqrt": Function(np.sqrt),
+    "exp": Function(np.exp),
+    "log": Function(np.log),
+    "sin": Function(np.sin),
+    "cos": Function(np.cos),
+    "tan": Function(np.tan),
+    "tanh": Function(np.tanh),
+    "minimum": Function(np.minimum, unit="same"),
+    "maximum": Function(np.maximum, unit="same"),
+    "clip": Function(lambda x, low, high: np.minimum(np.maximum(x, low), high), unit="same"),
+    "where": Function(where),
+}
+
+
+def call_problem(call: Call, functions: Mapping[str, Function]) -> str:
+    """What is wrong with a call: an unknown function or argument, too many or too few of them, or a list among them."""
+    if call.name not in functions:
+        nearest = did_you_mean(call.name, functions) or f"; there are {', '.join(sorted(functions))}"
+        return f"unknown function '{call.name}'{nearest}"
+    signature = functions[call.name].arguments
+    for word in call.keywords:
+        if word not in signature.parameters:
+            return f"{call.name} has no argument '{word}'{did_you_mean(word, signature.parameters)}"
+    plain = len(call.arguments) - len(call.keywords)
+    named = dict(zip(call.keywords, call.arguments[plain:], strict=True))
+    try:
+        given = signature.bind(*call.arguments[:plain], **named).arguments
+    except TypeError as error:
+        return f"{call.name}({', '.join(signature.parameters)}): {error}"
+    lists = [word for word, argument in given.items() if isinstance(argument, Group) and word != "outside"]
+    return f"{call.name}: {lists[0]} takes a signal or a number, not a list" if lists else ""

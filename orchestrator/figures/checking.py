@@ -1,0 +1,112 @@
+"""What is wrong with `[[figures]]`, as far as it can be told before a run."""
+
+from collections.abc import Collection, Iterator, Mapping, Sequence
+from typing import Any
+
+import numpy as np
+
+from ..errors import ExpressionError, did_you_mean
+from ..evaluation import FUNCTIONS, parse
+from .panels import PANEL_KEYS, bands_of, panels_of, texts_of
+
+_FUNCTION_KEYS = ("name", "from", "to", "points")
+_MAX_POINTS = 100_000
+
+
+def check_figures(figures: Sequence[Mapping[str, Any]], names: Collection[str], every_step: bool = True) -> list[str]:
+    """Every problem of the [[figures]] that can be found before a run.
+
+    `names` are the signals to be recorded and the parameters; `every_step` says whether each step is recorded.
+    """
+    problems: list[str] = []
+    for number, figure in enumerate(figures, 1):
+        place = f"[[figures]] entry {number} ({figure.get('title', 'no title')})"
+        if not isinstance(figure.get("title"), str) or not figure["title"].strip():
+            problems.append(f"{place}: title is missing; it also names the file")
+        panels = figure.get("panels")
+        if panels is None:
+            problems += [f"{place}: {problem}" for problem in _panel_problems(figure, names, every_step)]
+            continue
+        if not isinstance(panels, list) or not panels or not all(isinstance(panel, Mapping) for panel in panels):
+            problems.append(f"{place}: panels must be a list of tables, each with y")
+            continue
+        strange = [key for key in figure if key not in ("title", "x", "x_label", "x_range", "panels")]
+        problems += [f"{place}: '{key}' belongs into the panels" for key in strange]
+        for which, panel in enumerate(panels_of(figure), 1):
+            problems += [f"{place}, panel {which}: {problem}" for problem in _panel_problems(panel, names, every_step)]
+    return problems
+
+
+def _panel_problems(panel: Mapping[str, Any], names: Collection[str], every_step: bool) -> Iterator[str]:
+    valid = (*PANEL_KEYS, "panels")
+    for key in panel:
+        if key not in valid:
+            yield f"unknown key '{key}'{did_you_mean(key, valid) or '; there are ' + ', '.join(valid)}"
+    yield from _shape_problems(panel)
+    function = panel.get("x")
+    variable = (str(function.get("name")),) if isinstance(function, Mapping) else ()
+    texts = [*texts_of(panel.get("y")), *texts_of(function)]
+    texts += [end for band in bands_of(panel) for end in band if isinstance(end, str)]
+    for text in texts:
+        try:
+            expression = parse(text, FUNCTIONS)
+        except ExpressionError as error:
+            yield from error.problems
+            continue
+        yield from expression.check(names, variable)
+        if expression.calls("at_sample") and not every_step:
+            yield f"'{text}': at_sample needs every communication step recorded; set record = step"
+
+
+def _shape_problems(panel: Mapping[str, Any]) -> Iterator[str]:
+    """Values of the wrong kind."""
+    if not texts_of(panel.get("y")):
+        yield 'y is missing; give the expressions to draw, as in y = ["train[:].speed", "target.value"]'
+    labels = panel.get("label")
+    if labels is not None and len(texts_of(labels)) != len(texts_of(panel.get("y"))):
+        yield "label must be a list of texts, one for each entry of y"
+    for key in ("x_label", "y_label", "title"):
+        if key in panel and not isinstance(panel[key], str):
+            yield f"{key} must be text"
+    for key in ("x_range", "y_range"):
+        if key in panel and not _is_range(panel[key]):
+            yield f"{key} must be two rising numbers, as in {key} = [0, 90]"
+    if "scale" in panel and not (_is_number(panel["scale"]) and panel["scale"] != 0):
+        yield "scale must be a number other than 0"
+    elif "scale" in panel and "y_label" not in panel:
+        yield "scale needs y_label, which says the unit that is drawn"
+    bands = panel.get("bands", [])
+    if not isinstance(bands, list) or not all(map(_is_band, bands)):
+        yield "bands must be a list of levels and [low, high] pairs, each a number or an expression"
+    x = panel.get("x")
+    if isinstance(x, Mapping):
+        yield from _function_problems(x)
+    elif x is not None and not isinstance(x, str):
+        yield 'x must be an expression, or { name = "d", from = 0, to = 1, points = 400 } for a function plot'
+
+
+def _function_problems(x: Mapping[str, Any]) -> Iterator[str]:
+    for key in x:
+        if key not in _FUNCTION_KEYS:
+            yield f"unknown key '{key}' in x{did_you_mean(key, _FUNCTION_KEYS) or '; there are name, from, to, points'}"
+    name = x.get("name")
+    if not isinstance(name, str) or not name.isidentifier() or name in {"i", "count", "time", "pi"}:
+        yield "x.name must be a plain word that is not taken, such as d"
+    if not _is_range([x.get("from"), x.get("to")]):
+        yield "x.from and x.to must be two rising numbers"
+    points = x.get("points", 400)
+    if not isinstance(points, int) or not 2 <= points <= _MAX_POINTS:
+        yield f"x.points must be a whole number from 2 to {_MAX_POINTS}"
+
+
+def _is_number(value: Any) -> bool:
+    return isinstance(value, int | float) and not isinstance(value, bool) and bool(np.isfinite(value))
+
+
+def _is_range(value: Any) -> bool:
+    return isinstance(value, list) and len(value) == 2 and all(map(_is_number, value)) and value[0] < value[1]
+
+
+def _is_band(band: Any) -> bool:
+    ends = band if isinstance(band, list) else [band]
+    return len(ends) in {1, 2} and all(isinstance(end, str) or _is_number(end) for end in ends)

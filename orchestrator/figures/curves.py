@@ -1,0 +1,145 @@
+"""The curves of a panel, out of recorded signals, with their labels and those of the axes.
+
+A panel draws expressions over time, over another expression, or over a plain variable (a function plot).
+"""
+
+import re
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..errors import ExpressionError
+from ..evaluation import FUNCTIONS, Expression, Reference, Signals, parse, unit_of
+from .panels import texts_of
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Curve:
+    """One line: x and y of shape (T,), its label, which entry of `y` it comes from and which of its lines it is."""
+
+    x: Array
+    y: Array
+    label: str
+    entry: int
+    member: int
+    alone: bool  # the only line of its entry
+    unit: str
+
+
+def curves_of(panel: Mapping[str, Any], signals: Signals) -> list[Curve]:
+    """All lines of a panel, labelled so that several families can be told apart."""
+    labels = texts_of(panel.get("label")) if "label" in panel else []
+    curves = []
+    for entry, text in enumerate(texts_of(panel["y"])):
+        curves += _entry(panel.get("x"), text, labels[entry] if labels else "", entry, signals)
+    families = {curve.entry for curve in curves if not curve.alone}
+    if labels or len(families) < 2:
+        return curves
+    what = [_variable(text) or f"({text})" for text in texts_of(panel["y"])]  # "train 1" alone would be ambiguous
+    return [c if c.alone else replace(c, label=f"{c.label} {what[c.entry]}") for c in curves]
+
+
+def _entry(x: Any, text: str, label: str, entry: int, signals: Signals) -> list[Curve]:
+    """The lines of one entry of `y`: one a row or value of i."""
+    expression = parse(text, FUNCTIONS)
+    names = [*signals.names(), *signals.parameters]
+    constants: dict[str, Any] = {}
+    if isinstance(x, Mapping):
+        constants[x["name"]] = np.linspace(x["from"], x["to"], x.get("points", 400))
+    drawn: list[tuple[Array, Array, str, str]] = []
+    for index in expression.instances(names):
+        y = np.atleast_2d(np.asarray(expression.evaluate(signals, index, **constants), dtype=np.float64))
+        across = _across(x, signals, index, constants)
+        y = np.broadcast_to(y, (y.shape[0], across.shape[-1]))
+        across = np.broadcast_to(across, y.shape)
+        resolved = expression.resolve(names, index)
+        unit = unit_of(expression, signals, index)
+        drawn += [
+            (across[row], y[row], _label(expression, resolved, index, row, len(y)), unit) for row in range(len(y))
+        ]
+    alone = len(drawn) == 1
+    return [
+        Curve(abscissa, y, _named(label, own, alone, member), entry, member, alone, unit)
+        for member, (abscissa, y, own, unit) in enumerate(drawn)
+    ]
+
+
+def _across(x: Any, signals: Signals, index: int | None, constants: Mapping[str, Any]) -> Array:
+    if isinstance(x, Mapping):
+        return np.asarray(constants[x["name"]])
+    if x is None:
+        return signals.time
+    values = np.asarray(parse(x, FUNCTIONS).evaluate(signals, index), dtype=np.float64)
+    if not values.ndim:
+        raise ExpressionError(f"x = '{x}' is a single number; draw over a signal")
+    return values
+
+
+def _named(label: str, own: str, alone: bool, member: int) -> str:
+    """The user's label, told apart by number: `{i}` in it stands for the numbers of the line's signals."""
+    if not label:
+        return own
+    numbers = ", ".join(re.findall(r"\d+(?:–\d+)?", own)) or str(member + 1)
+    return label.replace("{i}", numbers) if "{i}" in label or alone else f"{label} {numbers}"
+
+
+def _label(expression: Expression, resolved: list[list[str]], index: int | None, row: int, rows: int) -> str:
+    """`train 2` for one of a family, `train 1–2` for a gap between two, the text itself for a single line."""
+    families = [
+        names[row] if reference.stacked and len(names) == rows else names[0]
+        for reference, names in zip(expression.references, resolved, strict=True)
+        if names and (reference.stacked if index is None else reference.uses_index)
+    ]
+    if not families:
+        return _short(expression.text)
+    array = families[0].partition("[")[0]
+    numbers = [re.findall(r"\[([\d,]+)\]", name) for name in families if name.startswith(f"{array}[")]
+    first = sorted({tuple(map(int, found[0].split(","))) for found in numbers})
+    own = "–".join(",".join(map(str, index)) for index in first)
+    return " ".join([array.replace(".", " "), own, *numbers[0][1:]])
+
+
+def _short(text: str) -> str:
+    """`gust acceleration` for a plain signal, the expression otherwise."""
+    plain = re.fullmatch(r"[\w.\[\]:,-]+", text)
+    return text.removesuffix(".value").replace("[:]", "").replace("[i]", "").replace(".", " ") if plain else text
+
+
+def _variable(text: str) -> str:
+    """`speed` for a plain signal, nothing for a formula."""
+    tree = parse(text, FUNCTIONS).tree
+    return tree.parts[-1][0].replace("_", " ") if isinstance(tree, Reference) else ""
+
+
+def bracketed(unit: str) -> str:
+    """A unit as an axis shows it: m/s2 as [m/s²]."""
+    return f"[{re.sub(r'(?<=[a-z])([23])', lambda match: '²³'[int(match[0]) - 2], unit)}]" if unit else ""
+
+
+def y_label_of(panel: Mapping[str, Any], curves: Sequence[Curve]) -> str:
+    """The variable all entries share, and the unit they share."""
+    units = {curve.unit for curve in curves}
+    variables = {_variable(text) for text in texts_of(panel["y"])} - {"value"}
+    shared = [
+        next(iter(variables)) if len(variables) == 1 else "",
+        bracketed(next(iter(units))) if len(units) == 1 else "",
+    ]
+    return " ".join(filter(None, shared))
+
+
+def x_label_of(panel: Mapping[str, Any], signals: Signals) -> str:
+    """The variable and unit along x."""
+    x = panel.get("x")
+    if isinstance(x, Mapping):
+        return str(x["name"])
+    if x is None:
+        return "time [s]"
+    expression = parse(x, FUNCTIONS)
+    index = expression.instances([*signals.names(), *signals.parameters])[0]
+    unit = unit_of(expression, signals, index)
+    return f"{_variable(x) or x} {bracketed(unit)}".rstrip()

@@ -1,0 +1,82 @@
+"""How every picture looks: colours, dashes, and the page of panels above one another.
+
+matplotlib is imported where it is used: importing it costs more than most commands take.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+
+# Okabe and Ito 2008, told apart by colour-blind readers too; without their yellow, too pale for a line.
+COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#56B4E9", "#E69F00", "#000000")
+DASHES = ("-", "--", ":", "-.")
+_STYLE: Any = {  # matplotlib's own type for this is a list of every key it knows
+    "font.size": 9.5,
+    "axes.spines.top": False,
+    "axes.spines.right": False,
+    "axes.edgecolor": "#555555",
+    "axes.grid": True,
+    "grid.color": "#e4e4e4",
+    "grid.linewidth": 0.7,
+    "axes.axisbelow": True,
+    "axes.titlesize": 10,
+    "axes.titlelocation": "left",
+    "lines.linewidth": 1.6,
+    "legend.frameon": False,
+    "legend.fontsize": 9,
+    "xtick.color": "#555555",
+    "ytick.color": "#555555",
+    "xtick.labelcolor": "black",
+    "ytick.labelcolor": "black",
+}
+
+
+@contextmanager
+def page(
+    title: str, panels: int, path: Path, *, size: tuple[float, float], title_size: float = 11.5, share_x: bool = False
+) -> Iterator[list[Axes]]:
+    """The axes of a figure to draw into, which is written as PNG file at the end.
+
+    Args:
+        title: above all panels.
+        panels: how many axes stand above one another.
+        path: the file.
+        size: width and height in inches.
+        title_size: in points.
+        share_x: whether all panels have the x axis of the last.
+    """
+    import matplotlib as mpl  # noqa: PLC0415
+    from matplotlib.backends.backend_agg import FigureCanvasAgg  # noqa: PLC0415
+    from matplotlib.figure import Figure  # noqa: PLC0415
+
+    with mpl.rc_context(_STYLE):
+        figure = Figure(figsize=size, dpi=100, layout="constrained")
+        FigureCanvasAgg(figure)
+        figure.suptitle(title, x=0.01, ha="left", fontsize=title_size, fontweight="bold")
+        yield list(figure.subplots(panels, 1, sharex=share_x, squeeze=False)[:, 0])
+        figure.savefig(path, metadata={"Software": None})
+
+
+def colour(k: int, count: int) -> Any:
+    """The colour of one of `count` curves: of a palette, or along a scale where there are more than it has."""
+    if count <= len(COLOURS):
+        return COLOURS[k]
+    import matplotlib as mpl  # noqa: PLC0415
+
+    return mpl.colormaps["viridis"](0.92 * k / (count - 1))
+
+
+def colour_and_dashes(k: int) -> dict[str, Any]:
+    """One of many lines that have nothing in common: told apart by colour first."""
+    return {"color": COLOURS[k % len(COLOURS)], "linestyle": DASHES[k // len(COLOURS) % 4]}
+
+
+def legend(ax: Axes, count: int, **more: Any) -> None:
+    """A legend of `count` lines beside the axes, where it hides no data."""
+    ax.legend(loc="upper left", bbox_to_anchor=(1.01, 1.02), borderaxespad=0.0, ncols=1 + (count - 1) // 14, **more)

@@ -1,0 +1,31 @@
+"""The tables of an interface."""
+
+from railcosim.fmus.annotation import Annotation
+from railcosim.orchestrator.cli.printing import show_interface
+from railcosim.orchestrator.fmi import Interface, Variable
+
+
+def test_an_interface_stands_by_causality_with_what_each_output_depends_on(shown):
+    variables = [
+        Variable("gain", 0, "Real", "parameter", "tunable", "exact", 0.5, "1/s", description="of the loop"),
+        Variable("on", 1, "Boolean", "input", "discrete", None, True),
+        Variable("u", 2, "Real", "input", "continuous", None, 0.0, "m", description="what comes in"),
+        Variable("y", 3, "Real", "output", "continuous", None, None, "m", dependencies=frozenset({"u", "on"})),
+        Variable("z", 4, "Real", "output", "continuous", None, None, None, dependencies=frozenset()),
+        Variable("w", 5, "Real", "output", "continuous", None, None),
+    ]
+    interface = Interface(
+        "M", "M", "{1}", {v.name: v for v in variables}, {}, {}, annotation=Annotation(optional_inputs=("u",))
+    )
+    lines = [" ".join(line.split()) for line in shown(show_interface, interface)]
+    assert [line for line in lines if line in ("Parameters", "Inputs", "Outputs")] == [
+        "Parameters",
+        "Inputs",
+        "Outputs",
+    ]
+    assert "gain Real 1/s 0.5 of the loop (tunable)" in lines
+    assert "on Boolean true" in lines
+    assert "u Real m 0 what comes in (optional)" in lines
+    assert "y Real m on, u" in lines
+    assert "z Real no input" in lines
+    assert "w Real not said" in lines
