@@ -17,6 +17,7 @@ import pythonfmu
 from railcosim.orchestrator.fmi.archive import Workspace
 from railcosim.orchestrator.fmi.models import load_fmu
 
+TOYS = Path(__file__).parents[1] / "toys.py"
 _WRAPPER = next(
     (Path(pythonfmu.__file__).parent / "resources" / "binaries" / fmpy.platform).glob("*pythonfmu-export.*")
 )
@@ -85,6 +86,12 @@ def own_cache(session_cache):
     with pytest.MonkeyPatch.context() as patch:
         patch.setenv("RAILCOSIM_CACHE", str(session_cache))
         yield
+
+
+@pytest.fixture(scope="session")
+def mine():
+    """Reference of a toy component by its class name: a component of a user's, in a file of theirs."""
+    return lambda cls: f"{TOYS}:{cls}"
 
 
 @pytest.fixture

@@ -35,36 +35,6 @@ pytestmark = [
     pytest.mark.skipif(GCC is None, reason="FMUs by hand need gcc"),
 ]
 ALGORITHMS = pytest.mark.parametrize("algorithm", ["gauss-seidel", "jacobi"])
-MIXED = """
-class Lag(Base):
-    '''A first-order lag.'''
-
-    u = Input("m", 0.0, optional=True)
-    x = State("m", 1.0, output=True)
-
-    def derivatives(self):
-        return {"x": self.u - self.x}
-
-
-class Worded(Base):
-    '''A text and a number.'''
-
-    n = Memory("1", 0.0, output=True)
-    word = Memory("1", "a", output=True)
-
-    def update(self):
-        return {"n": self.n + 0.1, "word": self.word}
-
-
-class Fails(Base):
-    '''Fails at five seconds.'''
-
-    u = Input("m", 0.0, optional=True)
-    y = Output("m")
-
-    def outputs(self):
-        return {"y": maths.sqrt(4.95 - self.time) + self.u}
-"""
 
 
 @pytest.fixture
@@ -175,12 +145,12 @@ def test_a_whole_scenario(both, used, algorithm, kind):
 
 @ALGORITHMS
 @pytest.mark.parametrize("delay", [0, 1, 2, 3, 7])
-def test_delays_and_conversions(both, components, odd, algorithm, delay):
+def test_delays_and_conversions(both, mine, odd, algorithm, delay):
     """Of feed-through and other outputs; and past the end of the run, where the first value is all there is."""
     system = System(stop_time=2.0, step=0.25, algorithm=algorithm)
     system.add("a", odd, u=3.0, v=1.0)
     system.add("b", odd, m=5, on=True)
-    system.add("lag", components(MIXED)("Lag"))
+    system.add("lag", mine("Lag"))
     system.connect("a.x", "b.u", delay=delay, scale=-0.1, offset=1 / 3)
     system.connect("a.y", "b.v", delay=delay)
     system.connect("b.n", "a.m", delay=delay)
@@ -230,11 +200,11 @@ def test_recorded_points(both, odd, record, stop, monkeypatch):
     ]
 
 
-def test_native_and_python_models_together(both, components, odd):
+def test_native_and_python_models_together(both, mine, odd):
     """A Python FMU takes the interpreter's lock again inside the loop; it does so hundreds of thousands of times."""
     system = System(stop_time=300.0, step=0.01, record=100.0)
     system.add("odd", odd, v=1.0)
-    system.add("lag", components(MIXED)("Lag"))
+    system.add("lag", mine("Lag"))
     system.connect("lag.x", "odd.u")
     system.connect("odd.y", "lag.u")
     result = both(system, kind="python")
@@ -269,16 +239,16 @@ def test_an_fmu_without_variables(both, odd_library, xml, tmp_path):
 # -------------------------------------------------------------------- who takes which loop
 
 
-def test_texts_are_for_python(used, components):
+def test_texts_are_for_python(used, mine):
     system = System(stop_time=1.0, step=0.1)
-    system.add("worded", components(MIXED)("Worded"))
-    assert run(system, kind="python")["worded.word"][-1] == "a"
+    system.add("worded", mine("Types"))
+    assert run(system, kind="python")["worded.said"][-1] == "b"
     assert not used
 
 
-def test_components_in_this_process_are_for_python(used, components):
+def test_components_in_this_process_are_for_python(used, mine):
     system = System(stop_time=1.0, step=0.1)
-    system.add("lag", components(MIXED)("Lag"))
+    system.add("lag", mine("Lag"))
     run(system, kind="plain")
     assert not used
 
@@ -351,8 +321,7 @@ def test_a_value_that_is_no_number(both, odd, algorithm, mode, name):
 
 @pytest.mark.parametrize("kind", [native(), "python"])
 @ALGORITHMS
-def test_a_component_that_fails(both, components, kind, algorithm):
-    mine = components(MIXED)
+def test_a_component_that_fails(both, mine, kind, algorithm):
     system = System(stop_time=10.0, step=0.1, algorithm=algorithm)
     system.add("lag", mine("Lag"))
     system.add("bad", mine("Fails"))
