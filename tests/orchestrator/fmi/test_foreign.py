@@ -76,16 +76,10 @@ ALL = [
 
 
 @pytest.fixture(scope="session")
-def libraries(tmp_path_factory):
+def libraries(compile_c):
     """The library of foreign.c: as it is, without what few need, and without what all need."""
-    folder = tmp_path_factory.mktemp("foreign")
-    made = {}
-    for kind, options in {"whole": (), "bare": ("-DBARE",), "lame": ("-DBARE", "-DLAME")}.items():
-        target = folder / kind
-        command = [GCC, "-shared", "-fPIC", "-O1", *options, FOREIGN / "foreign.c", "-o", target, "-lm"]
-        subprocess.run(command, check=True)
-        made[kind] = target.read_bytes()
-    return made
+    kinds = {"whole": (), "bare": ("-DBARE",), "lame": ("-DBARE", "-DLAME")}
+    return {kind: compile_c("foreign.c", *options) for kind, options in kinds.items()}
 
 
 @pytest.fixture

@@ -83,35 +83,6 @@ def contents(result):
     return [("time", result.time.tobytes()), *((name, result[name].tobytes()) for name in result.names())]
 
 
-@pytest.fixture(scope="session")
-def odd_library(tmp_path_factory):
-    target = tmp_path_factory.mktemp("odd") / f"Odd{fmpy.sharedLibraryExtension}"
-    subprocess.run([GCC, "-shared", "-fPIC", "-O1", FOREIGN / "odd.c", "-o", target, "-lm"], check=True)
-    return target.read_bytes()
-
-
-@pytest.fixture
-def odd(odd_library, xml, tmp_path):
-    """The FMU of odd.c."""
-    v = xml["variable"]
-    variables = [
-        v("u", "input", start=0.0),
-        v("v", "input", start=0.0),
-        v("x", "output", dependencies=[]),
-        v("y", "output", dependencies=["v"]),
-        v("m", "input", "Integer", 0, variability="discrete"),
-        v("n", "output", "Integer", variability="discrete"),
-        v("on", "input", "Boolean", False, variability="discrete"),
-        v("off", "output", "Boolean", variability="discrete"),
-        v("mode", "parameter", "Integer", 0, variability="fixed"),
-    ]
-    files = {
-        "modelDescription.xml": xml["description"](variables, identifier="Odd"),
-        f"binaries/{fmpy.platform}/Odd{fmpy.sharedLibraryExtension}": odd_library,
-    }
-    return str(xml["write_archive"](tmp_path / "odd.fmu", files))
-
-
 def ring(model, count, stop=10.0, **how):
     """Instances in a ring, in every type an FMU of odd.c has."""
     system = System(**{"stop_time": stop, "step": 0.25, "algorithm": "jacobi"} | how)
@@ -226,10 +197,10 @@ def test_many_instances_share_one_library(both, odd):
     assert len({result[f"odd[{k}].x"][-1] for k in range(1500)}) > 1400
 
 
-def test_an_fmu_without_variables(both, odd_library, xml, tmp_path):
+def test_an_fmu_without_variables(both, compile_c, xml, tmp_path):
     files = {
         "modelDescription.xml": xml["description"]([], identifier="Odd"),
-        f"binaries/{fmpy.platform}/Odd{fmpy.sharedLibraryExtension}": odd_library,
+        f"binaries/{fmpy.platform}/Odd{fmpy.sharedLibraryExtension}": compile_c("odd.c"),
     }
     system = System(stop_time=1.0, step=0.25)
     system.add("mute", str(xml["write_archive"](tmp_path / "mute.fmu", files)))

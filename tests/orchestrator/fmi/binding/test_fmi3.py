@@ -307,35 +307,12 @@ def test_a_library_of_another_name_or_in_the_folder_of_fmi_2(by_hand, alone, com
 # -------------------------------------------------------------------- in systems
 
 
-@pytest.fixture
-def second(compile_c, xml, tmp_path):
-    """The FMI 2.0 FMU of odd.c."""
-    v = xml["variable"]
-    variables = [
-        v("u", "input", start=0.0, unit="m"),
-        v("v", "input", start=0.0),
-        v("x", "output", dependencies=[], unit="m"),
-        v("y", "output", dependencies=["v"]),
-        v("m", "input", "Integer", 0, variability="discrete"),
-        v("n", "output", "Integer", variability="discrete"),
-        v("on", "input", "Boolean", False, variability="discrete"),
-        v("off", "output", "Boolean", variability="discrete"),
-        v("mode", "parameter", "Integer", 0, variability="fixed"),
-    ]
-    units = '<Unit name="m"><BaseUnit m="1"/></Unit>'
-    files = {
-        "modelDescription.xml": xml["description"](variables, units, identifier="Odd"),
-        f"binaries/{fmpy.platform}/Odd{fmpy.sharedLibraryExtension}": compile_c("odd.c"),
-    }
-    return str(xml["write_archive"](tmp_path / "odd.fmu", files))
-
-
 @pytest.mark.parametrize("algorithm", ["jacobi", "gauss-seidel"])
-def test_a_closed_loop_of_all_versions(by_hand, second, algorithm):
+def test_a_closed_loop_of_all_versions(by_hand, odd, algorithm):
     """Three lags in a ring: the recursion of the discrete system, to rounding."""
     system = System(stop_time=5.0, step=0.25, algorithm=algorithm, order=["a", "b", "c"])
     system.add("a", str(by_hand(1)), x=4.0)
-    system.add("b", second)
+    system.add("b", odd)
     system.add("c", str(by_hand(3)), x=-2.0)
     system.connect("a.x", "b.u")
     system.connect("b.x", "c.u")
@@ -355,22 +332,22 @@ def test_a_closed_loop_of_all_versions(by_hand, second, algorithm):
     assert np.abs(found - expected).max() < 1e-13
 
 
-def test_every_type_goes_from_version_to_version(by_hand, second, components):
+def test_every_type_goes_from_version_to_version(by_hand, odd, components):
     """Whole numbers, booleans, texts and enumerations, through the three versions and a component of ours."""
     echo = components(
         "class Echo(Base):\n    word = Input('1', '')\n    again = Output('1', str)\n"
         "    def outputs(self):\n        return {'again': self.word + '!'}\n"
     )("Echo")
-    system = System(stop_time=1.0, step=0.25, order=["first", "second", "echo", "third"])
+    system = System(stop_time=1.0, step=0.25, order=["first", "odd", "echo", "third"])
     system.add("first", str(by_hand(1)), n=41, gear="high", word="grüezi", on=False)
-    system.add("second", second)
+    system.add("odd", odd)
     system.add("third", str(by_hand(3)))
     system.add("echo", echo)
     for source, target in {
-        "first.m": "second.m",
-        "second.n": "third.i64",
-        "first.off": "second.on",
-        "second.off": "third.on",
+        "first.m": "odd.m",
+        "odd.n": "third.i64",
+        "first.off": "odd.on",
+        "odd.off": "third.on",
         "first.shown": "third.gear",
         "first.said": "echo.word",
         "echo.again": "third.word",
@@ -379,18 +356,18 @@ def test_every_type_goes_from_version_to_version(by_hand, second, components):
         system.connect(source, target)
     result = run(system, kind="python")
     assert result["third.o64"][-1] == 43
-    assert [result[f"{n}.off"][-1] for n in ("first", "second", "third")] == [1, 0, 1]
+    assert [result[f"{n}.off"][-1] for n in ("first", "odd", "third")] == [1, 0, 1]
     assert result["third.shown"][-1] == 3
     assert result["third.said"][-1] == "grüezi!"
     assert result["third.g"][-1] == np.float32(result["first.y"][-1])
 
 
-def test_a_number_that_the_receiver_cannot_hold_stops_the_run(by_hand, second):
-    system = System(stop_time=1.0, step=0.25, order=["third", "second"])
+def test_a_number_that_the_receiver_cannot_hold_stops_the_run(by_hand, odd):
+    system = System(stop_time=1.0, step=0.25, order=["third", "odd"])
     system.add("third", str(by_hand(3)), i64=2**40)
-    system.add("second", second)
-    system.connect("third.o64", "second.m")
-    with pytest.raises(FmuError, match=r"^second, t = \S+ s: 'm' cannot become 1099511627776: its type Integer holds"):
+    system.add("odd", odd)
+    system.connect("third.o64", "odd.m")
+    with pytest.raises(FmuError, match=r"^odd, t = \S+ s: 'm' cannot become 1099511627776: its type Integer holds"):
         run(system)
 
 
