@@ -128,23 +128,3 @@ class Functions(Component):
             ],
             "integer": maths.where(self.flag, self.whole, 2 * self.whole),
         }
-
-
-class Breaks(Component):
-    """Breaks when it is told to."""
-
-    u = Input("1", 1.0)
-    rate = Parameter("1/s", 1.0, tunable=True)
-    x = State("m", 1.0, output=True)
-    y = Output("1", description="infinite at u = 0")
-    whole = Output("1", int)
-    m = Memory("1", 1.0)
-
-    def derivatives(self):
-        return {"x": self.rate * self.x * self.x}
-
-    def outputs(self):
-        return {"y": self.m / self.u, "whole": 2.0 * self.u}
-
-    def update(self):
-        return {"m": self.m}

@@ -1,4 +1,4 @@
-"""What the tests of the C runtime share: scripts in a process of their own."""
+"""What the tests of the C runtime share: scripts in a process of their own, integrators, and how near is near."""
 
 import subprocess
 import sys
@@ -6,6 +6,7 @@ from pathlib import Path
 
 import pytest
 
+SAMPLES = Path(__file__).parent / "samples.py"
 BARE = Path(__file__).parents[1] / "bare.py"
 MODULES = """
 import importlib.util, sys
@@ -30,3 +31,15 @@ def in_another_process():
         return subprocess.run(command, capture_output=True, text=True, check=True).stdout
 
     return run
+
+
+@pytest.fixture
+def integrators(load):
+    """Makes instances of integrators of their inputs."""
+    return lambda: load(f"{SAMPLES}:Integrators")
+
+
+@pytest.fixture(scope="session")
+def near():
+    """A value up to a few roundings of the sub-steps."""
+    return lambda value: pytest.approx(value, rel=1e-14)

@@ -12,7 +12,7 @@ import pytest
 
 SAMPLES = Path(__file__).parents[1] / "native_samples.py"
 MIXED = f"{SAMPLES}:Mixed"
-BREAKS = f"{SAMPLES}:Breaks"
+BREAKS = f"{Path(__file__).parent / 'samples.py'}:Breaks"
 OK = 0
 DISCARD = 2
 ERROR = 3

@@ -9,7 +9,7 @@ import pytest
 
 SAMPLES = Path(__file__).parents[1] / "native_samples.py"
 MIXED = f"{SAMPLES}:Mixed"
-BREAKS = f"{SAMPLES}:Breaks"
+BREAKS = f"{Path(__file__).parent / 'samples.py'}:Breaks"
 OTHERS = Path(__file__).parents[2] / "components" / "samples.py"
 COUNTER = f"{OTHERS}:Counter"
 OK = 0

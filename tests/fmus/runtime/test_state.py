@@ -10,7 +10,7 @@ from railcosim.fmus.build import build
 
 SAMPLES = Path(__file__).parents[1] / "native_samples.py"
 MIXED = f"{SAMPLES}:Mixed"
-BREAKS = f"{SAMPLES}:Breaks"
+BREAKS = f"{Path(__file__).parent / 'samples.py'}:Breaks"
 OK = 0
 ERROR = 3
 STEP = 0.25
