@@ -19,7 +19,7 @@ ERROR = 3
 STEP = 0.25
 NULL = None
 REALS = c_double
-INTEGERS = BOOLEANS = c_int
+INTEGERS = c_int
 
 
 # ---------------------------------------------------------------- the calling sequence
