@@ -5,7 +5,7 @@ import math
 
 import numpy as np
 import pytest
-from railcosim.components import ComponentError, Simulation
+from railcosim.components import Simulation
 from railcosim.components.tape import smooth
 from scipy import signal
 
@@ -141,13 +141,7 @@ def test_a_wait_stays_a_wait_through_a_step_of_several_samples(samples):
 # ---------------------------------------------------------------- messages
 
 
-def refusal(call):
-    with pytest.raises(ComponentError) as caught:
-        call()
-    return str(caught.value)
-
-
-def test_the_trip_may_change_only_while_waiting(samples):
+def test_the_trip_may_change_only_while_waiting(samples, refusal):
     simulation = learner(samples)
     run_trip(simulation, 1, last=3)
     simulation.set("trip", 2)
@@ -157,7 +151,7 @@ def test_the_trip_may_change_only_while_waiting(samples):
     )
 
 
-def test_a_departure_with_a_rounding_error_is_a_departure(samples):
+def test_a_departure_with_a_rounding_error_is_a_departure(samples, refusal):
     simulation = learner(samples)
     run_trip(simulation, 1)
     simulation.set("trip", 2)
@@ -165,7 +159,7 @@ def test_a_departure_with_a_rounding_error_is_a_departure(samples):
     assert "changed from 1 to 2" in refusal(lambda: simulation.step(STEP))
 
 
-def test_off_the_grid_and_past_the_end(samples):
+def test_off_the_grid_and_past_the_end(samples, refusal):
     simulation = learner(samples)
     simulation.set("trip_time", 0.25)
     assert refusal(lambda: simulation.get("command")) == (
@@ -177,7 +171,7 @@ def test_off_the_grid_and_past_the_end(samples):
     simulation.get("command")
 
 
-def test_a_tape_needs_a_sample_time(samples):
+def test_a_tape_needs_a_sample_time(samples, refusal):
     simulation = Simulation(samples.Learner())
     simulation.initialize()
     assert refusal(simulation.start) == "Learner.sample_time must be set: a tape is recorded on a fixed grid"
@@ -323,7 +317,7 @@ def test_the_file_is_read_before_the_first_output(samples, tmp_path):
         (lambda lines: [*lines[:5], "1.0 2.0 x", *lines[6:]], "is corrupt: could not convert string to float: 'x'"),
     ],
 )
-def test_a_file_that_does_not_fit_says_why(samples, tmp_path, spoil, expected):
+def test_a_file_that_does_not_fit_says_why(samples, tmp_path, spoil, expected, refusal):
     path = tmp_path / "learned.tape"
     simulation = learner(samples, tape_file=str(path))
     run_trip(simulation, 1)
@@ -334,7 +328,7 @@ def test_a_file_that_does_not_fit_says_why(samples, tmp_path, spoil, expected):
     assert expected in text
 
 
-def test_a_file_of_bytes_or_a_missing_folder_is_told(samples, tmp_path):
+def test_a_file_of_bytes_or_a_missing_folder_is_told(samples, tmp_path, refusal):
     (tmp_path / "noise.tape").write_bytes(bytes(range(256)))
     assert "cannot be read" in refusal(lambda: learner(samples, tape_file=str(tmp_path / "noise.tape")))
     simulation = learner(samples, tape_file=str(tmp_path / "no" / "such.tape"))

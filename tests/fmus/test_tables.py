@@ -4,7 +4,6 @@ import re
 import subprocess
 from pathlib import Path
 
-import fmpy
 import pytest
 from railcosim.components import Component, ComponentError, Input, Output, Parameter, PointMassTrain
 from railcosim.fmus.references import resolve
@@ -12,7 +11,6 @@ from railcosim.fmus.tables import model_header
 from railcosim.fmus.trace import trace
 
 MIXED = f"{Path(__file__).parent / 'native_samples.py'}:Mixed"
-RUNTIME = Path(fmpy.__file__).parent / "c-code"
 
 
 def header(component):

@@ -11,7 +11,8 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from railcosim.fmus.build import native_problem, resolve
+from railcosim.fmus.build import native_problem
+from railcosim.fmus.references import resolve
 from railcosim.orchestrator import load, run
 from railcosim.orchestrator.fmi.archive import Workspace
 from railcosim.orchestrator.fmi.interface import Interface, Variable

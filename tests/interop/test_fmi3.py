@@ -11,7 +11,8 @@ from fmpy.container_fmu import Configuration
 from fmpy.container_fmu.cli import create_container_fmu
 from fmpy.container_fmu.config import Component
 from fmpy.model_description import CoSimulation, ModelDescription, ModelVariable, Unknown
-from railcosim.fmus.build import build, native_problem, resolve
+from railcosim.fmus.build import build, native_problem
+from railcosim.fmus.references import resolve
 from railcosim.orchestrator import System, run
 from railcosim.orchestrator.validation.report import PROBES, validate
 

@@ -6,7 +6,6 @@ import os
 import shutil
 import signal
 import subprocess
-import sys
 import zipfile
 from pathlib import Path
 from xml.sax.saxutils import quoteattr
@@ -17,6 +16,7 @@ import pythonfmu
 from railcosim.orchestrator.fmi.archive import Workspace
 from railcosim.orchestrator.fmi.models import load_fmu
 
+TOYS = Path(__file__).parents[1] / "toys.py"
 _WRAPPER = next(
     (Path(pythonfmu.__file__).parent / "resources" / "binaries" / fmpy.platform).glob("*pythonfmu-export.*")
 )
@@ -85,6 +85,12 @@ def own_cache(session_cache):
     with pytest.MonkeyPatch.context() as patch:
         patch.setenv("RAILCOSIM_CACHE", str(session_cache))
         yield
+
+
+@pytest.fixture(scope="session")
+def mine():
+    """Reference of a toy component by its class name: a component of a user's, in a file of theirs."""
+    return lambda cls: f"{TOYS}:{cls}"
 
 
 @pytest.fixture
@@ -176,14 +182,14 @@ def compile_c(tmp_path_factory):
     """A C file beside the tests as the content of a shared library."""
     made = {}
 
-    def build(name):
+    def build(name, *options):
         if GCC is None:
             pytest.skip("FMUs by hand need gcc")
-        if name not in made:
+        if (name, *options) not in made:
             target = tmp_path_factory.mktemp("c") / f"{name}{fmpy.sharedLibraryExtension}"
-            subprocess.run([GCC, "-shared", "-fPIC", "-O1", FOREIGN / name, "-o", target, "-lm"], check=True)
-            made[name] = target.read_bytes()
-        return made[name]
+            subprocess.run([GCC, "-shared", "-fPIC", "-O1", *options, FOREIGN / name, "-o", target, "-lm"], check=True)
+            made[name, *options] = target.read_bytes()
+        return made[name, *options]
 
     return build
 
@@ -206,6 +212,28 @@ def by_hand(compile_c, tmp_path):
         return write_archive(tmp_path / (name or f"{identifier.lower()}.fmu"), files)
 
     return pack
+
+
+@pytest.fixture
+def odd(compile_c, tmp_path):
+    """The FMU of odd.c: y depends directly on v."""
+    v, discrete = variable, {"variability": "discrete"}
+    shown = [
+        v("u", "input", start=0.0, unit="m"),
+        v("v", "input", start=0.0),
+        v("x", "output", dependencies=[], unit="m"),
+        v("y", "output", dependencies=["v"]),
+        v("m", "input", "Integer", 0, **discrete),
+        v("n", "output", "Integer", **discrete),
+        v("on", "input", "Boolean", False, **discrete),
+        v("off", "output", "Boolean", **discrete),
+        v("mode", "parameter", "Integer", 0, variability="tunable"),
+    ]
+    files = {
+        "modelDescription.xml": description(shown, '<Unit name="m"><BaseUnit m="1"/></Unit>', identifier="Odd"),
+        f"binaries/{fmpy.platform}/Odd{fmpy.sharedLibraryExtension}": compile_c("odd.c"),
+    }
+    return str(write_archive(tmp_path / "odd.fmu", files))
 
 
 @pytest.fixture
@@ -284,83 +312,3 @@ def nothing_left():
             if parent == os.getpid() and 'import_module(sys.argv[1] + ".host")' in place.read_text():
                 left.append(place.parent.name)
     assert not left
-
-
-@pytest.fixture(params=["quick", pytest.param("deep", marks=pytest.mark.long)])
-def explore(request):
-    """Try a rule on examples out of strategies: on the same few each time, in the long tier on many new ones."""
-    from hypothesis import HealthCheck, given, settings
-    from hypothesis import strategies as st
-
-    def examine(rule, *strategies, quick, deep):
-        @settings(
-            max_examples=quick if request.param == "quick" else deep,
-            derandomize=request.param == "quick",
-            database=None,
-            deadline=10_000,
-            suppress_health_check=list(HealthCheck),
-        )
-        @given(st.tuples(*strategies))
-        def examples(example):
-            rule(*example)
-
-        examples()
-
-    return examine
-
-
-_REACHING_OUT = (
-    *("os.system", "os.exec", "os.fork", "os.spawn", "os.posix_spawn", "subprocess.Popen", "pty.spawn"),
-    *("os.symlink", "os.link", "os.rename", "socket.connect", "socket.bind", "socket.getaddrinfo", "ctypes.dlopen"),
-)
-
-
-@pytest.fixture(scope="session")
-def watched(tmp_path_factory):
-    """Watch Python while it runs something: gives a context that fails if code of the input's is run, a process is
-    started, the network asked, or a file written outside a folder."""
-    seen, base = [], str(tmp_path_factory.getbasetemp())
-    watching = False
-
-    def hear(event, arguments):
-        if watching and event in ("exec", "open", "os.mkdir", *_REACHING_OUT):
-            seen.append((event, arguments))
-
-    def is_harmless(event, arguments, folder):
-        if event == "exec":  # what modules are made of when they are imported, but nothing out of a text or our files
-            name = arguments[0].co_filename
-            made = name.startswith("<frozen") or "networkx.utils" in name  # which writes functions of its own
-            return made or (os.path.isabs(name) and not name.startswith(base))
-        if event == "open" and not arguments[2] & (os.O_WRONLY | os.O_RDWR | os.O_CREAT):
-            return True
-        if event in ("open", "os.mkdir") and isinstance(arguments[0], str | os.PathLike):
-            place = os.path.realpath(arguments[0])
-            return place == os.devnull or "__pycache__" in place or place.startswith(f"{folder}{os.sep}")
-        return event == "open"  # a descriptor that is open already
-
-    sys.addaudithook(hear)  # there is no way to take it back
-
-    @contextlib.contextmanager
-    def watch(folder):
-        nonlocal watching
-        seen.clear()
-        watching = True
-        try:
-            yield
-        finally:
-            watching = False
-        deeds = [
-            (event, *map(str, arguments)) for event, arguments in seen if not is_harmless(event, arguments, folder)
-        ]
-        assert not deeds
-
-    return watch
-
-
-@pytest.fixture
-def confined(monkeypatch, tmp_path):
-    """The folder that temporary files come into, below ``tmp_path``."""
-    folder = tmp_path / "temporary"
-    folder.mkdir()
-    monkeypatch.setattr("tempfile.tempdir", str(folder))
-    return folder

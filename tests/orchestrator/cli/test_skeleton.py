@@ -4,7 +4,7 @@ from pathlib import Path
 
 import pytest
 from railcosim.components import CruiseController
-from railcosim.fmus.build import resolve
+from railcosim.fmus.references import resolve
 from railcosim.orchestrator import ScenarioError
 from railcosim.orchestrator.cli.skeleton import write_skeleton
 

@@ -8,177 +8,15 @@ import shutil
 import subprocess
 import sys
 import time
-from dataclasses import dataclass
-from pathlib import Path
 
-import fmpy
 import pytest
 from railcosim.orchestrator.cli import app as cli
-from railcosim.orchestrator.errors import FmuError
-from railcosim.orchestrator.fmi.models import load_fmu
-from railcosim.orchestrator.master import compiled
 from railcosim.orchestrator.run.results import Results
 
 GCC = shutil.which("gcc")
-FOREIGN = Path(__file__).parents[1] / "foreign"
-LIBRARY = f"Foreign{fmpy.sharedLibraryExtension}"
-ITEMS = '<Item name="low" value="1"/><Item name="high" value="3"/>'
-GEAR = f'<SimpleType name="Gear"><Enumeration>{ITEMS}</Enumeration></SimpleType>'
-VARIES = 'canHandleVariableCommunicationStepSize="true"'
 
 pytestmark = pytest.mark.skipif(GCC is None or sys.platform != "linux", reason="compiles its FMUs with gcc")
-
-
-def v(name, reference, causality, kind="Real", *, start=None, typed="", **own):
-    """A variable as a model description has it."""
-    own = {"name": name, "valueReference": reference, "causality": causality, **own}
-    named = " ".join(f'{key}="{escaped(value)}"' for key, value in own.items())
-    start = "" if start is None else f'start="{escaped(start)}"'
-    return f"<ScalarVariable {named}><{kind} {start} {typed}/></ScalarVariable>"
-
-
-def escaped(text):
-    return str(text).replace("&", "&amp;").replace("<", "&lt;").replace('"', "&quot;")
-
-
-def signal(name, reference, causality, kind, typed=""):
-    start = None if causality == "output" else {"Boolean": "false", "String": ""}.get(kind, 1)
-    return v(name, reference, causality, kind, start=start, typed=typed, variability="discrete")
-
-
-REALS = [
-    v("u", 0, "input", start=0.0),
-    v("y", 1, "output"),
-    v("gain", 2, "parameter", start=2.0, variability="tunable"),
-    v("x", 3, "output", start=0.0, initial="exact"),
-    v("calls", 4, "output"),
-    v("at", 5, "parameter", start=5.0, variability="fixed"),
-    v("longest", 6, "parameter", start=1e9, variability="fixed"),
-    v("now", 7, "output"),
-]
-NUMBERS = [
-    *REALS,
-    v("mode", 0, "parameter", "Integer", start=0, variability="fixed"),
-    signal("m", 1, "input", "Integer"),
-    signal("n", 2, "output", "Integer"),
-    signal("gear", 3, "input", "Enumeration", 'declaredType="Gear"'),
-    signal("next", 4, "output", "Enumeration", 'declaredType="Gear"'),
-    signal("on", 0, "input", "Boolean"),
-    signal("off", 1, "output", "Boolean"),
-]
-ALL = [
-    *NUMBERS,
-    v("label", 0, "parameter", "String", start="", variability="fixed"),
-    signal("word", 1, "input", "String"),
-    signal("said", 2, "output", "String"),
-]
-"""The variables of foreign.c."""
-
-
-@pytest.fixture(scope="session")
-def libraries(tmp_path_factory):
-    """The library of foreign.c: as it is, without what few need, and without what all need."""
-    folder = tmp_path_factory.mktemp("foreign")
-    made = {}
-    for kind, options in {"whole": (), "bare": ("-DBARE",), "lame": ("-DBARE", "-DLAME")}.items():
-        target = folder / kind
-        command = [GCC, "-shared", "-fPIC", "-O1", *options, FOREIGN / "foreign.c", "-o", target, "-lm"]
-        subprocess.run(command, check=True)
-        made[kind] = target.read_bytes()
-    return made
-
-
-@pytest.fixture
-def fmu(libraries, xml, tmp_path):
-    """Write an FMU of foreign.c."""
-
-    def make(
-        variables=NUMBERS,
-        *,
-        name="f.fmu",
-        binaries=None,
-        simulation=VARIES,
-        guid="{1}",
-        structure=None,
-        more="",
-        **files,
-    ):
-        outputs = [k for k, text in enumerate(variables, 1) if 'causality="output"' in text]
-        unknowns = "".join(f'<Unknown index="{k}"/>' for k in outputs)
-        if structure is None and outputs:
-            structure = f"<Outputs>{unknowns}</Outputs><InitialUnknowns>{unknowns}</InitialUnknowns>"
-        text = (
-            f'<?xml version="1.0"?><fmiModelDescription fmiVersion="2.0" modelName="Foreign" guid="{guid}">'
-            f'<CoSimulation modelIdentifier="Foreign" {simulation}/><TypeDefinitions>{GEAR}</TypeDefinitions>{more}'
-            f"<ModelVariables>{''.join(variables)}</ModelVariables>"
-            f"<ModelStructure>{structure or ''}</ModelStructure></fmiModelDescription>"
-        )
-        binaries = {LIBRARY: "whole"} if binaries is None else binaries
-        content = {f"binaries/{fmpy.platform}/{key}": libraries.get(b, b) for key, b in binaries.items()}
-        resources = {f"resources/{key}.txt": value for key, value in files.items()}
-        return xml["write_archive"](tmp_path / name, {"modelDescription.xml": text, **content, **resources})
-
-    return make
-
-
-@dataclass
-class Outcome:
-    """A command's exit code and words; of a run, its record and results."""
-
-    code: int
-    out: str
-    errors: list[str]
-    record: dict
-    results: Results | None
-
-    @property
-    def notes(self):
-        return [line.removeprefix("note: ") for line in self.out.splitlines() if line.startswith("note: ")]
-
-
-@pytest.fixture
-def go(tmp_path, capsys):
-    """Write a scenario and run it, or check it, in a directory of its own."""
-
-    def run(fmus, start=None, connections=None, command="run", more="", **simulation):
-        lines = ["[simulation]", *(f"{k} = {x}" for k, x in ({"stop_time": 10.0, "step": 0.5} | simulation).items())]
-        for name, path in (fmus if isinstance(fmus, dict) else {"it": fmus}).items():
-            lines += [f"[instances.{name}]", f"fmu = {json.dumps(str(path))}", f"[instances.{name}.start]"]
-            lines += [f"{json.dumps(k)} = {json.dumps(x)}" for k, x in ((start or {}).get(name, {})).items()]
-        lines += ["[connections]", *(f"{json.dumps(k)} = {json.dumps(x)}" for k, x in (connections or {}).items())]
-        (tmp_path / "s.toml").write_text("\n".join([*lines, more]) + "\n", encoding="utf-8")
-        output = tmp_path / "out"
-        shutil.rmtree(output, ignore_errors=True)
-        capsys.readouterr()
-        options = ["-o", str(output), "--no-figures"] if command == "run" else []
-        code = cli.call([command, str(tmp_path / "s.toml"), *options])
-        said = capsys.readouterr()
-        errors = [line for line in said.err.splitlines() if "% of" not in line]
-        record = json.loads((output / "run.json").read_text()) if output.exists() else {}
-        return Outcome(
-            code, said.out, errors, record, Results.load(output) if (output / "results.csv").exists() else None
-        )
-
-    return run
-
-
-@pytest.fixture
-def traced(tmp_path, monkeypatch):
-    """The file in which calls are written down."""
-    monkeypatch.setenv("FOREIGN_TRACE", str(tmp_path / "trace"))
-    return tmp_path / "trace"
-
-
 BOTH_LOOPS = pytest.mark.usefixtures("loop")
-
-
-@pytest.fixture(params=["compiled", "interpreted"])
-def loop(request, monkeypatch):
-    """Both step loops."""
-    if request.param == "interpreted":
-        monkeypatch.setattr(compiled, "kernel", None)
-    elif compiled.kernel is None:
-        pytest.skip("installed without a C compiler")
 
 
 # -------------------------------------------------------------------- what a step may return
@@ -323,89 +161,11 @@ def test_an_fmu_that_ends_the_process(fmu, go, tmp_path, mode, code):
     assert list((tmp_path / "out").glob("*.png"))
 
 
-# -------------------------------------------------------------------- libraries
-
-
-def test_a_library_without_what_nobody_calls(fmu, go):
-    found = go(fmu(REALS, binaries={LIBRARY: "bare"}, mode="11"), {"it": {"u": 1.0}})
-    assert (found.code, found.results["it.x"][-1]) == (0, 10.0)
-
-
-def test_a_library_that_cannot_say_how_far_it_got(fmu, go):
-    found = go(fmu(REALS, binaries={LIBRARY: "bare"}, mode="11"), {"it": {"longest": 0.2}})
-    assert found.code == 3
-    assert "it, t = 5 s, status discard: discarded the step and does not say how far it got" in found.errors[0]
-
-
-@pytest.mark.parametrize(
-    ("variables", "binaries", "message"),
-    [
-        (REALS, {LIBRARY: "lame"}, "it: cannot be instantiated: its library has no function fmi2DoStep"),
-        (NUMBERS, {LIBRARY: "bare"}, "it, t = 0 s: its library has no function fmi2GetInteger"),
-        (
-            REALS,
-            {LIBRARY: b"nothing"},
-            f"it: cannot be instantiated: Failed to load shared library binaries/{fmpy.platform}/{LIBRARY}.",
-        ),
-    ],
-)
-def test_a_library_that_cannot_be_used(fmu, go, variables, binaries, message):
-    found = go(fmu(variables, binaries=binaries))
-    assert (found.code, found.record["status"], found.results) == (3, "failed", None)
-    assert found.errors[0].startswith(f"error: an FMU failed: {message}")
-
-
-def test_a_library_of_another_description(fmu, go):
-    """It is asked once more with logging on: what the matter is, this FMU says only then."""
-    found = go(fmu(guid="{2}"))
-    assert (found.code, found.record["status"]) == (3, "failed")
-    assert found.errors == [
-        "error: an FMU failed: it: cannot be instantiated: it gives no instance",
-        "    [error] wrong guid {2}",
-    ]
-
-
-@pytest.mark.parametrize("others", [{}, {"libneeded.so": b"\x7fELF"}])
-def test_a_library_of_another_name(fmu, go, others):
-    path = fmu(binaries={"its_own.so": "whole", **others})
-    found = go(path)
-    assert (found.code, found.record["status"]) == (0, "completed")
-    assert found.notes[0] == f"{path}: its library its_own.so is not named after its model identifier 'Foreign'"
-    assert found.record["notes"][0] == found.notes[0]
-
-
-@pytest.mark.parametrize("second", ["whole", b"nothing"])
-def test_a_library_beside_the_right_one_is_let_be(fmu, go, second):
-    assert not any("library" in note for note in go(fmu(binaries={LIBRARY: "whole", "more.so": second})).notes)
-
-
-def test_no_telling_which_library(fmu, go, tmp_path):
-    path = fmu(binaries={"a.so": "whole", "b.so": "bare"})
-    found = go(path)
-    several = f"{path} has several libraries for {fmpy.platform} (a.so, b.so) and none called {LIBRARY}"
-    assert (found.code, found.errors) == (2, [f"error: {tmp_path / 's.toml'}:4: instance 'it': {several}"])
-    assert found.record == {}
-
-
-def test_resources_are_found(fmu, go):
-    assert go(fmu(mode="3")).errors[0] == "error: an FMU failed: it, t = 5 s, status error: fmi2DoStep failed"
-
-
-def test_a_state_that_is_promised_and_not_kept(fmu, workspace):
-    model = load_fmu(fmu(mode="403", simulation='canGetAndSetFMUstate="true"'), workspace)
-    it = model.instantiate("it")
-    it.setup(0.0, 1.0)
-    it.channel("Real", ["at"]).set([0.0])
-    with pytest.raises(FmuError, match=r"^it, t = 0 s, status error: fmi2GetFMUstate failed"):
-        it.save()
-    it.free()
-
-
 # -------------------------------------------------------------------- variables
 
 
 def test_every_type_goes_from_fmu_to_fmu(fmu, go):
-    path = fmu(ALL)
+    path = fmu("all")
     start = {"a": {"gear": "high", "m": 41, "on": True, "label": "zürich", "word": 'a,"b"'}, "b": {"gear": 3}}
     wires = {"b.gear": "a.next", "b.m": "a.n", "b.on": "a.off", "b.word": "a.said", "b.u": "a.n"}
     found = go({"a": path, "b": path}, start, wires, stop_time=1.0)
@@ -417,7 +177,7 @@ def test_every_type_goes_from_fmu_to_fmu(fmu, go):
 @pytest.mark.parametrize(("mode", "text"), [(23, 'a\rb\nc\r\n"'), (24, "")])
 def test_texts_of_all_kinds_survive_the_file(fmu, go, mode, text):
     """Ends of lines of every kind, and none at all where the FMU gives no text."""
-    found = go(fmu(ALL), {"it": {"mode": mode, "at": 0.0}}, stop_time=1.0)
+    found = go(fmu("all"), {"it": {"mode": mode, "at": 0.0}}, stop_time=1.0)
     assert (found.code, list(found.results["it.said"])) == (0, [text] * 3)
 
 
@@ -437,7 +197,7 @@ ODD = [
 ]
 
 
-def test_odd_names(fmu, go, tmp_path):
+def test_odd_names(fmu, go, tmp_path, v):
     """In start values and connections as they are; in expressions between quotes."""
     inputs = [v(name, 100 + 2 * k, "input", start=0.0) for k, name in enumerate(ODD)]
     outputs = [v(f"out.{name}", 101 + 2 * k, "output") for k, name in enumerate(ODD)]
@@ -454,10 +214,10 @@ def test_odd_names(fmu, go, tmp_path):
     assert cli.call(["plot", str(tmp_path / "out"), 'signal("b.out.der(x)")']) == 0
 
 
-def test_start_values(fmu, go):
+def test_start_values(fmu, go, v, numbers):
     """What may be set is set; what is computed or constant may not, and says so."""
     variables = [
-        *NUMBERS,
+        *numbers,
         v("c", 100, "output", start=7.0, variability="constant"),
         v("guess", 102, "local", start=1.0, initial="approx", variability="fixed"),
         v("k", 104, "calculatedParameter", variability="fixed"),
@@ -480,8 +240,8 @@ def test_start_values(fmu, go):
     ]
 
 
-def test_several_names_of_one_variable(fmu, go):
-    variables = [*NUMBERS, v("twin", 0, "input", start=0.0), v("image", 1, "output")]
+def test_several_names_of_one_variable(fmu, go, v, numbers):
+    variables = [*numbers, v("twin", 0, "input", start=0.0), v("image", 1, "output")]
     path = fmu(variables)
     found = go({"a": path, "b": path}, {"a": {"u": 3.0}}, {"b.twin": "a.image"}, stop_time=1.0)
     assert (found.code, found.results["b.y"][-1], found.results["b.image"][-1]) == (0, 12.0, 12.0)
@@ -521,7 +281,7 @@ def test_an_fmu_that_is_made_for_one_step(fmu, go):
 # -------------------------------------------------------------------- many variables
 
 
-def test_thousands_of_variables(fmu, go):
+def test_thousands_of_variables(fmu, go, v):
     """Reading, wiring, checking and recording take a time that grows with their number, not with its square."""
     count = 2500
     variables = [v(f"bus.s{k}.u", 100 + 2 * k, "input", start=0.0) for k in range(count)]

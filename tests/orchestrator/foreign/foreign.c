@@ -21,24 +21,10 @@
    -DBARE leaves out what the standard demands and hardly any FMU needs; -DLAME leaves out fmi2DoStep as well.
    Calls that begin, step and end are written to the file that the environment variable FOREIGN_TRACE names. */
 
-#include <math.h>
-#include <signal.h>
-#include <stddef.h>
-#include <stdio.h>
-#include <stdlib.h>
-#include <string.h>
-#include <unistd.h>
+#include "fmi2.h"
 
 #define REALS 12000
 
-typedef void (*Logger)(void *environment, const char *instance, int status, const char *category, const char *text, ...);
-typedef struct {
-    Logger logger;
-    void *(*allocate)(size_t, size_t);
-    void (*release)(void *);
-    void *finished;
-    void *environment;
-} Callbacks;
 typedef struct {
     double reals[REALS];
     int whole[5], truths[2];
@@ -240,16 +226,6 @@ int fmi2DoStep(void *c, double time, double step, int final)
 }
 #endif
 
-const char *fmi2GetVersion(void)
-{
-    return "2.0";
-}
-
-const char *fmi2GetTypesPlatform(void)
-{
-    return "default";
-}
-
 #ifndef BARE
 int fmi2SetInteger(void *c, const unsigned *vr, size_t count, const int *values)
 {
@@ -357,7 +333,6 @@ int fmi2FreeFMUstate(void *c, void **state)
     return 0;
 }
 
-#define FINE(name) int name(void) { return 0; }
 FINE(fmi2SetDebugLogging) FINE(fmi2Reset) FINE(fmi2SerializedFMUstateSize) FINE(fmi2SerializeFMUstate)
 FINE(fmi2DeSerializeFMUstate) FINE(fmi2GetDirectionalDerivative) FINE(fmi2SetRealInputDerivatives)
 FINE(fmi2GetRealOutputDerivatives) FINE(fmi2GetStatus) FINE(fmi2GetIntegerStatus) FINE(fmi2GetStringStatus)

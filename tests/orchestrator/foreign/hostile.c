@@ -8,22 +8,8 @@
    gulp (the same, and a crash), print (100 lines), say (a line to the logger and one printed), cry (the same, and null), fork (a child that stays),
    discard, error, fatal, nan, once (nothing but the process's first instance is made). */
 
-#include <math.h>
-#include <stddef.h>
-#include <stdio.h>
-#include <stdlib.h>
-#include <string.h>
-#include <signal.h>
-#include <unistd.h>
+#include "fmi2.h"
 
-typedef void (*Logger)(void *environment, const char *instance, int status, const char *category, const char *text, ...);
-typedef struct {
-    Logger logger;
-    void *(*allocate)(size_t, size_t);
-    void (*release)(void *);
-    void *finished;
-    void *environment;
-} Callbacks;
 typedef struct {
     double reals[6], slope, time;
     int whole[2], truths[2];
@@ -292,16 +278,5 @@ int fmi2GetRealStatus(void *c, int kind, double *value)
     return 2;
 }
 
-const char *fmi2GetVersion(void)
-{
-    return "2.0";
-}
-
-const char *fmi2GetTypesPlatform(void)
-{
-    return "default";
-}
-
-#define FINE(name) int name(void) { return 0; }
 FINE(fmi2SetDebugLogging) FINE(fmi2Reset) FINE(fmi2GetRealOutputDerivatives) FINE(fmi2CancelStep) FINE(fmi2GetStatus)
 FINE(fmi2GetIntegerStatus) FINE(fmi2GetBooleanStatus) FINE(fmi2GetStringStatus)

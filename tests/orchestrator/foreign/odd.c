@@ -4,19 +4,8 @@
    Modes 1 to 5: the status of the step; 9: status -1; 10, 11, 12: y is NaN, infinity, minus infinity; 20 + s, 30 + s: the
    status of getting, of setting. */
 
-#include <math.h>
-#include <stddef.h>
-#include <stdlib.h>
-#include <string.h>
+#include "fmi2.h"
 
-typedef void (*Logger)(void *environment, const char *instance, int status, const char *category, const char *text, ...);
-typedef struct {
-    Logger logger;
-    void *(*allocate)(size_t, size_t);
-    void (*release)(void *);
-    void *finished;
-    void *environment;
-} Callbacks;
 typedef struct {
     double reals[4];
     int whole[9];
@@ -120,17 +109,6 @@ int fmi2DoStep(void *c, double time, double step, int final)
     return tell(s, status == 9 ? -1 : status);
 }
 
-const char *fmi2GetVersion(void)
-{
-    return "2.0";
-}
-
-const char *fmi2GetTypesPlatform(void)
-{
-    return "default";
-}
-
-#define FINE(name) int name(void) { return 0; }
 FINE(fmi2SetDebugLogging) FINE(fmi2EnterInitializationMode) FINE(fmi2ExitInitializationMode) FINE(fmi2Terminate)
 FINE(fmi2Reset) FINE(fmi2GetString) FINE(fmi2SetString) FINE(fmi2GetFMUstate) FINE(fmi2SetFMUstate)
 FINE(fmi2FreeFMUstate) FINE(fmi2SerializedFMUstateSize) FINE(fmi2SerializeFMUstate) FINE(fmi2DeSerializeFMUstate)

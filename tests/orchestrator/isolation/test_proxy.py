@@ -1,22 +1,13 @@
-"""One instance in a process of its own: the face of any other, and whatever its FMU does is an error, not our end."""
+"""One instance in a process of its own: the face of any other."""
 
 import os
 import random
-import re
-import signal
-import subprocess
 import sys
-import time
-from pathlib import Path
 
 import pytest
-from railcosim.orchestrator.errors import FmuError, StoppedError
-from railcosim.orchestrator.fmi.interface import Interface
-from railcosim.orchestrator.fmi.models import load_fmu
-from railcosim.orchestrator.isolation import messages as doorbell
+from railcosim.orchestrator.errors import FmuError
 from railcosim.orchestrator.isolation import process as host_process
 from railcosim.orchestrator.isolation import proxy as isolated
-from railcosim.orchestrator.isolation.proxy import IsolatedSlave
 
 pytestmark = [
     pytest.mark.skipif(not sys.platform.startswith("linux"), reason="FMUs by hand are compiled for Linux here"),
@@ -30,47 +21,6 @@ VALUES = {
     "Boolean": lambda dice: [dice.randrange(2)],
     "String": lambda dice: [dice.choice(["", "Zürich", "a b\nc", "x" * 90])],
 }
-
-
-@pytest.fixture
-def apart(hostile, workspace):
-    """An instance of hostile.c in a process of its own, not yet initialized; given back at the end."""
-    made = []
-
-    def make(deed="", name="it", *, path=None, begun=False, **how):
-        model = load_fmu(Path(path or hostile()), workspace)
-        made.append(IsolatedSlave(name, model.interface, model.folder, **how))
-        if deed:
-            made[-1].channel("String", ["deed"]).set([deed])
-        return begin(made[-1]) if begun else made[-1]
-
-    yield make
-    for one in made:
-        one.free()
-
-
-def begin(slave):
-    slave.setup(0.0, 10.0)
-    slave.enter_initialization()
-    slave.exit_initialization()
-    return slave
-
-
-def live(slave, steps=4, pause=0.0):
-    """A whole life of half a second per step; the error that ends it, if one does."""
-    u, y = slave.channel("Real", ["u"]), slave.channel("Real", ["y"])
-    try:
-        begin(slave)
-        for k in range(steps):
-            time.sleep(pause)
-            u.set([1.0])
-            slave.step(0.5 * k, 0.5)
-            y.get()
-            slave.forget(slave.save())
-        slave.terminate()
-    except FmuError as error:
-        return error
-    return None
 
 
 # -------------------------------------------------------------------- the face of an instance
@@ -180,7 +130,9 @@ class Pair:
 
 
 @pytest.mark.parametrize("seed", range(6))
-def test_whatever_it_is_asked_its_answers_are_those_without_isolation(apart, alone, hostile, monkeypatch, seed):
+def test_whatever_it_is_asked_its_answers_are_those_without_isolation(
+    apart, alone, hostile, begin, monkeypatch, *, seed
+):
     """Also where there is no room, or not enough, in the shared memory."""
     room = (None, 0, 3)[seed % 3]
     if room is not None:
@@ -211,7 +163,7 @@ def test_thousands_of_values(apart, workspace, hostile, monkeypatch):
 
 
 @pytest.mark.parametrize("version", [1, 3])
-def test_other_versions_of_fmi(apart, alone, by_hand, version):
+def test_other_versions_of_fmi(apart, alone, by_hand, version, begin):
     path = by_hand(version)
     pair = [begin(alone(path)), apart(path=path, begun=True)]
     for k in range(5):
@@ -222,7 +174,7 @@ def test_other_versions_of_fmi(apart, alone, by_hand, version):
         assert there == here
 
 
-def test_whole_numbers_that_need_64_bits_without_sign(apart, by_hand):
+def test_whole_numbers_that_need_64_bits_without_sign(apart, by_hand, begin):
     it = apart(path=by_hand(3))
     names = [v.name for v in it.interface.variables.values() if v.fmi_type == "UInt64" and v.causality == "input"]
     begin(it)
@@ -259,311 +211,3 @@ def test_a_pipe_that_is_not_inherited(apart, monkeypatch):
     it.channel("Real", ["u"]).set([1.0])
     it.step(0.0, 1.0)
     assert it.channel("Real", ["x"]).get() == [1.0]
-
-
-# -------------------------------------------------------------------- failures
-
-
-@pytest.mark.parametrize("status", ["discard", "error", "fatal"])
-@pytest.mark.parametrize("where", ["step", "get", "set", "enter", "exit", "terminate"])
-def test_a_bad_status_is_the_error_it_is_without_isolation(apart, alone, hostile, where, status):
-    told = []
-    for one in (alone(hostile()), apart()):
-        one.channel("String", ["deed"]).set([f"{where} {status} {1.0 if where in ('step', 'get', 'set') else 0.0}"])
-        error = live(one)
-        told.append((type(error), str(error), error.instance, error.time, error.status, error.log))
-    assert told[0] == told[1]
-    assert told[0][4] == status
-
-
-def test_the_wish_to_end_is_handed_on(apart, foreign, xml):
-    path = foreign([xml["variable"]("y", "output")], "    def step(self, t, h, v):\n        return t < 1.0\n")
-    it = apart(path=path, begun=True)
-    it.step(0.0, 1.0)
-    with pytest.raises(StoppedError, match="it, t = 1 s: asks for the end of the simulation"):
-        it.step(1.0, 1.0)
-
-
-ENDS = {
-    "null": r"its process crashed in {} \(SIGSEGV\)",
-    "abort": r"its process crashed in {} \(SIGABRT\)",
-    "exit": r"its process ended in {} \(exit code 7\)",
-    "kill": r"its process was killed in {} \(SIGKILL\), most likely by the system, for lack of memory",
-    "hang": r"did not return from {} within 1 s; its process was ended; set step_timeout to allow more wall time",
-}
-CALLS = {
-    "enter": ("EnterInitializationMode", 0.0),
-    "exit": ("ExitInitializationMode", 0.0),
-    "set": ("SetReal", 1.0),
-    "step": ("DoStep", 1.0),
-    "get": ("GetReal", 1.0),
-    "save": ("GetFMUstate", 1.0),
-    "terminate": ("Terminate", 2.0),
-}
-
-
-@pytest.mark.parametrize(
-    ("where", "what"),
-    [*((where, "null") for where in CALLS), *(("step", what) for what in ENDS), ("terminate", "hang")],
-)
-def test_a_process_that_is_lost(apart, where, what):
-    call, when = CALLS[where]
-    it = apart(f"{where} {what} {when}", "odd[1]", step_timeout=1.0)
-    error = live(it)
-    assert (error.instance, error.time, error.status) == ("odd[1]", when, "")
-    assert re.fullmatch(rf"odd\[1\], t = {when:g} s: {ENDS[what].format(f'fmi2{call}')}", str(error))
-    u, y = it.channel("Real", ["u"]), it.channel("Real", ["y"])
-    for after in (lambda: u.set([1.0]), y.get, lambda: it.step(0.0, 1.0), it.save, it.terminate):
-        with pytest.raises(FmuError) as again:
-            after()
-        assert str(again.value) == str(error), "after its end nothing is called any more"
-    it.forget(None)
-
-
-@pytest.mark.parametrize("what", ["abort", "exit", "hang"])
-@pytest.mark.parametrize("where", ["instantiate", "setup"])
-def test_a_process_that_is_lost_before_it_can_be_told_anything(apart, hostile, where, what):
-    it = apart(path=hostile(f"{where} {what}"), step_timeout=1.0)
-    it.channel("Real", ["u"]).set([1.0])
-    call, at = {"instantiate": ("Instantiate", ""), "setup": ("SetupExperiment", ", t = 0 s")}[where]
-    with pytest.raises(FmuError, match=rf"^it{at}: {ENDS[what].format(f'fmi2{call}')}$"):
-        it.setup(0.0, 1.0)
-
-
-def test_an_instance_that_is_refused(apart, hostile):
-    it = apart(path=hostile("instantiate error"))
-    with pytest.raises(FmuError, match=r"^it: cannot be instantiated: it gives no instance\n    \[error\] it: error$"):
-        it.setup(0.0, 1.0)
-    with pytest.raises(FmuError, match="cannot be instantiated"):
-        it.enter_initialization()
-
-
-def test_a_library_that_does_not_load(apart, workspace, hostile):
-    path = hostile()
-    next(load_fmu(Path(path), workspace).folder.glob("binaries/*/*")).write_bytes(b"not a library")
-    with pytest.raises(FmuError, match="cannot be instantiated: Failed to load shared library"):
-        apart(path=path, begun=True)
-
-
-@pytest.mark.parametrize("what", ENDS)
-def test_a_process_that_is_lost_when_it_is_freed(apart, caplog, what):
-    it = apart(f"free {what}", step_timeout=1.0, begun=True)
-    it.terminate()
-    it.free()
-    it.free()
-    (record,) = caplog.records
-    assert record.levelname == "WARNING"
-    assert "fmi2FreeInstance" in record.getMessage()
-
-
-def test_a_crash_tells_what_the_fmu_said_last(apart):
-    it = apart("step cry 1")
-    begin(it)
-    it.step(0.0, 1.0)
-    with pytest.raises(FmuError) as caught:
-        it.step(1.0, 1.0)
-    assert caught.value.log == ["[warning] it: beware", "printed at 1 s"]
-    assert str(caught.value).endswith("(SIGSEGV)\n    [warning] it: beware\n    printed at 1 s")
-
-
-def test_what_an_fmu_prints_is_not_shown_and_does_not_fill_the_disk(apart, workspace, capfd):
-    it = apart("step print", begun=True)
-    (output,) = workspace.folder.glob("host_*/output")
-    most = 0
-    for k in range(3000):
-        it.step(0.1 * k, 0.1)
-        most = max(most, output.stat().st_size)
-    until = time.monotonic() + 10.0
-    while output.stat().st_size >= most and time.monotonic() < until:
-        time.sleep(0.1)
-    assert output.stat().st_size < most, "it was cut"
-    assert capfd.readouterr() == ("", "")
-
-
-def test_slow_is_not_hanging(apart):
-    it = apart("step slow 0.5", step_timeout=5.0, begun=True)
-    x = it.channel("Real", ["calls"])
-    for k in range(4):
-        it.step(0.5 * k, 0.5)
-        assert x.get() == [k + 1.0]
-
-
-def test_a_leak_ends_at_the_limit(apart):
-    error = live(apart("step leak", memory_limit=100.0), 20)
-    assert error.status == "error"
-    assert error.log == ["[error] it: no memory is left"]
-    assert re.search(
-        "fmi2DoStep failed; it had [0-9]+ of the 100 MiB that memory_limit allows: a likely reason", str(error)
-    )
-
-
-def test_a_crash_for_lack_of_memory(apart):
-    error = live(apart("step gulp", memory_limit=100.0), 20, pause=0.1)
-    assert re.search(r"crashed in fmi2DoStep \(SIGSEGV\); it had \d+ of the 100 MiB that memory_limit", str(error))
-
-
-def test_a_crash_under_a_limit(apart):
-    error = live(apart("step null", memory_limit=100.0))
-    assert str(error) == "it, t = 0 s: its process crashed in fmi2DoStep (SIGSEGV); its memory_limit was 100 MiB"
-
-
-def test_a_limit_that_leaves_enough(apart):
-    it = apart("step leak", memory_limit=100.0, begun=True)
-    for k in range(3):
-        it.step(0.5 * k, 0.5)
-    it.terminate()
-
-
-def test_what_a_lost_process_has_started_is_ended_too(apart):
-    it = apart("step fork", step_timeout=1.0, begun=True)
-    with pytest.raises(FmuError, match=r"its process crashed in fmi2DoStep \(SIGABRT\)"):
-        it.step(0.0, 1.0)
-    until = time.monotonic() + 10.0
-    while members_of(it.pid) and time.monotonic() < until:
-        time.sleep(0.05)
-    assert not members_of(it.pid)
-
-
-def members_of(group):
-    """Processes of a group, the dead ones aside."""
-    found = []
-    for place in Path("/proc").glob("[0-9]*/stat"):
-        try:
-            state, _, member = place.read_text().rpartition(")")[2].split()[:3]
-        except OSError:
-            continue
-        if int(member) == group and state != "Z":
-            found.append(place.parent.name)
-    return found
-
-
-def test_a_process_that_does_not_start(apart, monkeypatch):
-    monkeypatch.setattr(host_process, "_BOOT", "raise SystemExit('no way')")
-    with pytest.raises(FmuError, match=r"^it: its process could not be started \(exit code 1\)\n    no way$"):
-        apart(begun=True)
-
-
-def test_no_process_at_all(apart, monkeypatch):
-    monkeypatch.setattr(sys, "executable", "/no/python")
-    with pytest.raises(
-        FmuError, match=r"^it: its process cannot be started: .*No such file or directory: '/no/python'$"
-    ):
-        apart()
-
-
-def test_a_process_that_is_lost_between_two_calls(apart):
-    """And whose memory cannot be trusted."""
-    it = apart(begun=True)
-    it._process.memory[:16] = b"\xff" * 16
-    os.kill(it.pid, signal.SIGSEGV)
-    with pytest.raises(FmuError, match=r"^it, t = 0 s: its process crashed between two calls \(SIGSEGV\)$"):
-        it.terminate()
-
-
-def test_a_process_that_does_not_listen(apart):
-    it = apart(step_timeout=0.5, begun=True)
-    os.kill(it.pid, signal.SIGSTOP)
-    with pytest.raises(FmuError, match=r"did not return from what it was asked for within 0\.5 s"):
-        it.terminate()
-
-
-@pytest.mark.parametrize("inherits", [True, False])
-def test_a_process_that_takes_too_long_to_start(apart, monkeypatch, inherits):
-    monkeypatch.setattr(host_process, "INHERITS", inherits)
-    monkeypatch.setattr(host_process, "PATIENCE", 0.5)
-    monkeypatch.setattr(host_process, "_BOOT", "import time; time.sleep(60)")
-    with pytest.raises(FmuError, match=r"^it: its process did not start within 0.5 s$"):
-        apart(step_timeout=0.5, begun=True)
-
-
-def test_what_cannot_be_read_is_no_answer(apart, monkeypatch):
-    it = apart(begun=True)
-    monkeypatch.setattr(doorbell, "content", lambda body: int("garbage"))
-    with pytest.raises(FmuError, match="its process sends what cannot be read"):
-        it.save()
-    assert not Path(f"/proc/{it.pid}").exists()
-
-
-def test_a_second_interruption_does_not_wait(apart):
-    it = apart("step hang 1", begun=True)
-    it.step(0.0, 1.0)
-
-    def interrupt(*_):
-        raise KeyboardInterrupt
-
-    before = signal.signal(signal.SIGUSR1, interrupt)
-    helper = subprocess.Popen([sys.executable, "-c", f"import os, time; time.sleep(0.3); os.kill({os.getpid()}, 10)"])
-    try:
-        with pytest.raises(KeyboardInterrupt):
-            it.step(1.0, 1.0)
-    finally:
-        helper.wait()
-        signal.signal(signal.SIGUSR1, before)
-    assert not Path(f"/proc/{it.pid}").exists()
-    with pytest.raises(FmuError, match="was interrupted"):
-        it.terminate()
-
-
-# -------------------------------------------------------------------- nobody is left
-
-MASTER = """
-import sys, threading, time
-from pathlib import Path
-from railcosim.orchestrator.fmi.archive import Workspace
-from railcosim.orchestrator.isolation.proxy import IsolatedSlave
-from railcosim.orchestrator.fmi.models import load_fmu
-
-def work():
-    model = load_fmu(Path(sys.argv[1]), Workspace())
-    it = IsolatedSlave("it", model.interface, model.folder)
-    it.channel("String", ["deed"]).set([sys.argv[2]])
-    it.setup(0.0, 10.0)
-    it.enter_initialization()
-    it.exit_initialization()
-    print(it.pid, flush=True)
-    it.step(0.0, 1.0)
-    time.sleep(60)
-
-if sys.argv[3] == "thread":
-    thread = threading.Thread(target=work)
-    thread.start()
-    thread.join()
-else:
-    work()
-"""
-
-
-@pytest.mark.long
-@pytest.mark.parametrize("thread", ["main", "thread"])
-@pytest.mark.parametrize("deed", ["step hang", "nothing"])
-def test_a_process_ends_with_its_master_even_inside_a_step(hostile, deed, thread, tmp_path):
-    command = [sys.executable, "-c", MASTER, hostile(), deed, thread]
-    with subprocess.Popen(
-        command, stdout=subprocess.PIPE, text=True, env=os.environ | {"TMPDIR": str(tmp_path)}
-    ) as master:
-        process = Path(f"/proc/{int(master.stdout.readline())}")
-        time.sleep(0.3)
-        assert process.exists()
-        master.kill()
-    until = time.monotonic() + 10.0
-    while process.exists() and time.monotonic() < until:
-        time.sleep(0.05)
-    assert not process.exists()
-
-
-def test_an_instance_that_was_never_used(apart):
-    it = apart()
-    pid = it.pid
-    it.free()
-    assert not Path(f"/proc/{pid}").exists()
-
-
-def test_the_names_of_calls_are_the_standards():
-    from railcosim.orchestrator.fmi.binding.versions import SLAVES, call_name
-
-    for version, slave in SLAVES.items():
-        interface = Interface("m", "m", "g", {}, {}, {}, version=version)
-        for call in doorbell.CALLS[1:]:
-            kind = next(iter(slave.TYPES))
-            name = call_name(interface, call, kind, ())
-            assert name in slave.SIGNATURES or name == call

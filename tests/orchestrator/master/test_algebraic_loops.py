@@ -17,78 +17,7 @@ from railcosim.orchestrator.run.execution import run
 from railcosim.orchestrator.system import Connection, System
 from railcosim.orchestrator.wiring.resolution import Link
 
-BODY = """
-class Clock(Base):
-    '''The time.'''
-
-    t = Output("s")
-
-    def outputs(self):
-        return {"t": self.time}
-
-
-class Affine(Base):
-    '''y = gain u + w.'''
-
-    gain = Parameter("1", 1.0)
-    u = Input("1", optional=True)
-    w = Input("1", optional=True)
-    y = Output("1")
-
-    def outputs(self):
-        return {"y": self.gain * self.u + self.w}
-
-
-class Switch(Base):
-    '''y = low or high, as it is told, plus w.'''
-
-    on = Input("1", False, optional=True)
-    w = Input("1", optional=True)
-    low = Parameter("1", 0.0)
-    high = Parameter("1", 10.0)
-    y = Output("1")
-
-    def outputs(self):
-        return {"y": maths.where(self.on, self.high, self.low) + self.w}
-
-
-class Level(Base):
-    '''Whether the input is above a level; or below, upside down.'''
-
-    level = Parameter("1", 5.0)
-    upside_down = Parameter("1", False)
-    u = Input("1", optional=True)
-    on = Output("1", bool)
-
-    def outputs(self):
-        return {"on": maths.where(self.upside_down, self.u < self.level, self.u > self.level)}
-
-
-class Not(Base):
-    '''The opposite.'''
-
-    u = Input("1", False, optional=True)
-    y = Output("1", bool)
-
-    def outputs(self):
-        return {"y": maths.logical_not(self.u)}
-
-
-class Lag(Base):
-    '''x' = u - x: no feed-through.'''
-
-    u = Input("1", optional=True)
-    x = State("1", 1.0, output=True)
-
-    def derivatives(self):
-        return {"x": self.u - self.x}
-"""
 EXPLICIT = pytest.mark.parametrize("algorithm", ["gauss-seidel", "jacobi"])
-
-
-@pytest.fixture
-def mine(components):
-    return components(BODY)
 
 
 # -------------------------------------------------------------------- where there is one

@@ -5,48 +5,14 @@ from railcosim.orchestrator.errors import ScenarioError
 from railcosim.orchestrator.run.checking import check, describe_stepping
 from railcosim.orchestrator.system import System
 
-BODY = """
-class Pass(Base):
-    '''y = gain u.'''
-
-    gain = Parameter("1", 0.5)
-    u = Input("1", optional=True)
-    y = Output("1")
-
-    def outputs(self):
-        return {"y": self.gain * self.u}
-
-
-class Lag(Base):
-    '''x' = u - x.'''
-
-    u = Input("1", optional=True)
-    x = State("1", 1.0, output=True)
-    row = State("1", shape=(2,), output=True)
-
-    def derivatives(self):
-        return {"x": self.u - self.x, "row": -self.row}
-
-
-class Sampled(Base):
-    '''Samples its input.'''
-
-    u = Input("1", optional=True)
-    seen = Memory("1", 0.0, output=True)
-
-    def update(self):
-        return {"seen": self.u}
-"""
-
 
 @pytest.fixture
-def ring(components):
+def ring(mine):
     """Two components in a circle."""
-    mine = components(BODY)
 
-    def make(a="Pass", b="Lag", **how):
+    def make(a="Pass", b="LagWithRow", **how):
         it = System(**{"stop_time": 1.0, "step": 0.1} | how)
-        outputs = {"Pass": "y", "Lag": "x", "Sampled": "seen"}
+        outputs = {"Pass": "y", "LagWithRow": "x", "Keep": "seen"}
         it.add("a", mine(a))
         it.add("b", mine(b))
         it.connect(f"a.{outputs[a]}", "b.u")
@@ -131,8 +97,7 @@ def test_no_loop_no_note(ring, workspace):
     assert notes(ring(), workspace) == ()
 
 
-def test_long_loops_are_not_listed_in_full(components, workspace):
-    mine = components(BODY)
+def test_long_loops_are_not_listed_in_full(mine, workspace):
     it = System(stop_time=1.0, step=0.1)
     for k in range(9):
         it.add(f"p{k}", mine("Pass"))
@@ -147,7 +112,7 @@ def test_long_loops_are_not_listed_in_full(components, workspace):
 
 def test_check_tells_what_iterative_repeats(ring, workspace):
     it = ring(algorithm="iterative")
-    it.instances["sampled"] = ring("Sampled").instances["a"]
+    it.instances["sampled"] = ring("Keep").instances["a"]
     it.instances["sampled"].name = "sampled"
     it.connect("b.x", "sampled.u")
     lines = describe_stepping(check(it, workspace, "plain"))
@@ -158,5 +123,5 @@ def test_check_tells_what_iterative_repeats(ring, workspace):
 
 
 def test_check_tells_the_order_of_adaptive(ring, workspace):
-    lines = describe_stepping(check(ring("Lag", "Pass", algorithm="adaptive"), workspace, "plain"))
+    lines = describe_stepping(check(ring("LagWithRow", "Pass", algorithm="adaptive"), workspace, "plain"))
     assert lines == ["adaptive steps in the order: b, a"]

@@ -10,7 +10,7 @@ from railcosim.orchestrator.scenario.loading import loads
 from railcosim.orchestrator.system import Event, System
 
 BODY = """
-class Source(Base):
+class Outputs(Base):
     '''An output of each type, and parameters.'''
 
     fixed = Parameter("1", 1.0)
@@ -27,7 +27,7 @@ class Source(Base):
         return {"x": self.x, "k": self.k, "on": self.on, "word": self.word, "row": self.row, "inner": self.inner}
 
 
-class Sink(Base):
+class Sum(Base):
     '''Inputs.'''
 
     u = Input("m", optional=True)
@@ -43,8 +43,8 @@ class Sink(Base):
 def system(components):
     def make(*events, **how):
         it = System(**{"stop_time": 10.0, "step": 0.5} | how, events=list(events))
-        it.add("source", components(BODY)("Source"))
-        it.add("sink", components(BODY)("Sink"))
+        it.add("source", components(BODY)("Outputs"))
+        it.add("sink", components(BODY)("Sum"))
         it.connect("source.x", "sink.u")
         return it
 
@@ -87,9 +87,9 @@ def test_nothing_is_said_about_what_is_fine(system, workspace, event):
 WRONG = [
     (("sorce.x", "freeze", 1.0), "there is no instance 'sorce'; did you mean 'source'?"),
     (("x", "freeze", 1.0), "there is no instance 'x'"),
-    (("source.rwo", "freeze", 1.0), "Source has no variable 'rwo'; did you mean 'row'?"),
-    (("source.row[4]", "freeze", 1.0), "Source has no variable 'row[4]'; did you mean 'row[3]'?"),
-    (("source", "freeze", 1.0), "Source has no variable ''"),
+    (("source.rwo", "freeze", 1.0), "Outputs has no variable 'rwo'; did you mean 'row'?"),
+    (("source.row[4]", "freeze", 1.0), "Outputs has no variable 'row[4]'; did you mean 'row[3]'?"),
+    (("source", "freeze", 1.0), "Outputs has no variable ''"),
     (("source.x", "frezee", 1.0), "there is no action 'frezee'; did you mean 'freeze'?"),
     (("source.fixed", "set", 1.0, 2.0), "it is a fixed parameter: only tunable ones can change"),
     (("source.gain", "freeze", 1.0), "'freeze' is for outputs and connected inputs, not for causality parameter"),
@@ -180,11 +180,11 @@ def test_an_input_is_read_at_its_instance_s_own_steps_only(system, workspace):
 
 
 def test_each_instance_s_mistake_stands_at_its_place_in_the_file(components, workspace):
-    model = components(BODY)("Source")
+    model = components(BODY)("Outputs")
     text = f'[simulation]\nstop_time = 1.0\n[instances.source]\ncomponent = "{model}"\ncount = 3\n'
     text += '[[events]]\nsignal = "source.xx"\naction = "freeze"\nat = 0.5\n'
     with pytest.raises(ScenarioError) as caught:
         check(loads(text, "x.toml"), workspace, "plain")
     assert caught.value.problems == [
-        f"x.toml:6: event on 'source[{k}].xx': Source has no variable 'xx'; did you mean 'x'?" for k in (1, 2, 3)
+        f"x.toml:6: event on 'source[{k}].xx': Outputs has no variable 'xx'; did you mean 'x'?" for k in (1, 2, 3)
     ]

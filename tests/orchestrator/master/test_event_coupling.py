@@ -7,53 +7,6 @@ import pytest
 from railcosim.orchestrator.run.execution import run
 from railcosim.orchestrator.system import Event, System
 
-BODY = """
-class Ramp(Base):
-    '''x = t.'''
-
-    x = State("1", 0.0, output=True)
-
-    def derivatives(self):
-        return {"x": 1.0}
-
-
-class Lag(Base):
-    '''x' = rate (u - x).'''
-
-    rate = Parameter("1/s", 1.0, tunable=True)
-    u = Input("1", optional=True)
-    x = State("1", 0.0, output=True)
-
-    def derivatives(self):
-        return {"x": self.rate * (self.u - self.x)}
-
-
-class Half(Base):
-    '''y = u / 2 + bias, at one instant.'''
-
-    bias = Parameter("1", 1.0, tunable=True)
-    u = Input("1", optional=True)
-    y = Output("1")
-
-    def outputs(self):
-        return {"y": 0.5 * self.u + self.bias}
-
-
-class Keep(Base):
-    '''What the input was when the last step began.'''
-
-    u = Input("1", optional=True)
-    seen = Memory("1", -1.0, output=True)
-
-    def update(self):
-        return {"seen": self.u}
-"""
-
-
-@pytest.fixture
-def mine(components):
-    return components(BODY)
-
 
 @pytest.fixture
 def spring(mine):
@@ -62,7 +15,7 @@ def spring(mine):
     def make(*events, **how):
         system = System(**{"stop_time": 2.0, "step": 0.1} | how, events=list(events))
         system.add("a", mine("Lag"), x=1.0)
-        system.add("b", mine("Lag"))
+        system.add("b", mine("Lag"), x=0.0)
         system.connect("a.x", "b.u")
         system.connect("b.x", "a.u")
         return system
@@ -140,7 +93,7 @@ def test_adaptive_is_right_after_a_jump(mine):
     system = System(stop_time=3.0, step=0.5, algorithm="adaptive", tolerance=1e-6)
     system.events = [Event("ramp.x", "override", 0.0, 0.0, duration=1.0), Event("ramp.x", "override", 1.0, 2.0)]
     system.add("ramp", mine("Ramp"))
-    system.add("lag", mine("Lag"))
+    system.add("lag", mine("Lag"), x=0.0)
     system.connect("ramp.x", "lag.u")
     result = go(system)
     assert set(result["ramp.x"]) == {0.0, 2.0}
@@ -168,7 +121,7 @@ def test_no_polynomial_goes_through_a_jump(mine, algorithm, order):
         Event("lag.u", "override", 2.0, 0.0),
     ]
     system.add("ramp", mine("Ramp"))
-    system.add("lag", mine("Lag"), rate=2.0)
+    system.add("lag", mine("Lag"), rate=2.0, x=0.0)
     system.connect("ramp.x", "lag.u")
     checked = run(system, kind="native")
     x, time = checked["lag.x"], checked.time
@@ -187,8 +140,8 @@ def test_a_loop_is_solved_with_what_the_event_makes_of_it(mine, algorithm):
         Event("q.u", "bias", 2.0, 3.0, duration=1.0),
         Event("p.y", "override", 3.0, 10.0),
     ]
-    system.add("p", mine("Half"))
-    system.add("q", mine("Half"))
+    system.add("p", mine("Pass"), gain=0.5, bias=1.0)
+    system.add("q", mine("Pass"), gain=0.5, bias=1.0)
     system.connect("p.y", "q.u")
     system.connect("q.y", "p.u")
     result = go(system)
@@ -208,7 +161,7 @@ def test_an_isolated_instance_is_no_exception(mine):
         Event("ramp.x", "override", 4.0, -7.0),
     ]
     system.add("ramp", mine("Ramp"))
-    system.add("half", mine("Half"))
+    system.add("half", mine("Pass"), gain=0.5, bias=1.0)
     system.connect("ramp.x", "half.u")
     here = run(system, kind="python")
     for instance in system.instances.values():

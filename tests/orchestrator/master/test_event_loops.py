@@ -2,7 +2,6 @@
 
 import random
 
-import fmpy
 import numpy as np
 import pytest
 from railcosim.orchestrator.master import compiled
@@ -13,28 +12,6 @@ pytestmark = pytest.mark.skipif(compiled.kernel is None, reason="installed witho
 STEP = 0.25
 INPUTS = {"u": "Real", "v": "Real", "m": "Integer", "on": "Boolean"}
 OUTPUTS = {"x": "Real", "y": "Real", "n": "Integer", "off": "Boolean"}
-
-
-@pytest.fixture
-def odd(compile_c, xml, tmp_path):
-    """The FMU of odd.c: two real, an integer and a boolean input; y depends directly on v."""
-    v = xml["variable"]
-    variables = [
-        v("u", "input", start=0.0),
-        v("v", "input", start=0.0),
-        v("x", "output", dependencies=[]),
-        v("y", "output", dependencies=["v"]),
-        v("m", "input", "Integer", 0, variability="discrete"),
-        v("n", "output", "Integer", variability="discrete"),
-        v("on", "input", "Boolean", False, variability="discrete"),
-        v("off", "output", "Boolean", variability="discrete"),
-        v("mode", "parameter", "Integer", 0, variability="tunable"),
-    ]
-    files = {
-        "modelDescription.xml": xml["description"](variables, identifier="Odd"),
-        f"binaries/{fmpy.platform}/Odd{fmpy.sharedLibraryExtension}": compile_c("odd.c"),
-    }
-    return str(xml["write_archive"](tmp_path / "odd.fmu", files))
 
 
 @pytest.fixture

@@ -8,106 +8,7 @@ from railcosim.orchestrator.master import compiled
 from railcosim.orchestrator.run.execution import execute, run
 from railcosim.orchestrator.system import Event, System
 
-BODY = """
-class Counter(Base):
-    '''10, 11, 12, ...: without feed-through.'''
-
-    n = Memory("1", 10.0, output=True)
-
-    def update(self):
-        return {"n": self.n + 1.0}
-
-
-class Pass(Base):
-    '''y = gain u + bias, at one instant.'''
-
-    gain = Parameter("1", 1.0, tunable=True)
-    bias = Parameter("1", 0.0)
-    u = Input("1", optional=True)
-    y = Output("1")
-
-    def outputs(self):
-        return {"y": self.gain * self.u + self.bias}
-
-
-class Keep(Base):
-    '''What the input was when the last step began.'''
-
-    u = Input("1", optional=True)
-    seen = Memory("1", -1.0, output=True)
-
-    def update(self):
-        return {"seen": self.u}
-
-
-class Types(Base):
-    '''Passes every type on, from memory.'''
-
-    n = Input("1", 0, type=int, optional=True)
-    on = Input("1", False, optional=True)
-    word = Input("1", "", optional=True)
-    m = Memory("1", 1, type=int, output=True)
-    off = Memory("1", True, output=True)
-    said = Memory("1", "a", output=True)
-
-    def update(self):
-        return {"m": self.n + 1, "off": self.on, "said": self.word + "b"}
-
-
-class Row(Base):
-    '''An array that counts in each element, and one that is received.'''
-
-    u = Input("1", shape=(3,), optional=True)
-    x = Memory("1", 1.0, shape=(3,), output=True)
-    seen = Memory("1", 0.0, shape=(3,), output=True)
-
-    def update(self):
-        return {"x": self.x + 1.0, "seen": self.u}
-
-
-class Metres(Base):
-    '''What arrives, in m.'''
-
-    u = Input("m", optional=True)
-    y = Output("m")
-
-    def outputs(self):
-        return {"y": self.u}
-
-
-class Kilometres(Base):
-    '''A distance in km.'''
-
-    d = Memory("km", 1.0, output=True)
-
-    def update(self):
-        return {"d": self.d + 1.0}
-
-
-class Lag(Base):
-    '''A first-order lag.'''
-
-    u = Input("1", optional=True)
-    x = State("1", 0.0, output=True)
-
-    def derivatives(self):
-        return {"x": self.u - self.x}
-
-
-class Broken(Base):
-    '''Not a number, from 3 s on.'''
-
-    y = Output("1")
-
-    def outputs(self):
-        return {"y": maths.sqrt(2.5 - self.time)}
-"""
 ALGORITHMS = pytest.mark.parametrize("algorithm", ["gauss-seidel", "jacobi"])
-
-
-@pytest.fixture
-def mine(components):
-    return components(BODY)
 
 
 @pytest.fixture(params=["plain", "compiled"])
@@ -447,7 +348,7 @@ def test_an_fmu_that_refuses_what_is_set_is_named_with_the_time(foreign, xml):
 @pytest.mark.parametrize("action", ["override", "bias"])
 def test_what_is_not_finite_is_blamed_on_its_source_even_if_nobody_sees_it(mine, action):
     system = System(stop_time=5.0, step=1.0, events=[Event("bad.y", action, 1.0, 5.0)])
-    system.add("bad", mine("Broken"))
+    system.add("bad", mine("Fails"), until=2.5)
     system.add("end", mine("Keep"))
     system.connect("bad.y", "end.u")
     with pytest.raises(FmuError, match=r"^bad, t = "):

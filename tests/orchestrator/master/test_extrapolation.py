@@ -9,64 +9,7 @@ from railcosim.orchestrator.master.extrapolation import polynomial
 from railcosim.orchestrator.run.execution import execute, resume, run
 from railcosim.orchestrator.system import Event, System
 
-BODY = """
-class Course(Base):
-    '''a + b t + c t^2, without feed-through.'''
-
-    a = Parameter("1", 1.0)
-    b = Parameter("1", 0.0)
-    c = Parameter("1", 0.0)
-    y = Output("1")
-
-    def outputs(self):
-        return {"y": self.a + self.b * self.time + self.c * self.time * self.time}
-
-
-class Integral(Base):
-    '''x' = u.'''
-
-    u = Input("1", optional=True)
-    x = State("1", 0.0, output=True)
-
-    def derivatives(self):
-        return {"x": self.u}
-
-
-class Pass(Base):
-    '''y = u, at one instant.'''
-
-    u = Input("1", optional=True)
-    y = Output("1")
-
-    def outputs(self):
-        return {"y": self.u}
-
-
-class Sampled(Base):
-    '''Its input, at samples.'''
-
-    u = Input("1", optional=True)
-    y = Memory("1", 1.0, output=True)
-
-    def update(self):
-        return {"y": self.u}
-
-
-class Whole(Base):
-    '''A whole number into a whole number.'''
-
-    n = Input("1", 0, type=int, optional=True)
-    m = Output("1", int)
-
-    def outputs(self):
-        return {"m": self.n + 1}
-"""
 ALGORITHMS = pytest.mark.parametrize("algorithm", ["gauss-seidel", "jacobi", "iterative", "adaptive"])
-
-
-@pytest.fixture
-def mine(components):
-    return components(BODY)
 
 
 # -------------------------------------------------------------------- polynomials
@@ -151,13 +94,13 @@ def test_what_is_held_all_the_same(mine, monkeypatch):
     it.add("course", mine("Course"), b=1.0)
     for name in ("moves", "late", "behind"):
         it.add(name, mine("Integral"))
-    it.add("sampled", mine("Sampled"))
+    it.add("sampled", mine("Keep"))
     it.add("whole", mine("Whole"))
     it.add("more", mine("Whole"))
     it.connect("course.y", "moves.u")
     it.connect("course.y", "late.u", delay=1)
     it.connect("course.y", "sampled.u")
-    it.connect("sampled.y", "behind.u")
+    it.connect("sampled.seen", "behind.u")
     it.connect("whole.m", "more.n")
     run(it, kind="native")
     assert seen == {"moves": {"u"}}

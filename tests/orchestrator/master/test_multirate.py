@@ -11,68 +11,7 @@ from railcosim.orchestrator.run.execution import at_half_the_step, execute, run
 from railcosim.orchestrator.scenario.loading import loads
 from railcosim.orchestrator.system import Event, System
 
-BODY = """
-class Counter(Base):
-    '''10, 11, 12, ...: one more at each sample, without feed-through.'''
-
-    sample_time = Parameter("s", 0.0)
-    n = Memory("1", 10.0, output=True)
-
-    def update(self):
-        return {"n": self.n + 1.0}
-
-
-class Pass(Base):
-    '''What it is given, at one instant.'''
-
-    u = Input("1", optional=True)
-    y = Output("1")
-
-    def outputs(self):
-        return {"y": self.u}
-
-
-class Sampled(Base):
-    '''What it is given at each sample, and how many samples there have been: both pass through at once.'''
-
-    sample_time = Parameter("s", 0.0)
-    u = Input("1", optional=True)
-    count = Memory("1", 0.0)
-    y = Output("1")
-    k = Output("1")
-
-    def outputs(self):
-        return {"y": self.u, "k": self.count + 0.0 * self.u}
-
-    def update(self):
-        return {"count": self.count + 1.0}
-
-
-class Keep(Base):
-    '''What the input was when the last step began.'''
-
-    u = Input("1", optional=True)
-    seen = Memory("1", -1.0, output=True)
-
-    def update(self):
-        return {"seen": self.u}
-
-
-class Lag(Base):
-    '''A first-order lag.'''
-
-    u = Input("1", optional=True)
-    x = State("1", 1.0, output=True)
-
-    def derivatives(self):
-        return {"x": self.u - self.x}
-"""
 ALGORITHMS = pytest.mark.parametrize("algorithm", ["gauss-seidel", "jacobi"])
-
-
-@pytest.fixture
-def mine(components):
-    return components(BODY)
 
 
 @pytest.fixture

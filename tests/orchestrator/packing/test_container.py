@@ -8,7 +8,8 @@ import fmpy
 import numpy as np
 import pytest
 from fmpy.validation import validate_fmu
-from railcosim.fmus.build import build, native_problem, resolve
+from railcosim.fmus.build import build, native_problem
+from railcosim.fmus.references import resolve
 from railcosim.orchestrator import Event, RailcosimError, ScenarioError, System, load, run
 from railcosim.orchestrator.cli.app import call
 from railcosim.orchestrator.packing.container import pack

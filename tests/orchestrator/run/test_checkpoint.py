@@ -11,117 +11,6 @@ from railcosim.orchestrator.run import checkpoint
 from railcosim.orchestrator.run.execution import resume, run
 from railcosim.orchestrator.system import Event, System
 
-BODY = """
-from railcosim.components import Tape
-
-
-class Lag(Base):
-    '''A first-order lag, with what a state carries that is no state: a tunable parameter.'''
-
-    rate = Parameter("1/s", 1.0, tunable=True)
-    u = Input("1", 0.25, optional=True)
-    x = State("1", 1.0, output=True)
-    slope = Output("1/s")
-
-    def derivatives(self):
-        return {"x": self.rate * (self.u - self.x)}
-
-    def outputs(self):
-        return {"slope": self.rate * (self.u - self.x)}
-
-
-class Wave(Base):
-    '''Something that depends on the time alone.'''
-
-    y = Output("1")
-
-    def outputs(self):
-        return {"y": maths.sin(3.0 * self.time)}
-
-
-class Noisy(Base):
-    '''Random numbers, held, and their sum.'''
-
-    seed = Parameter("1", 1, type=int)
-    hold = Parameter("s", 0.3)
-    w = Noise(hold)
-    sum = Memory("1", 0.0, output=True)
-    y = Output("1")
-
-    def outputs(self):
-        return {"y": self.w}
-
-    def update(self):
-        return {"sum": self.sum + self.w}
-
-
-class Types(Base):
-    '''Memory of every type, and arrays.'''
-
-    n = Input("1", 0, type=int, optional=True)
-    on = Input("1", False, optional=True)
-    m = Memory("1", 1, type=int, output=True)
-    off = Memory("1", True, output=True)
-    row = Memory("1", 0.1, shape=(3,), output=True)
-
-    def update(self):
-        m = maths.where(self.m > 99, 1, self.n + self.m)
-        return {"m": m, "off": maths.logical_not(self.on), "row": self.row * 1.7 - 0.3 * self.m}
-
-
-class Said(Base):
-    '''A text that grows.'''
-
-    word = Input("1", "", optional=True)
-    said = Memory("1", "a, b", output=True)
-    n = Memory("1", 0, type=int, output=True)
-
-    def update(self):
-        return {"said": self.word + '"', "n": self.n + 1}
-
-
-class Trips(Base):
-    '''Trips of one second, and a quarter of one before each to go back to the beginning.'''
-
-    trip = Output("1", int)
-    trip_time = Output("s")
-
-    def outputs(self):
-        trip = maths.floor((self.time + 1e-9) / 1.25)
-        return {"trip": trip, "trip_time": self.time - 1.25 * trip - 0.25}
-
-
-class Learner(Base):
-    '''Adds to what it did at the same place of the trip before.'''
-
-    sample_time = Parameter("s", 0.05)
-    trip = Input("1", 0, type=int)
-    trip_time = Input("s")
-    effort = Tape("1")
-    y = Output("1")
-
-    def outputs(self):
-        return {"y": 0.75 * self.effort + self.trip_time}
-
-    def update(self):
-        return {"effort": 0.75 * self.effort + self.trip_time}
-
-
-class Fails(Base):
-    '''Fails after four seconds.'''
-
-    u = Input("1", optional=True)
-    y = Output("1")
-
-    def outputs(self):
-        return {"y": maths.sqrt(4.0 - self.time) + self.u}
-"""
-
-
-@pytest.fixture
-def mine(components):
-    return components(BODY)
-
 
 def read(directory):
     """The two files that a run which was never interrupted must have left alike."""
@@ -156,8 +45,8 @@ def loop(mine, **how):
     """Two lags that follow each other, one of them delayed, with a metric."""
     system = System(**{"stop_time": 3.0, "step": 0.1} | how)
     system.metrics = {"end": "final(a.x)", "mean": "mean(b.x)"}
-    system.add("a", mine("Lag"), x=2.0)
-    system.add("b", mine("Lag"), rate=0.5)
+    system.add("a", mine("LagWithSlope"), x=2.0)
+    system.add("b", mine("LagWithSlope"), rate=0.5)
     system.add("wave", mine("Wave"))
     system.connect("a.x", "b.u")
     system.connect("b.slope", "a.u", offset=0.1)
@@ -263,7 +152,7 @@ def test_random_numbers_go_on(same, mine, kind):
 @pytest.mark.parametrize("kind", ["native", "python", "plain"])
 def test_all_types_and_arrays(same, mine, kind):
     system = System(stop_time=2.0, step=0.1)
-    system.add("it", mine("Types"))
+    system.add("it", mine("TypesAndRow"))
     system.connect("it.m", "it.n", delay=2)
     system.connect("it.off", "it.on")
     one, _ = same(system, 0.7, kind)
@@ -339,7 +228,7 @@ def test_a_resumed_run_may_be_resumed_from_the_same_point(mine, tmp_path):
 def test_a_model_that_fails_does_so_again(mine, tmp_path):
     system = System(stop_time=9.0, step=0.1)
     system.add("lag", mine("Lag"))
-    system.add("bad", mine("Fails"))
+    system.add("bad", mine("Fails"), until=4.0)
     system.connect("lag.x", "bad.u")
     errors, files = [], []
     for go in (lambda: run(system, output=tmp_path, checkpoint_every=1.5), lambda: resume(tmp_path)):

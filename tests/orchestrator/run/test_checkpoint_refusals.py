@@ -4,6 +4,7 @@ import json
 import random
 import shutil
 import zipfile
+from pathlib import Path
 
 import pytest
 from railcosim.orchestrator.errors import FmuError, RailcosimError, ScenarioError
@@ -12,30 +13,12 @@ from railcosim.orchestrator.run.execution import execute, resume, run
 from railcosim.orchestrator.run.results import Results
 from railcosim.orchestrator.system import Event, System
 
-BODY = """
-class Lag(Base):
-    '''A first-order lag.'''
-
-    u = Input("1", 0.25, optional=True)
-    x = State("1", 1.0, output=True)
-
-    def derivatives(self):
-        return {"x": self.u - self.x}
-
-
-class Wave(Base):
-    '''Something that depends on the time alone.'''
-
-    y = Output("1")
-
-    def outputs(self):
-        return {"y": maths.sin(3.0 * self.time)}
-"""
-
 
 @pytest.fixture
-def mine(components):
-    return components(BODY)
+def mine(mine, tmp_path):
+    """A toy out of a file that a test may change."""
+    path = Path(shutil.copy(mine("Lag").rpartition(":")[0], tmp_path / "mine.py"))
+    return lambda cls: f"{path}:{cls}"
 
 
 def pair(mine, **how):

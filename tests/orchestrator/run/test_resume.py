@@ -46,42 +46,12 @@ end = "final(thing[1].x)"
 title = "Both"
 y = ["thing[:].x"]
 """
-BODY = """
-class Thing(Base):
-    '''A first-order lag, with a text if there is to be one.'''
-
-    u = Input("1")
-    x = State("1", 0.0, output=True)
-
-    def derivatives(self):
-        return {"x": self.u - self.x}
-
-
-class Word(Base):
-    '''A text of growing length.'''
-
-    word = Memory("1", "", output=True)
-    n = Memory("1", 0, type=int, output=True)
-
-    def update(self):
-        return {"word": self.word + maths.where(self.n > 0, ", ", "") if self.n else "a", "n": self.n + 1}
-
-
-class Fails(Base):
-    '''Fails at three seconds.'''
-
-    u = Input("1")
-    x = Output("1")
-
-    def outputs(self):
-        return {"x": maths.sqrt(2.95 - self.time) + 0.0 * self.u}
-"""
 
 
 @pytest.fixture
-def scenario(components, tmp_path):
+def scenario(mine, tmp_path):
     path = tmp_path / "things.toml"
-    path.write_text(SCENARIO.format(model=components(BODY)("Thing")))
+    path.write_text(SCENARIO.format(model=mine("Lag")))
     return path
 
 
@@ -97,15 +67,14 @@ def orchestrate(capsys):
     return call
 
 
-def things(components, words=False, **how):
-    model = components(BODY)
+def things(mine, words=False, **how):
     system = System(**{"stop_time": 4.0, "step": 0.1} | how)
     for name, x in (("a", 1.0), ("b", 5.0)):
-        system.add(name, model("Thing"), x=x)
+        system.add(name, mine("Lag"), x=x)
     system.connect("a.x", "b.u")
     system.connect("b.x", "a.u")
     if words:
-        system.add("word", model("Word"))
+        system.add("word", mine("Word"))
     return system
 
 
@@ -125,9 +94,9 @@ def interrupted(system, at, directory, every=1.0, **how):
 @POSIX
 @pytest.mark.parametrize("words", [False, True])
 @pytest.mark.parametrize("record", [None, 0.3])
-def test_after_ctrl_c(components, tmp_path, words, record):
+def test_after_ctrl_c(mine, tmp_path, words, record):
     """The point at which it was stopped stands in the record of rows, though none was due; resumed, it does not."""
-    system = things(components, words, record=record)
+    system = things(mine, words, record=record)
     run(system, kind="plain", output=tmp_path / "whole", figures=False)
     stopped = interrupted(system, 2.59, tmp_path / "parts")
     assert (stopped.status, stopped.time[-1]) == ("interrupted", pytest.approx(2.6))
@@ -165,9 +134,9 @@ def killed(what, directory, until):
 
 
 @POSIX
-def test_after_a_kill_and_a_kill_while_it_was_resumed(components, tmp_path):
+def test_after_a_kill_and_a_kill_while_it_was_resumed(mine, tmp_path):
     """Rows since the last flush are lost with the process, and computed again."""
-    model, out = components(BODY)("Thing"), tmp_path / "out"
+    model, out = mine("Lag"), tmp_path / "out"
     killed(model, out, 3.0)
     first = checkpoint.read_checkpoint(out).time
     assert json.loads((out / "run.json").read_text())["status"] == "running"
@@ -190,9 +159,9 @@ def test_after_a_kill_and_a_kill_while_it_was_resumed(components, tmp_path):
 @POSIX
 @pytest.mark.parametrize("words", [False, True])
 @pytest.mark.parametrize("ended", ["killed", "interrupted"])
-def test_nothing_is_lost_whenever_a_resumed_run_is_killed(components, tmp_path, monkeypatch, words, ended):
+def test_nothing_is_lost_whenever_a_resumed_run_is_killed(mine, tmp_path, monkeypatch, words, ended):
     """After every single step, every renaming and every removal of a file, all rows of before can be read."""
-    system = things(components, words)
+    system = things(mine, words)
     out = tmp_path / "out"
     interrupted(system, 3.0, out, every=1.3)
     if ended == "killed" and not words:  # a run with texts has its results as text from the beginning
@@ -232,10 +201,10 @@ def test_nothing_is_lost_whenever_a_resumed_run_is_killed(components, tmp_path, 
 
 
 @POSIX
-def test_a_stop_before_the_old_end_leaves_the_rows_up_to_there(components, tmp_path):
+def test_a_stop_before_the_old_end_leaves_the_rows_up_to_there(mine, tmp_path):
     """Ctrl-C is an end: what is on the disk is what the record says."""
     out = tmp_path / "out"
-    run(things(components), kind="plain", output=out, checkpoint_every=1.0, figures=False)
+    run(things(mine), kind="plain", output=out, checkpoint_every=1.0, figures=False)
     interrupted_again = []
 
     def press(now, _):
@@ -277,12 +246,8 @@ def test_a_requirement_that_fails_in_the_end_ends_with_1(orchestrate, scenario, 
     assert orchestrate("run", "--resume", out, "-q")[0] == 1
 
 
-def test_a_model_that_fails_ends_with_3_and_says_how_to_go_on(orchestrate, scenario, tmp_path):
-    text = (
-        scenario.read_text()
-        + '[instances."thing[2]"]\n'
-        + f'component = "{tmp_path / "mine.py"}:Fails"\nstart = {{}}\n'
-    )
+def test_a_model_that_fails_ends_with_3_and_says_how_to_go_on(orchestrate, scenario, mine, tmp_path):
+    text = scenario.read_text() + '[instances."thing[2]"]\n' + f'component = "{mine("Fails")}"\nstart.until = 2.95\n'
     scenario.write_text(text.replace("start.x = [1.0, 5.0]\n", ""))
     out = tmp_path / "out"
     for arguments in (

@@ -19,90 +19,6 @@ from railcosim.orchestrator.run.execution import execute, run
 from railcosim.orchestrator.system import Connection, System
 from railcosim.orchestrator.wiring.resolution import Link
 
-BODY = """
-class Lag(Base):
-    '''x' = gain u - x.'''
-
-    gain = Parameter("1", 1.0)
-    u = Input("1", optional=True)
-    x = State("1", 1.0, output=True)
-
-    def derivatives(self):
-        return {"x": self.gain * self.u - self.x}
-
-
-class Mix(Base):
-    '''A linear combination of three signals, at one instant.'''
-
-    a = Parameter("1", 0.0)
-    b = Parameter("1", 0.0)
-    c = Parameter("1", 0.0)
-    bias = Parameter("1", 1.0)
-    u = Input("1", optional=True)
-    v = Input("1", optional=True)
-    w = Input("1", optional=True)
-    y = Output("1")
-
-    def outputs(self):
-        return {"y": self.a * self.u + self.b * self.v + self.c * self.w + self.bias * (1.0 + self.time)}
-
-
-class Relay(Base):
-    '''On below a level.'''
-
-    level = Parameter("1", 1.0)
-    u = Input("1", optional=True)
-    on = Output("1", bool)
-
-    def outputs(self):
-        return {"on": self.u < self.level}
-
-
-class Heater(Base):
-    '''Rises while on.'''
-
-    on = Input("1", False, optional=True)
-    x = State("1", 0.0, output=True)
-
-    def derivatives(self):
-        return {"x": maths.where(self.on, 1.0, -1.0)}
-
-
-class Root(Base):
-    '''y = 1 - gain sqrt(u).'''
-
-    gain = Parameter("1", 1.0)
-    u = Input("1", 0.04, optional=True)
-    x = State("1", 0.0)
-    y = Output("1")
-
-    def derivatives(self):
-        return {"x": 1.0}
-
-    def outputs(self):
-        return {"y": 1.0 + self.x - self.gain * maths.sqrt(self.u)}
-
-
-class Sampler(Base):
-    '''Its input at the begin of the step.'''
-
-    u = Input("1", optional=True)
-    seen = Memory("1", -1.0, output=True)
-    y = Output("1")
-
-    def outputs(self):
-        return {"y": 2.0 * self.u}
-
-    def update(self):
-        return {"seen": self.u}
-"""
-
-
-@pytest.fixture
-def mine(components):
-    return components(BODY)
-
-
 # -------------------------------------------------------------------- from what was tried to what is tried next
 
 
@@ -323,7 +239,7 @@ def test_truth_values_are_repeated_too(mine):
     it = System(stop_time=1.0, step=0.3, algorithm="iterative", record=0.3)
     it.stop_time = 0.9
     it.add("heater", mine("Heater"), x=0.0)
-    it.add("relay", mine("Relay"), level=-1.0)
+    it.add("relay", mine("Level"), upside_down=True, level=-1.0)
     it.connect("heater.x", "relay.u")
     it.connect("relay.on", "heater.on")
     outcome = run(it, kind="plain")
@@ -335,7 +251,7 @@ def test_truth_values_that_flip_for_ever_are_said_to(mine):
     """On, it ends too high for being on; off, too low for being off."""
     it = System(stop_time=0.9, step=0.3, algorithm="iterative", max_iterations=7)
     it.add("heater", mine("Heater"), x=0.0)
-    it.add("relay", mine("Relay"), level=0.1)
+    it.add("relay", mine("Level"), upside_down=True, level=0.1)
     it.connect("heater.x", "relay.u")
     it.connect("relay.on", "heater.on")
     with pytest.raises(CouplingError) as caught:

@@ -1,4 +1,4 @@
-"""Native FMUs follow their inputs along the time derivatives that the importer gives for a step."""
+"""inputs.c: inputs that move within a step by given derivatives, what is seen after it, and what is saved."""
 
 import ctypes
 import itertools
@@ -7,14 +7,8 @@ import math
 from ctypes import c_double, c_int, c_size_t, c_uint
 from fractions import Fraction
 
-import fmpy
 import numpy as np
 import pytest
-from lxml import etree
-from railcosim.components import PointMassTrain
-from railcosim.fmus.build import build
-from railcosim.fmus.description import write
-from railcosim.fmus.references import resolve
 from scipy.integrate import solve_ivp
 
 OK, ERROR = 0, 3
@@ -23,26 +17,6 @@ TIMES = (0.0, 0.7, 0.95, 2.0, 3.5)
 COURSE = (0.375, -1.25, 0.5, 2.0)
 """Value and time derivatives of an input at time zero."""
 
-INTEGRATORS = """
-from railcosim.components import Component, Input, Output, Parameter, State
-class C(Component):
-    "Integrators of their inputs."
-    gain = Parameter("1", 1.0)
-    slack = Parameter("1", 1.0, tunable=True)
-    u = Input("1", 0.0)
-    w = Input("1", [0.0, 0.0], shape=(2,))
-    count = Input("1", 0, type=int)
-    door = Input("1", False)
-    label = Input("1", "none")
-    x = State("1", 0.0, output=True)
-    z = State("1", 0.0, shape=(2,), output=True)
-    y = Output("1", description="of the input at this instant")
-    late = Output("1", description="of the state at this instant")
-    def derivatives(self):
-        return {"x": self.gain * self.u, "z": self.w}
-    def outputs(self):
-        return {"y": 2.0 * self.u + self.w[0], "late": 3.0 * self.x}
-"""
 SPRING = """
 from railcosim.components import Component, Input, State
 class C(Component):
@@ -69,24 +43,6 @@ class C(Component):
     def update(self):
         return {"total": self.total + self.u}
 """
-NINE = """
-from railcosim.components import Component, Input, State
-class C(Component):
-    "Nine integrators."
-    u = Input("1", shape=(9,))
-    x = State("1", 0.0, shape=(9,), output=True)
-    def derivatives(self):
-        return {"x": self.u}
-"""
-TEXTS_ONLY = """
-from railcosim.components import Component, Input, Output
-class C(Component):
-    "Has inputs, but none that is a real number."
-    count = Input("1", 0, type=int)
-    y = Output("1")
-    def outputs(self):
-        return {"y": 2.0 * self.count}
-"""
 
 
 def derivatives(course, t):
@@ -103,11 +59,6 @@ def integral(course, t):
     return float(sum(Fraction(c) * Fraction(t) ** (k + 1) / math.factorial(k + 1) for k, c in enumerate(course)))
 
 
-def near(value):
-    """Up to a few roundings of the sub-steps."""
-    return pytest.approx(value, rel=1e-14)
-
-
 def follow(fmu, name, course, times, given):
     """Steps between the times with the value set at each, and the derivatives too where ``given`` says so."""
     for begin, end in itertools.pairwise(times):
@@ -116,12 +67,6 @@ def follow(fmu, name, course, times, given):
         if given:
             assert fmu.set_derivatives(name, *rates) == OK, fmu.said
         assert fmu.step(end - begin) == OK, fmu.said
-
-
-@pytest.fixture
-def integrators(load, write_component):
-    path = write_component(INTEGRATORS, name="integrators.py")
-    return lambda: load(path)
 
 
 @pytest.fixture
@@ -135,7 +80,7 @@ def sampler(load, write_component):
 
 @pytest.mark.parametrize("max_step", [0.0, 0.2])
 @pytest.mark.parametrize("degree", range(MAX_ORDER + 1))
-def test_the_integral_of_a_polynomial_is_exact(integrators, degree, max_step):
+def test_the_integral_of_a_polynomial_is_exact(integrators, degree, max_step, near):
     """Runge-Kutta of fourth order is Simpson's rule here: exact to the third degree, over steps of any length."""
     course = COURSE[: degree + 1]
     expected = integral(course, TIMES[-1])
@@ -148,7 +93,7 @@ def test_the_integral_of_a_polynomial_is_exact(integrators, degree, max_step):
     assert (abs(sums - expected) > 0.1) == (degree > 0)
 
 
-def test_inputs_may_differ_in_order_and_need_not_have_any(integrators):
+def test_inputs_may_differ_in_order_and_need_not_have_any(integrators, near):
     fmu = integrators().initialize()
     for name, value in (("u", 1.0), ("w[1]", 2.0), ("w[2]", 3.0)):
         fmu.set(name, value)
@@ -160,7 +105,7 @@ def test_inputs_may_differ_in_order_and_need_not_have_any(integrators):
     assert [fmu.get(name) for name in ("u", "w[1]", "w[2]")] == [-3.0, 2.0, 3.0 + 8.0 + 12.0]
 
 
-def test_the_course_does_not_depend_on_how_late_it_is(integrators):
+def test_the_course_does_not_depend_on_how_late_it_is(integrators, near):
     """The time within the step is counted from its beginning: nothing cancels a year after the start."""
     year, h = 3.2e7, 1.0 / 3.0
     fmu = integrators().initialize(start=year)
@@ -205,7 +150,7 @@ def test_an_oscillator_follows_the_course_of_its_foot(load, write_component):
 # ---------------------------------------------------------------- what is seen after the step
 
 
-def test_after_a_step_everything_belongs_to_the_value_that_the_input_reached(integrators):
+def test_after_a_step_everything_belongs_to_the_value_that_the_input_reached(integrators, near):
     fmu = integrators().initialize(gain=3.0)
     fmu.set("u", 1.0)
     fmu.set("w[1]", 10.0)
@@ -217,7 +162,7 @@ def test_after_a_step_everything_belongs_to_the_value_that_the_input_reached(int
     assert fmu.get("late") == 3.0 * fmu.get("x")
 
 
-def test_derivatives_serve_one_step(integrators):
+def test_derivatives_serve_one_step(integrators, near):
     fmu = integrators().initialize()
     fmu.set("u", 1.0)
     fmu.set_derivatives("u", 4.0, 2.0)
@@ -235,7 +180,7 @@ def test_derivatives_serve_one_step(integrators):
     assert (fmu.get("u"), fmu.get("x")) == (0.5, near(x + 0.5))
 
 
-def test_value_and_derivatives_may_be_set_in_either_order_and_the_last_word_counts(integrators):
+def test_value_and_derivatives_may_be_set_in_either_order_and_the_last_word_counts(integrators, near):
     first, second = (integrators().initialize() for _ in range(2))
     first.set("u", 2.0)
     first.set_derivatives("u", 1.0, 6.0)
@@ -260,7 +205,7 @@ def test_derivatives_that_are_zero_hold_the_input(integrators):
     assert rows[:5] == rows[5:]
 
 
-def test_derivatives_given_before_the_run_serve_the_first_step(integrators):
+def test_derivatives_given_before_the_run_serve_the_first_step(integrators, near):
     for phase in ("instantiated", "initialization"):
         fmu = integrators()
         if phase == "instantiated":
@@ -275,7 +220,7 @@ def test_derivatives_given_before_the_run_serve_the_first_step(integrators):
         assert fmu.get("x") == near(2.0)
 
 
-def test_a_step_that_is_refused_leaves_the_derivatives_to_the_next(integrators):
+def test_a_step_that_is_refused_leaves_the_derivatives_to_the_next(integrators, near):
     fmu = integrators().initialize()
     fmu.set_derivatives("u", 2.0)
     assert fmu.step(-1.0) == fmu.step(1.0, at=5.0) == ERROR
@@ -286,7 +231,7 @@ def test_a_step_that_is_refused_leaves_the_derivatives_to_the_next(integrators):
 # ---------------------------------------------------------------- sampled components
 
 
-def test_a_sampled_component_samples_the_course(sampler):
+def test_a_sampled_component_samples_the_course(sampler, near):
     """Four samples in a step of 1 s; a feed-through output is that of the last one, the rest is of the step's end."""
     fmu = sampler().initialize()
     fmu.set("u", 1.0)
@@ -305,7 +250,7 @@ def test_a_sampled_component_samples_the_course(sampler):
     assert fmu.get("total") == sum(u(0.25 * k) for k in range(4)) + 4 * 7.0
 
 
-def test_a_component_sampled_once_a_step_samples_the_beginning(sampler):
+def test_a_component_sampled_once_a_step_samples_the_beginning(sampler, near):
     fmu = sampler().initialize(sample_time=0.0)
     fmu.set("u", 1.0)
     fmu.set_derivatives("u", 2.0)
@@ -336,7 +281,7 @@ def test_a_tape_takes_the_time_along_the_trip_as_it_is_given(load, sample, tmp_p
 # ---------------------------------------------------------------- saved states
 
 
-def test_a_saved_state_holds_the_derivatives(integrators):
+def test_a_saved_state_holds_the_derivatives(integrators, near):
     fmu, other = integrators().initialize(), integrators().initialize()
     fmu.set("u", 1.0)
     plain = fmu.save()
@@ -361,7 +306,7 @@ def test_a_saved_state_holds_the_derivatives(integrators):
         fmu.FreeFMUstate(ctypes.byref(one))
 
 
-def test_a_step_is_repeated_with_other_derivatives(integrators):
+def test_a_step_is_repeated_with_other_derivatives(integrators, near):
     """What an iterating master does."""
     fmu = integrators().initialize()
     follow(fmu, "u", COURSE, TIMES[:3], given=True)
@@ -394,7 +339,7 @@ def test_the_state_after_a_step_does_not_remember_the_derivatives(integrators):
 
 
 @pytest.mark.parametrize("after", ["giving them", "a step"])
-def test_reset_clears_the_derivatives(integrators, after):
+def test_reset_clears_the_derivatives(integrators, after, near):
     fmu = integrators().initialize()
     fmu.set_derivatives("u", 2.0, 3.0, 4.0)
     if after == "a step":
@@ -403,122 +348,3 @@ def test_reset_clears_the_derivatives(integrators, after):
     fmu.initialize(u=1.0)
     assert fmu.step(1.0) == OK
     assert (fmu.get("u"), fmu.get("x")) == (1.0, near(1.0))
-
-
-# ---------------------------------------------------------------- what is refused
-
-
-def give(fmu, references, orders, values):
-    count = len(references)
-    return fmu.SetRealInputDerivatives(
-        (c_uint * count)(*references), c_size_t(count), (c_int * count)(*orders), (c_double * count)(*values)
-    )
-
-
-@pytest.mark.parametrize(
-    ("name", "order", "value", "said"),
-    [
-        ("u", 0, 1.0, "u takes derivatives of the orders 1 to 3, not 0"),
-        ("u", -1, 1.0, "not -1"),
-        ("u", 4, 1.0, "not 4"),
-        ("u", 2**31 - 1, 1.0, "not 2147483647"),
-        ("u", 1, math.nan, "u takes a finite derivative, not"),
-        ("w[2]", 2, math.inf, "w[2] takes a finite derivative, not inf"),
-        ("u", 3, -math.inf, "finite"),
-        ("x", 1, 1.0, "x is no input"),
-        ("y", 1, 1.0, "y is no input"),
-        ("gain", 1, 1.0, "gain is no input"),
-        ("slack", 1, 1.0, "slack is no input"),
-        ("der(x)", 1, 1.0, "a rate is no input"),
-        ("count", 1, 1.0, "count is of another type"),
-        ("door", 1, 1.0, "door is of another type"),
-        ("label", 1, 1.0, "label is of another type"),
-        (999, 1, 1.0, "no variable with value reference 999"),
-        (2**32 - 1, 1, 1.0, "no variable with value reference 4294967295"),
-    ],
-)
-def test_what_is_no_derivative_of_an_input_is_refused_and_nothing_is_taken(integrators, name, order, value, said):
-    fmu = integrators().initialize(u=1.0)
-    reference = fmu.references.get(name, name)
-    assert give(fmu, [fmu.references["u"], reference], [1, order], [5.0, value]) == ERROR
-    assert "fmi2SetRealInputDerivatives: " in fmu.said
-    assert said in fmu.said
-    assert fmu.step(1.0) == OK
-    assert (fmu.get("u"), fmu.get("x")) == (1.0, near(1.0))
-
-
-def test_no_derivatives_need_no_arrays_and_some_do(integrators):
-    fmu = integrators().initialize()
-    some, orders, values = (c_uint * 1)(fmu.references["u"]), (c_int * 1)(1), (c_double * 1)(1.0)
-    assert fmu.SetRealInputDerivatives(None, c_size_t(0), None, None) == OK
-    for arrays in ((None, orders, values), (some, None, values), (some, orders, None)):
-        assert fmu.SetRealInputDerivatives(arrays[0], c_size_t(1), *arrays[1:]) == ERROR
-        assert "fmi2SetRealInputDerivatives: NULL" in fmu.said
-    assert fmu.SetRealInputDerivatives(some, c_size_t(1), orders, values) == OK
-
-
-@pytest.mark.parametrize("phase", ["terminated", "error"])
-def test_there_is_no_step_to_come_after_the_end(integrators, phase):
-    fmu = integrators().initialize()
-    if phase == "terminated":
-        assert fmu.Terminate() == OK
-    else:
-        fmu.set_derivatives("u", 1e308, 1e308)
-        assert fmu.step(1e3) == ERROR
-    assert fmu.set_derivatives("u", 1.0) == ERROR
-    assert "fmi2SetRealInputDerivatives is not allowed while the instance is" in fmu.said
-
-
-@pytest.mark.parametrize("rates", [(1e308,), (0.0, -1e308), (1e306, -2e303)])
-def test_an_input_that_would_leave_all_numbers_is_an_error_that_names_it(integrators, rates):
-    fmu = integrators().initialize()
-    state = fmu.save()
-    assert fmu.set_derivatives("w[2]", *rates) == OK
-    assert fmu.step(1e3) == ERROR
-    assert "the derivatives given for w[2] take it beyond all numbers" in fmu.said
-    assert fmu.SetFMUstate(state) == OK
-    assert fmu.step(1e3) == OK
-    assert fmu.get("w[2]") == 0.0
-    fmu.FreeFMUstate(ctypes.byref(state))
-
-
-# ---------------------------------------------------------------- what is declared, and another tool
-
-
-def declared(component, kind):
-    return etree.fromstring(write(component, kind, "0" * 64)).find("CoSimulation").get("canInterpolateInputs")
-
-
-def test_native_fmus_with_real_inputs_declare_it(write_component):
-    without = resolve(write_component(TEXTS_ONLY))()
-    assert declared(PointMassTrain(), "native") == "true"
-    assert declared(PointMassTrain(), "python") is None
-    assert declared(without, "native") is None
-
-
-def test_a_component_without_real_inputs_has_none_to_move(load, write_component):
-    fmu = load(write_component(TEXTS_ONLY)).initialize()
-    assert fmu.SetRealInputDerivatives(None, c_size_t(0), None, None) == OK
-    assert fmu.set_derivatives("count", 1.0) == ERROR
-    assert fmu.step() == OK
-
-
-def test_fmpy_gives_derivatives(write_component):
-    """Straight lines between rows far apart: their integral.
-
-    FMPy 0.3.32 can do it for nine inputs, no more and no less, and not at the first row.
-    """
-    names = [f"u[{k}]" for k in range(1, 10)]
-    rows = [(t, *(k * t for k in range(1, 10))) for t in (-4.0, 4.0)]
-    signals = np.array(rows, dtype=[("time", float), *((name, float) for name in names)])
-    result = fmpy.simulate_fmu(
-        str(build(write_component(NINE), kind="native")),
-        stop_time=4.0,
-        output_interval=1.0,
-        input=signals,
-        output=[*names, *(f"x[{k}]" for k in range(1, 10))],
-        set_input_derivatives=True,
-    )
-    for k in range(1, 10):
-        assert result[f"x[{k}]"] == pytest.approx(k * result["time"] ** 2 / 2.0, rel=1e-14)
-        assert result[f"u[{k}]"].tolist() == (k * result["time"]).tolist()  # read after the step

@@ -1,0 +1,95 @@
+"""What the tests of the compiled loop share: how often it was used, its results and those of Python, a ring."""
+
+from types import SimpleNamespace
+
+import pytest
+from railcosim.orchestrator.errors import FmuError
+from railcosim.orchestrator.master import compiled
+from railcosim.orchestrator.master.loop import Master
+from railcosim.orchestrator.run.checking import check
+from railcosim.orchestrator.run.execution import run
+from railcosim.orchestrator.system import System
+
+
+@pytest.fixture
+def used(monkeypatch):
+    """How many blocks the kernel took."""
+    kernel, calls = compiled.kernel, []
+
+    def counted(*arguments):
+        calls.append(arguments)
+        return kernel.run(*arguments)
+
+    monkeypatch.setattr(compiled, "kernel", SimpleNamespace(run=counted, HAS_THREADS=compiled.kernel.HAS_THREADS))
+    return calls
+
+
+@pytest.fixture
+def both(monkeypatch, used):
+    """Run a system twice, compiled and in Python; gives the first result when the two are the same to the bit."""
+
+    def go(system, **how):
+        fast = _attempt(system, **how)
+        assert used, "the kernel was not used"
+        with monkeypatch.context() as patch:
+            patch.setattr(compiled, "kernel", None)
+            slow = _attempt(system, **how)
+        assert _described(fast.error) == _described(slow.error)
+        assert fast.status == slow.status
+        assert _contents(fast) == _contents(slow)
+        return fast
+
+    return go
+
+
+def _attempt(system, **how):
+    try:
+        return run(system, **how)
+    except FmuError as error:
+        return error.run
+
+
+def _described(error):
+    return error and (str(error), error.instance, error.time, error.status, error.log)
+
+
+@pytest.fixture(scope="session")
+def contents():
+    """All that a result holds, as bytes."""
+    return _contents
+
+
+def _contents(result):
+    return [("time", result.time.tobytes()), *((name, result[name].tobytes()) for name in result.names())]
+
+
+@pytest.fixture(scope="session")
+def ring():
+    """Makes systems of instances in a ring, in every type an FMU of odd.c has."""
+
+    def make(model, count, stop=10.0, **how):
+        system = System(**{"stop_time": stop, "step": 0.25, "algorithm": "jacobi"} | how)
+        for k in range(count):
+            system.add(f"odd[{k}]", model)
+        for k in range(count):
+            before, own = f"odd[{k - 1 if k else count - 1}]", f"odd[{k}]"
+            system.connect(f"{before}.x", f"{own}.u", offset=1.0 + 0.1 * k)
+            system.connect(f"{before}.n", f"{own}.m", delay=1)
+            system.connect(f"{before}.off", f"{own}.on")
+        return system
+
+    return make
+
+
+@pytest.fixture
+def instantiated(workspace):
+    """Makes the instances of a system, ready to step."""
+
+    def make(system):
+        checked = check(system, workspace)
+        slaves = {name: model.instantiate(name) for name, model in checked.models.items()}
+        master = Master(slaves, checked.order.sequence, checked.wiring.links, checked.wiring.starts, system.algorithm)
+        master.initialize(system.start_time, 1e9)
+        return master
+
+    return make

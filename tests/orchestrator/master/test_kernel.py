@@ -1,0 +1,213 @@
+"""kernel.c, stepping.c and team.c: what they are given is checked, and the compiler and its sanitizers find nothing."""
+
+import os
+import shutil
+import subprocess
+import sys
+import sysconfig
+from pathlib import Path
+
+import numpy as np
+import pytest
+from railcosim.orchestrator.master import compiled
+from railcosim.orchestrator.master.compiled import CompiledLoop
+
+MASTER = Path(__file__).parents[3] / "orchestrator" / "master"
+FOREIGN = Path(__file__).parents[1] / "foreign"
+GCC = shutil.which("gcc")
+pytestmark = [
+    pytest.mark.skipif(compiled.kernel is None, reason="installed without the compiled step loop"),
+    pytest.mark.skipif(not sys.platform.startswith("linux"), reason="FMUs by hand are compiled for Linux here"),
+    pytest.mark.skipif(GCC is None, reason="FMUs by hand need gcc"),
+]
+
+
+# -------------------------------------------------------------------- what the kernel is given
+
+NAMES = (
+    "operations parts channels instances entries references changes values history newest rows every start step first "
+    "count last begin"
+)
+
+
+@pytest.fixture
+def arguments(workspace, odd, ring, instantiated):
+    """What the kernel is called with for a ring, by name."""
+    master = instantiated(ring(odd, 3))
+    plan = [array.copy() for array in CompiledLoop(master.coupling, master.algorithm)._plan]
+    values = np.array(master.values)
+    changes = np.zeros(1, compiled._CHANGES)
+    rows = np.empty((8, len(values) + 1))
+    given = [*plan, changes, values, np.tile(values, (2, 1)), 1, rows, 1, 0.0, 0.25, 0, 4, 4, 0]
+    yield dict(zip(NAMES.split(), given, strict=True))
+    for slave in master.slaves.values():
+        slave.free()
+
+
+def call(arguments, **changed):
+    return compiled.kernel.run(*(arguments | changed).values())
+
+
+def test_a_sound_plan(arguments):
+    assert call(arguments) == (4, 4, -1, 0, 1)
+    assert list(arguments["rows"][:4, 0]) == [0.25, 0.5, 0.75, 1.0]
+    assert call(arguments, count=0) == (0, 0, -1, 0, 1)
+
+
+def test_a_block_ends_where_there_is_no_room_for_a_row(arguments):
+    assert call(arguments, rows=arguments["rows"][:2])[:2] == (2, 2)
+    assert call(arguments, rows=arguments["rows"][:0])[:2] == (0, 0)
+    assert call(arguments, rows=arguments["rows"][:1], every=3, last=100)[:2] == (4, 1)
+    assert call(arguments, rows=arguments["rows"][:1], every=3, last=100, count=9)[:2] == (5, 1)
+    assert call(arguments, rows=arguments["rows"][:0], every=100, last=100)[:2] == (4, 0)
+
+
+def changed(array, field, value, at=0):
+    result = array.copy()
+    result[field][at] = value
+    return result
+
+
+WRONG = {
+    "a place beyond the values": lambda a: {"entries": changed(a["entries"], "place", 10**6)},
+    "a negative place": lambda a: {"entries": changed(a["entries"], "place", -1)},
+    "outputs that are not side by side": lambda a: {"entries": changed(a["entries"], "place", 0, 10)},
+    "an age beyond the history": lambda a: {"entries": changed(a["entries"], "age", 2)},
+    "a huge age": lambda a: {"entries": changed(a["entries"], "age", 2**62)},
+    "a negative age": lambda a: {"entries": changed(a["entries"], "age", -2)},
+    "a history that is not there": lambda a: {"history": np.empty((0, len(a["values"]))), "newest": 0},
+    "half a row of history": lambda a: {"history": a["history"].ravel()[:-1]},
+    "a newest row beyond the history": lambda a: {"newest": 2},
+    "a negative newest row": lambda a: {"newest": -1},
+    "a channel that begins nowhere": lambda a: {"channels": changed(a["channels"], "begin", -1)},
+    "a channel that begins too late": lambda a: {"channels": changed(a["channels"], "begin", 10**6)},
+    "a channel that is too long": lambda a: {"channels": changed(a["channels"], "count", 2**62)},
+    "a channel of negative length": lambda a: {"channels": changed(a["channels"], "count", -1)},
+    "a channel without function": lambda a: {"channels": changed(a["channels"], "function", 0)},
+    "a step without function": lambda a: {"instances": changed(a["instances"], "function", 0)},
+    "an unknown operation": lambda a: {"operations": changed(a["operations"], "kind", 4)},
+    "an unknown change": lambda a: {"entries": changed(a["entries"], "change", 1)},
+    "a negative change": lambda a: {"entries": changed(a["entries"], "change", -2)},
+    "a change beyond the changes": lambda a: {
+        "operations": changed(changed(a["operations"], "kind", 3), "index", 1),
+    },
+    "a change of no value": lambda a: {
+        "operations": changed(changed(a["operations"], "kind", 3), "index", 0),
+        "changes": changed(a["changes"], "place", 10**6),
+    },
+    "an operation that is never due": lambda a: {"operations": changed(a["operations"], "period", 0)},
+    "a phase beyond the period": lambda a: {"operations": changed(a["operations"], "phase", 1)},
+    "a negative phase": lambda a: {"operations": changed(a["operations"], "phase", -1)},
+    "no parts": lambda a: {"parts": a["parts"][:0]},
+    "parts that do not end with the operations": lambda a: {"parts": a["parts"] - 1},
+    "parts that go back": lambda a: {"parts": np.array([3, 2, 3, len(a["operations"])])},
+    "an odd number of parts": lambda a: {"parts": np.array([1, 2, len(a["operations"])])},
+    "a negative part": lambda a: {"parts": np.array([-1, 2, 3, len(a["operations"])])},
+    "a begin before the first operation": lambda a: {"begin": -1},
+    "a negative operation": lambda a: {"operations": changed(a["operations"], "kind", -1)},
+    "an unknown channel": lambda a: {"operations": changed(a["operations"], "index", 10**6)},
+    "a negative channel": lambda a: {"operations": changed(a["operations"], "index", -1)},
+    "fewer references than entries": lambda a: {"references": a["references"][:-1]},
+    "half an entry": lambda a: {"entries": np.frombuffer(a["entries"].tobytes()[:-8], np.uint8)},
+    "values that are not aligned": lambda a: {"values": np.zeros(801, np.uint8)[1:]},
+    "rows of nothing": lambda a: {"every": 0},
+    "a negative number of rows": lambda a: {"every": -1},
+    "a negative step number": lambda a: {"first": -1},
+    "a negative number of steps": lambda a: {"count": -1},
+    "steps beyond all numbers": lambda a: {"first": 2**62, "count": 2**63 - 1},
+}
+
+
+@pytest.mark.parametrize("wrong", WRONG)
+def test_a_plan_that_is_not_sound_is_refused(arguments, wrong):
+    with pytest.raises(ValueError, match=r"^kernel: "):
+        call(arguments, **WRONG[wrong](arguments))
+
+
+def test_what_is_not_an_array_is_refused(arguments):
+    frozen = arguments["values"].copy()
+    frozen.flags.writeable = False
+    for wrong in (None, [1.0], "now", b"12345678", frozen, np.zeros(200)[::2]):
+        with pytest.raises(TypeError):
+            call(arguments, values=wrong)
+    with pytest.raises(TypeError):
+        call(arguments, start="now")
+    with pytest.raises(OverflowError):
+        call(arguments, count=2**64)
+
+
+# -------------------------------------------------------------------- the compiler's and the sanitizers' word
+
+
+def compile_kernel(target, *flags):
+    command = [GCC, "-Wall", "-Wextra", "-Wconversion", "-Wshadow", "-Werror", "-ffp-contract=off", "-shared", "-fPIC"]
+    sources = [MASTER / name for name in ("kernel.c", "stepping.c", "team.c")]
+    command += [f"-I{sysconfig.get_paths()['include']}", *flags, *sources, "-o", target]
+    subprocess.run(command, check=True)
+    return target
+
+
+@pytest.mark.parametrize("flags", [["-O2"], ["-O3", "-std=c11"]])
+def test_the_compiler_has_nothing_to_say(tmp_path, flags):
+    compile_kernel(tmp_path / "kernel.so", *flags)
+
+
+PARTS = ("test_compiled.py", "test_compiled_blocks.py", "test_kernel.py")
+SANITIZERS = {
+    ("address", "undefined"): (
+        "not sanitized and not compiler and not ctrl_c and not without_the_extension and not short_in_time"
+    ),
+    ("thread",): "threads_give or several_threads",
+}
+"""Which of the tests of the compiled loop run under which sanitizers."""
+
+
+@pytest.mark.long
+@pytest.mark.parametrize("sanitizers", SANITIZERS, ids="+".join)
+def test_sanitized(tmp_path, sanitizers):
+    """The tests of the compiled loop under the compiler's sanitizers."""
+    flags = "-g", "-O1", f"-fsanitize={','.join(sanitizers)}", "-fno-sanitize-recover"
+    library = compile_kernel(tmp_path / "kernel.so", *flags)
+    (tmp_path / "sanitized.py").write_text(SANITIZED)
+    preload = [
+        subprocess.run(
+            [GCC, f"-print-file-name=lib{name}.so"], check=True, capture_output=True, text=True
+        ).stdout.strip()
+        for name in (f"{sanitizer[0] if sanitizer != 'undefined' else 'ub'}san" for sanitizer in sanitizers)
+    ]
+    chosen = SANITIZERS[sanitizers]
+    command = [sys.executable, "-m", "pytest", "-p", "sanitized", "-p", "no:cacheprovider", "-n", "0", "-k", chosen]
+    environment = os.environ | {
+        "KERNEL": str(library),
+        "PYTHONPATH": str(tmp_path),
+        "LD_PRELOAD": ":".join(preload),
+        "ASAN_OPTIONS": "detect_leaks=0",
+        "UBSAN_OPTIONS": "print_stacktrace=1",
+        "PYTHONMALLOC": "malloc",
+    }
+    done = subprocess.run(
+        [*command, *(Path(__file__).resolve().with_name(name) for name in PARTS)],
+        env=environment,
+        check=False,
+        capture_output=True,
+        text=True,
+        cwd=FOREIGN.parents[2],
+    )
+    assert done.returncode == 0, done.stdout[-3000:] + done.stderr[-3000:]
+    assert "passed" in done.stdout
+    assert "WARNING: ThreadSanitizer" not in done.stderr + done.stdout
+    assert "runtime error" not in done.stderr + done.stdout
+
+
+SANITIZED = """
+import importlib.util, os, sys
+spec = importlib.util.spec_from_file_location("railcosim.orchestrator.master.kernel", os.environ["KERNEL"])
+module = importlib.util.module_from_spec(spec)
+spec.loader.exec_module(module)
+sys.modules["railcosim.orchestrator.master.kernel"] = module
+
+
+def pytest_sessionfinish():
+    from railcosim.orchestrator.master import compiled
+    assert compiled.kernel is module
+"""
