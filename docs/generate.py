@@ -84,12 +84,12 @@ def mathml(latex: str, *, block: bool = False) -> str:
     """A formula as MathML.
 
     Raises:
-        ValueError: it has a command that is not known.
+        ValueError: it has a command, or a sign of alignment, that would show as it is written.
     """
     found = convert(latex, display="block" if block else "inline")
-    if "\\" in found:
+    if "\\" in found or "&amp;" in found or "$" in found:
         raise ValueError(f"the formula {latex!r} has a command that cannot be translated")
-    return found
+    return f'<div class="formula">{found}</div>' if block else found
 
 
 def overview() -> str:
