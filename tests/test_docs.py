@@ -177,6 +177,14 @@ def test_links_and_pictures_of_a_page_exist(page: Path) -> None:
     assert missing == []
 
 
+def test_pages_that_code_refers_to_exist() -> None:
+    files = [path for folder in (*PACKAGES, "tests", "benchmarks") for path in (ROOT / folder).rglob("*.*")]
+    texts = {path: path.read_text(encoding="utf-8") for path in files if path.suffix in (".py", ".c", ".h", ".toml")}
+    cited = {(path.name, page) for path, text in texts.items() for page in re.findall(r"\bdocs/[\w/]+\.md\b", text)}
+    assert len(cited) > 15
+    assert [(name, page) for name, page in cited if not (ROOT / page).is_file()] == []
+
+
 @pytest.mark.parametrize("page", PAGES, ids=lambda page: page.name)
 def test_every_command_a_page_mentions_is_one_of_orchestrate(page: Path) -> None:
     """`orchestrate new ...` in running text and tables: the command exists, and so do its options."""
