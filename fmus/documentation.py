@@ -63,7 +63,7 @@ def _page(component: Component, kind: FmuKind, signals: dict[str, str]) -> str:
         f"<p>Source: {html.escape(cls.source or 'own')}. Build arguments: "
         f"<code>{html.escape(arguments(component))}</code>. Kind: {kind} ({NOTE_OF_KIND[kind]}). "
         f'<a href="licenses/license.txt">Licence</a>.</p>'
-        f"<h2>Stepping</h2><ul>{''.join(f'<li>{html.escape(line)}</li>' for line in _stepping(component))}</ul>"
+        f"<h2>Stepping</h2><ul>{''.join(f'<li>{html.escape(line)}</li>' for line in stepping(component))}</ul>"
         f"<h2>Reference signals</h2><p>{_signals(signals)}</p>"
         f"<h2>Interface</h2><table><tr><th>name</th><th>causality</th><th>variability</th><th>unit or type</th>"
         f"<th>start</th><th>description</th></tr>{rows}</table></body></html>\n"
@@ -86,7 +86,7 @@ def _start(component: Component, name: str, element: int | None) -> str:
     return html.escape(str(value if element is None else np.ravel(value)[element]))
 
 
-def _stepping(component: Component) -> list[str]:
+def stepping(component: Component) -> list[str]:
     """What the importing tool must do about step and order, one sentence or two for each."""
     longest, values = type(component).recommended_step, component.present_values
     lines = [f"Recommended communication step: {longest:g} s or shorter."] if longest else []

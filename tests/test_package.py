@@ -2,6 +2,7 @@
 
 import json
 import os
+import re
 import shutil
 import subprocess
 import sys
@@ -134,6 +135,42 @@ def test_the_wheel_holds_what_fmus_are_made_of(wheel: Path) -> None:
     files = {path for folder in ("runtime", "resources") for path in (ROOT / "fmus" / folder).glob("*.*")}
     wanted = {f"railcosim/{path.relative_to(ROOT).as_posix()}" for path in files if path.suffix not in (".py", ".pyc")}
     assert wanted - names == set()
+
+
+@pytest.mark.long
+def test_the_wheel_runs_a_scenario_in_a_fresh_environment(wheel: Path, tmp_path: Path) -> None:
+    """Installed with what it depends on and nothing else; the compiled loop is in it, and its numbers are ours."""
+    subprocess.run([sys.executable, "-m", "venv", str(tmp_path / "fresh")], check=True)
+    programs = tmp_path / "fresh" / ("Scripts" if sys.platform == "win32" else "bin")
+    environment = {k: v for k, v in os.environ.items() if k not in ("PYTHONPATH", "MYPYPATH", "VIRTUAL_ENV")}
+    environment["RAILCOSIM_CACHE"] = str(tmp_path / "cache")
+
+    def do(*command: object) -> str:
+        called = [str(word) for word in command]
+        done = subprocess.run(called, cwd=tmp_path, env=environment, capture_output=True, text=True, check=False)
+        assert done.returncode == 0, done.stdout + done.stderr
+        return done.stdout
+
+    do(programs / "python", "-m", "pip", "install", "--quiet", wheel)
+    kernel = do(programs / "python", "-c", "import railcosim.orchestrator.master.kernel as k; print(k.__file__)")
+    assert Path(kernel.strip()).is_relative_to(tmp_path / "fresh")
+    report = do(programs / "orchestrate", "run", "comfort_cruise", "--no-figures", "--output", "out")
+    assert "4 of 4 requirements pass" in report
+    assert "10 Python FMUs" in report  # no CasADi there
+    here = [sys.executable, "-m", "railcosim.orchestrator.cli.app", "run", "comfort_cruise", "--no-figures", "-q"]
+    subprocess.run([*here, "--kind", "plain", "-o", str(tmp_path / "here")], check=True, env=environment)
+    assert (tmp_path / "out" / "results.csv").read_bytes() == (tmp_path / "here" / "results.csv").read_bytes()
+
+
+def test_the_conda_recipe_asks_for_what_the_wheel_asks_for() -> None:
+    project = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]
+    recipe = (ROOT / "recipe" / "recipe.yaml").read_text().replace("matplotlib-base", "matplotlib")
+    run = recipe.partition("  run:\n")[2].partition("  run_constraints:")[0]
+    asked = dict(re.findall(r"- (\w+) (\S+)", run))
+    assert asked.pop("python") == ">=${{"
+    assert asked == dict(re.match(r"(\w+)(.*)", text).groups() for text in project["dependencies"])
+    assert f'version: "{project["version"]}"' in recipe
+    assert project["scripts"]["orchestrate"] in recipe
 
 
 def test_the_command_starts_without_heavy_imports() -> None:

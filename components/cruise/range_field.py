@@ -7,7 +7,7 @@ from typing import Any
 from ..maths import logical_or, maximum, where
 
 _FLOOR = 1.0
-"""m2: how near to a bound the potential's denominators may come (1e-6 km2 of the specification), sign kept."""
+"""m2: how near to a bound the potential's denominators may come (1e-6 km2), sign kept."""
 
 
 def slope(gap: Any, low: Any, high: Any) -> Any:

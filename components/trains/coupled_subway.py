@@ -17,7 +17,7 @@ MOTOR_CARS, ALL_CARS, LEADING_CAR = 0, 1, 2
 
 
 class CoupledSubwayTrain(MultipleUnit):
-    """A subway train of any number of vehicles with spring-damper couplers (plant B of the specification).
+    """A subway train of any number of vehicles with spring-damper couplers.
 
     m_k dv_k/dt = mu_k F_k - r_k + T_k-1 - T_k with T_k = k_c (y_k - y_k+1) + c_c (v_k - v_k+1), y_k the displacement
     since departure, T > 0 tension. ``position`` and ``speed`` are means over the motor cars: traction acts there, and

@@ -1,4 +1,4 @@
-"""What our own FMUs keep beyond the standard: see ``DESIGN``, and `fmus.description`, which writes it."""
+"""What our own FMUs keep beyond the standard: see `docs/architecture.md`, and `fmus.description`, which writes it."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The closed loops of the three laws of `papers/tunable_potential.md` as ordinary differential equations.
+"""The closed loops of the three laws of `docs/models/tunable_potential.md` as ordinary differential equations.
 
 Written by hand from its sections 1 to 4 and 7, with NumPy, in the paper's kilometres, and sharing nothing with
 `railcosim`. `march` integrates many starts at once with classical RK4 (step 0.25 s, reported every 1 s, as the

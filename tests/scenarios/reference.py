@@ -1,8 +1,8 @@
 """The closed loop of the comfort-aware cruise law as one system of ordinary differential equations.
 
-Written by hand from `papers/comfort_cruise.md`, sections 1 and 2, with NumPy and in the paper's kilometres, and solved
-by SciPy's eighth-order Runge-Kutta (DOP853). It shares nothing with `railcosim`, so that what the components and the
-co-simulation give can be held against it. Load it by its path (see ``conftest.py`` beside it).
+Written by hand from `docs/models/comfort_cruise.md`, sections 1 and 2, with NumPy and in the paper's kilometres, and
+solved by SciPy's eighth-order Runge-Kutta (DOP853). It shares nothing with `railcosim`, so that what the components and
+the co-simulation give can be held against it. Load it by its path (see ``conftest.py`` beside it).
 """
 
 import itertools

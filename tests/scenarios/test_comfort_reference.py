@@ -1,4 +1,4 @@
-"""The reference solution reproduces the numbers of `papers/comfort_cruise.md`, sections 2 to 5 and 8.
+"""The reference solution reproduces the numbers of `docs/models/comfort_cruise.md`, sections 2 to 5 and 8.
 
 They are the specification's own measurements with an independent implementation, or the source's figures.
 """

@@ -1,4 +1,4 @@
-"""The reference solution reproduces the numbers of `papers/tunable_potential.md`, sections 2 to 7.
+"""The reference solution reproduces the numbers of `docs/models/tunable_potential.md`, sections 2 to 7.
 
 They are the specification's own measurements with an independent implementation. The laws are reconstructions.
 """

@@ -1,4 +1,4 @@
-"""The sampling table of `papers/comfort_cruise.md`, section 6: what exchanging values every h seconds costs.
+"""The sampling table of `docs/models/comfort_cruise.md`, section 6: what exchanging values every h seconds costs.
 
 Worst deviations from the continuous loop over 350 s, of speeds in m/s and gaps in m, `figure-consistent`; the tanh law
 with a gust of 0.5 m/s2, the bottom layer without. Measured for the specification with an independent implementation.

@@ -1,4 +1,4 @@
-"""The co-simulated laws of `papers/tunable_potential.md`: shipped scenarios, Table 4, sampled exchange (section 8).
+"""The co-simulated laws of `docs/models/tunable_potential.md`: scenarios, Table 4, sampled exchange (section 8).
 
 The laws are reconstructions; the numbers are the specification's own measurements with an independent implementation.
 """

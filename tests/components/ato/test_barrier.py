@@ -17,7 +17,7 @@ def loop(step, gain, delay, speed=22.2):
     ("error", "expected"), [(0.01, 0.01000247), (0.05, 0.0585786), (0.09, 1.0409473), (0.098, 25.3604), (0.0, 0.0)]
 )
 def test_values_of_the_specification(error, expected):
-    """`papers/cailc_ato.md`, section 5, v_b = 0.1."""
+    """`docs/models/cailc_ato.md`, section 5, v_b = 0.1."""
     assert chi(error, 0.1, 0.999) == pytest.approx(expected, rel=2e-6)
     assert chi(-error, 0.1, 0.999) == -chi(error, 0.1, 0.999)
 

@@ -16,7 +16,7 @@ DRIVING = {
 
 
 def by_hand(learned, gain, bounds=None, barrier=None):
-    """Section 4 of `papers/cailc_ato.md`, the program text, for DRIVING."""
+    """Section 4 of `docs/models/cailc_ato.md`, the program text, for DRIVING."""
     v, d = 9.99, ALPHA * 0.002 - 0.01
     chi = d if barrier is None else d / math.cos(math.pi * d * d / (2 * barrier * barrier)) ** 2
     q = [p - v**k * g * chi for k, (p, g) in enumerate(zip(learned, gain, strict=True))]

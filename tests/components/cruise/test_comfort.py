@@ -1,4 +1,4 @@
-"""The comfort cruise law against the numbers of `papers/comfort_cruise.md` and the formula written anew in km."""
+"""The comfort cruise law against the numbers of `docs/models/comfort_cruise.md` and the formula written anew in km."""
 
 import math
 

@@ -1,4 +1,4 @@
-"""The three laws of `papers/tunable_potential.md` against the formulas of its sections 2 and 3, written anew in km."""
+"""The three laws of `docs/models/tunable_potential.md` against its sections 2 and 3, written anew in km."""
 
 import math
 

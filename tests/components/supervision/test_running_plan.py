@@ -27,7 +27,7 @@ def plan():
 
 
 def test_phases(plan):
-    """The table of `papers/cailc_ato.md`, section 3."""
+    """The table of `docs/models/cailc_ato.md`, section 3."""
     for t0, t1, x0, x1, v0, v1 in PHASES:
         begin, end = plan.profile.at(t0), plan.profile.at(t1)
         assert begin.position == pytest.approx(x0, abs=2e-3)

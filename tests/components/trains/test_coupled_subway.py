@@ -20,7 +20,7 @@ def system_matrix(**values):
 
 
 def test_modes():
-    """`papers/cailc_ato.md`, section 6: frequencies and damping ratios of the five coupler modes."""
+    """`docs/models/cailc_ato.md`, section 6: frequencies and damping ratios of the five coupler modes."""
     poles = np.linalg.eigvals(system_matrix())
     oscillating = sorted((p for p in poles if p.imag > 1e-3), key=abs)
     assert [abs(p) / (2 * np.pi) for p in oscillating] == pytest.approx([1.43, 2.81, 3.96, 4.80, 5.53], abs=0.006)

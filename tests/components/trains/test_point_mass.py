@@ -65,7 +65,7 @@ def test_quadratic_resistance_coasts_as_a_hyperbola():
 
 
 def test_resistance_at_the_speeds_of_the_source():
-    """By hand, `papers/comfort_cruise.md` section 1: R(85) = 1.234 and R(5) = 0.0196 N/kg; 493 kN balance 85 m/s."""
+    """By hand, `docs/models/comfort_cruise.md` section 1: R(85) = 1.234, R(5) = 0.0196 N/kg; 493 kN balance 85 m/s."""
     assert -PointMassTrain(speed=85.0).outputs()["acceleration"] == pytest.approx(1.234, abs=5e-4)
     assert -PointMassTrain(speed=5.0).outputs()["acceleration"] == pytest.approx(0.0196, abs=5e-5)
     assert PointMassTrain(speed=85.0, force=493.5e3).outputs()["acceleration"] == pytest.approx(0.0, abs=1e-3)

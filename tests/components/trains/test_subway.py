@@ -29,7 +29,7 @@ def driven(train, seconds, force, step=0.01, trip_time=0.0):
     ],
 )
 def test_resistance_parameters(time, r1, r2, r3, coupling):
-    """`papers/cailc_ato.md`, section 2: R1 without line and F_K, R2, R3, and F_K."""
+    """`docs/models/cailc_ato.md`, section 2: R1 without line and F_K, R2, R3, and F_K."""
     found = SubwayTrain(line=LEVEL, time=time).outputs()["resistance_parameters"]
     assert found[0] - coupling == pytest.approx(r1, abs=6e-4)
     assert found[1] == pytest.approx(r2, rel=2e-7)
@@ -47,7 +47,7 @@ def test_resistance_parameters(time, r1, r2, r3, coupling):
     ],
 )  # fmt: skip
 def test_additional_force_of_the_line(position, force):
-    """`papers/cailc_ato.md`, section 2.1, whole train."""
+    """`docs/models/cailc_ato.md`, section 2.1, whole train."""
     there, level = SubwayTrain(position=float(position)), SubwayTrain(line=LEVEL)
     assert there.outputs()["resistance"] - level.outputs()["resistance"] == pytest.approx(force, abs=0.06)
 

@@ -27,7 +27,7 @@ def test_the_train_of_the_source():
     ],
 )
 def test_distribution_of_the_specification(force, forces, shares):
-    """The table of `papers/cailc_ato.md`, section 4.2."""
+    """The table of `docs/models/cailc_ato.md`, section 4.2."""
     found = distribute(force, WEIGHTS, MOTORED, [0.1] * 6)
     assert [f / 1e3 for f in found] == pytest.approx(forces, abs=5e-4)
     if shares:

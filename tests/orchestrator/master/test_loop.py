@@ -189,7 +189,7 @@ def test_in_process_and_as_fmus_the_bits_are_the_same(system):
 def test_time_zero_is_consistent(kind):
     result = go(platoon(stop_time=0.1), kind=kind)
     first = {name: result[name][0] for name in result.names()}
-    for i, demand in enumerate([-0.595, 0.937, -0.907, 0.9999], 1):  # papers/comfort_cruise.md, section 3
+    for i, demand in enumerate([-0.595, 0.937, -0.907, 0.9999], 1):  # docs/models/comfort_cruise.md, section 3
         assert first[f"cruise[{i}].demand"] == pytest.approx(demand, abs=0.002)
         assert first[f"train[{i}].acceleration"] == pytest.approx(first[f"cruise[{i}].demand"], abs=1e-12)
         assert first[f"train[{i}].applied_force"] == first[f"cruise[{i}].force"]
