@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
-import difflib
 import inspect
 import math
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from typing import Any, ClassVar
 
@@ -27,6 +26,7 @@ from .declarations import (
     Tape,
     Variable,
 )
+from .spelling import nearest
 
 Values = dict[str, Any]
 MAX_LENGTH = 10_000
@@ -329,10 +329,3 @@ def _has_trip_inputs(cls: type[Component]) -> bool:
     if not (isinstance(trip, Input) and isinstance(trip_time, Input)):
         return False
     return not (trip.shape or trip_time.shape) and trip.type is int and trip_time.type is float
-
-
-def nearest(name: str, known: Iterable[str]) -> str:
-    """A misspelt name in quotes, with the nearest known one, or else with all of them."""
-    known = list(known)
-    close = difflib.get_close_matches(name, known, 1)
-    return f"{name!r}" + (f"; did you mean {close[0]!r}?" if close else f"; it has {', '.join(sorted(known))}")

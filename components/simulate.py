@@ -20,9 +20,10 @@ from typing import Any, Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from .component import Component, ComponentError, Slot, convert, nearest, pack
+from .component import Component, ComponentError, Slot, convert, pack
 from .declarations import Input, Memory, Output, Parameter, State, Tape
 from .equations import Equations
+from .spelling import nearest
 from .tape import TapeDeck
 from .tracing import TracingError, feedthrough, initial_dependencies
 

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import contextlib
-import difflib
 import hashlib
 import importlib
 import importlib.util
@@ -21,6 +20,7 @@ from typing import Any
 import platformdirs
 
 from ..components import CATALOGUE, Component, ComponentError, Simulation
+from ..components.spelling import did_you_mean
 from . import native_fmu, python_fmu, toolchain
 from .description import Kind, write
 from .identity import source_digest
@@ -234,7 +234,5 @@ def _line_in(error: BaseException, path: Path) -> int | None:
 
 
 def _nearest(name: str, known: Mapping[str, Any]) -> str:
-    close = difflib.get_close_matches(name, known, 1)
-    if close:
-        return f"{name!r}; did you mean {close[0]!r}?"
-    return f"{name!r}; there is {', '.join(sorted(known)) or 'none'}; one of your own is written file.py:Class"
+    there = f"; there is {', '.join(sorted(known)) or 'none'}; one of your own is written file.py:Class"
+    return f"{name!r}{did_you_mean(name, known) or there}"

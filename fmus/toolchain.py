@@ -28,7 +28,8 @@ from pathlib import Path
 
 import fmpy
 
-from ..components.component import ComponentError, nearest
+from ..components.component import ComponentError
+from ..components.spelling import nearest
 
 FLAGS = (
     *("-std=c11", "-O2", "-ffp-contract=off", "-fno-builtin-pow", "-fvisibility=hidden", "-g0"),

@@ -1,8 +1,23 @@
 """The errors of this package: one small family, each also the builtin a caller would catch."""
 
-import difflib
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 from itertools import groupby
+
+from ..components.spelling import did_you_mean
+
+__all__ = [
+    "CouplingError",
+    "ExpressionError",
+    "FmuError",
+    "FmuFileError",
+    "LostError",
+    "RailcosimError",
+    "RunError",
+    "ScenarioError",
+    "StoppedError",
+    "WindowError",
+    "did_you_mean",
+]
 
 
 class RailcosimError(Exception):
@@ -73,9 +88,3 @@ class LostError(FmuError):
 
 class StoppedError(FmuError):
     """An FMU asks for the end of the simulation: no failure, but the end."""
-
-
-def did_you_mean(word: str, valid: Iterable[str], *, cutoff: float = 0.6) -> str:
-    """A clause to append to an error: `"; did you mean 'x'?"` with the nearest valid name, or nothing."""
-    nearest = difflib.get_close_matches(word, list(valid), n=1, cutoff=cutoff)
-    return f"; did you mean '{nearest[0]}'?" if nearest else ""
