@@ -19,6 +19,7 @@ from rich.text import Text
 
 from ..evaluation import COMFORT_TITLE, Metric, MetricChange, PublishedRow, Verdict, comfort_levels, compare_metrics
 from ..fmi import Interface, Variable
+from ..problems import Problem
 from ..run import CHECKPOINT_FILE as CHECKPOINT
 from ..run import Progress as OnProgress
 from ..run import Run
@@ -95,13 +96,17 @@ def _lines(title: str, start: float, reached: float) -> OnProgress:
 # -------------------------------------------------------------------- problems
 
 
-def folded(problems: Iterable[str]) -> list[str]:
-    """Problems that differ in an instance's index only, told once: four trains make one mistake, not four."""
-    alike: dict[str, list[str]] = {}
+def folded(problems: Iterable[Problem | str]) -> list[str]:
+    """Problems that differ in an instance's index only, told once: four trains make one mistake, not four.
+
+    A problem knows its kind; of notes, which are sentences, every number in brackets counts as an index.
+    """
+    alike: dict[str, list[Problem | str]] = {}
     for problem in problems:
-        alike.setdefault(re.sub(r"(?<=\w)\[\d+\]", "[i]", problem), []).append(problem)
+        kind = problem.kind if isinstance(problem, Problem) else re.sub(r"(?<=\w)\[\d+\]", "[i]", problem)
+        alike.setdefault(kind, []).append(problem)
     return [
-        first + (f" (and {len(rest)} more like it, for other indices)" if rest else "")
+        str(first) + (f" (and {len(rest)} more like it, for other indices)" if rest else "")
         for first, *rest in alike.values()
     ]
 

@@ -14,7 +14,9 @@ from typing import Any, Protocol, TypeAlias, TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
-from ..errors import ExpressionError, WindowError, did_you_mean
+from ..errors import ExpressionError, WindowError
+from ..names import SignalName
+from ..problems import Problem, suggestion
 from .syntax import Call, Group, Name, Node, Number, Operation, Reference, Span, read, walk
 
 CONSTANTS = {"pi": np.pi, "inf": np.inf, "nan": np.nan, "true": True, "false": False}
@@ -136,9 +138,9 @@ class Scope:
     functions: Mapping[str, Function]
     constants: Mapping[str, Any]
 
-    def error(self, message: str) -> ExpressionError:
+    def error(self, problem: str | Problem) -> ExpressionError:
         """An error that quotes the expression."""
-        return ExpressionError(f"'{self.text}': {message}")
+        return ExpressionError(ExpressionError(problem).at(f"'{self.text}'"))
 
     @cached_property
     def names(self) -> frozenset[str]:
@@ -197,40 +199,40 @@ class Scope:
         return [n for ks, n in sorted(found) if all(a <= k <= b for k, (a, b) in zip(ks, spans, strict=True))]
 
 
-def unknown_signal(reference: Reference, names: Collection[str]) -> str:
+def unknown_signal(reference: Reference, names: Collection[str]) -> Problem:
     """What to say about a reference that stands for nothing."""
     family = re.escape(re.sub(r"\[[^\]]*\]", "[:]", reference.text)).replace(r":\]", r"[\d,]+\]")
     near = [name for name in names if re.fullmatch(family, name)]
     if near:
         near.sort(key=lambda name: [(len(k), k) for k in re.findall(r"\d+", name)])
-        return f"there is no '{reference.text}'; there are '{near[0]}' to '{near[-1]}'"
+        return Problem("", f"there is no '{reference.text}'", f"there are '{near[0]}' to '{near[-1]}'")
     written = re.findall(r"\[[^\]]*\]", reference.text)
 
     def as_written(name: str) -> str:
         indices = iter(written)
         return re.sub(r"\[[^\]]*\]", lambda _: next(indices, "[i]"), name)
 
-    nearest = did_you_mean(reference.text, {as_written(name) for name in names}) or "; 'describe' lists an instance"
-    return f"there is no signal or parameter '{reference.text}'{nearest}"
+    nearest = suggestion(reference.text, {as_written(name) for name in names}) or "'describe' lists an instance"
+    return Problem("", f"there is no signal or parameter '{reference.text}'", nearest)
 
 
-def call_problem(call: Call, functions: Mapping[str, Function]) -> str:
+def call_problem(call: Call, functions: Mapping[str, Function]) -> Problem | None:
     """What is wrong with a call: an unknown function or argument, too many or too few of them, or a list among them."""
     if call.name not in functions:
-        nearest = did_you_mean(call.name, functions) or f"; there are {', '.join(sorted(functions))}"
-        return f"unknown function '{call.name}'{nearest}"
+        nearest = suggestion(call.name, functions) or f"there are {', '.join(sorted(functions))}"
+        return Problem("", f"unknown function '{call.name}'", nearest)
     signature = functions[call.name].arguments
     for word in call.keywords:
         if word not in signature.parameters:
-            return f"{call.name} has no argument '{word}'{did_you_mean(word, signature.parameters)}"
+            return Problem("", f"{call.name} has no argument '{word}'", suggestion(word, signature.parameters))
     plain = len(call.arguments) - len(call.keywords)
     named = dict(zip(call.keywords, call.arguments[plain:], strict=True))
     try:
         given = signature.bind(*call.arguments[:plain], **named).arguments
     except TypeError as error:
-        return f"{call.name}({', '.join(signature.parameters)}): {error}"
+        return Problem(f"{call.name}({', '.join(signature.parameters)})", str(error))
     lists = [word for word, argument in given.items() if isinstance(argument, Group) and word != "outside"]
-    return f"{call.name}: {lists[0]} takes a signal or a number, not a list" if lists else ""
+    return Problem(call.name, f"{lists[0]} takes a signal or a number, not a list") if lists else None
 
 
 def evaluate(node: Node, scope: Scope) -> Value:  # noqa: PLR0911 (one a kind of node)
@@ -240,7 +242,7 @@ def evaluate(node: Node, scope: Scope) -> Value:  # noqa: PLR0911 (one a kind of
             return np.asarray(value)
         case Name(name=name):
             if name not in scope.constants:
-                raise scope.error(f"'{name}' is not known here{did_you_mean(name, scope.constants)}")
+                raise scope.error(Problem("", f"'{name}' is not known here", suggestion(name, scope.constants)))
             return np.asarray(scope.constants[name])
         case Reference():
             return scope.reference(node)
@@ -337,7 +339,7 @@ class Expression:
         scope = self._scope(_Rehearsal(names), {} if index is None else {"i": index})
         return [scope.resolve(reference) for reference in self.references]
 
-    def check(self, names: Collection[str], constants: Collection[str] = ()) -> list[str]:
+    def check(self, names: Collection[str], constants: Collection[str] = ()) -> list[Problem]:
         """Every problem that can be found before a run, each with the column and the nearest valid name.
 
         `constants` are further bare names the expression may use, such as the variable of a function plot.
@@ -345,7 +347,7 @@ class Expression:
         known = {*CONSTANTS, *constants, "time", "count", *(["i"] if self.references else [])}
         try:
             problems = [
-                f"'{self.text}', column {node.column}: {problem}"
+                problem.at(f"'{self.text}', column {node.column}")
                 for node in walk(self.tree)
                 if not isinstance(node, Number | Group | Operation) and (problem := self._problem(node, names, known))
             ]
@@ -355,7 +357,7 @@ class Expression:
             return problems
         instances = (None,) if "i" in constants else self.instances(names)
         if not instances:
-            return [f"'{self.text}': there is no i for which all of its signals exist; mend the indices"]
+            return [Problem(f"'{self.text}'", "there is no i for which all of its signals exist", "mend the indices")]
         try:
             self.evaluate(_Rehearsal(names), instances[0], **dict.fromkeys(constants, 1.0))
         except WindowError:
@@ -364,18 +366,18 @@ class Expression:
             return error.problems
         return []
 
-    def _problem(self, node: Name | Reference | Call, names: Collection[str], known: Collection[str]) -> str:
+    def _problem(self, node: Name | Reference | Call, names: Collection[str], known: Collection[str]) -> Problem | None:
         match node:
             case Name(name=name) if name not in known:
-                inside = next((full for full in names if re.match(re.escape(name) + r"[.\[]", full)), "")
-                remedy = f"; '{name}' is an instance: name a variable, as in '{inside}'" if inside else ""
-                remedy = "; an index stands in brackets, as in train[i].speed" if name == "i" else remedy
-                return f"unknown name '{name}'{remedy or did_you_mean(name, known)}"
+                inside = next((full for full in names if name == SignalName.parse(full).group), "")
+                remedy = f"'{name}' is an instance: name a variable, as in '{inside}'" if inside else ""
+                remedy = "an index stands in brackets, as in train[i].speed" if name == "i" else remedy
+                return Problem("", f"unknown name '{name}'", remedy or suggestion(name, known))
             case Call():
                 return call_problem(node, self.functions)
             case Reference() if not self._exists(node, names):
                 return unknown_signal(node, names)
-        return ""
+        return None
 
     def _exists(self, reference: Reference, names: Collection[str]) -> bool:
         """Whether it stands for something, for some i at least."""
@@ -397,11 +399,11 @@ class Expression:
             with np.errstate(all="ignore"):
                 return rule(self.tree, scope)
         except ExpressionError as error:
-            located = [p if p.startswith(f"'{self.text}'") else f"'{self.text}': {p}" for p in error.problems]
+            located = [problem if problem.place else problem.at(f"'{self.text}'") for problem in error.problems]
             raise type(error)(located) from None
         except ValueError as error:
-            reason = f"its parts differ in their number of rows ({error}); combine arrays of one size"
-            raise scope.error(reason) from None
+            reason = f"its parts differ in their number of rows ({error})"
+            raise scope.error(Problem("", reason, "combine arrays of one size")) from None
 
     def evaluate(self, signals: Signals, index: int | None = None, **constants: Any) -> float | Value:
         """The value: a number, or an array (T,), or (n, T) with one row per signal of a slice.
@@ -428,12 +430,12 @@ def evaluate_constant(text: str, **constants: float | bool) -> float | bool:
     expression = parse(text)
     if expression.references:
         signal = expression.references[0].text
-        raise ExpressionError(f"'{text}': a signal such as '{signal}' has no value before the run")
+        raise ExpressionError(Problem(f"'{text}'", f"a signal such as '{signal}' has no value before the run"))
     names = {*CONSTANTS, *constants}
     for node in walk(expression.tree):
         if isinstance(node, Name) and node.name not in names:
-            nearest = did_you_mean(node.name, names)
-            raise ExpressionError(f"'{text}', column {node.column}: unknown name '{node.name}'{nearest}")
+            nearest = suggestion(node.name, names)
+            raise ExpressionError(Problem(f"'{text}', column {node.column}", f"unknown name '{node.name}'", nearest))
     problems = expression.check((), names)
     if problems:
         raise ExpressionError(problems)

@@ -16,8 +16,9 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ..errors import ExpressionError, ScenarioError, did_you_mean
+from ..errors import ExpressionError, ScenarioError
 from ..evaluation import FUNCTIONS, Expression, Reference, Signals, parse, unit_of
+from ..problems import Problem, suggestion
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -64,35 +65,39 @@ class Curve:
     unit: str
 
 
-def check_figures(figures: Sequence[Mapping[str, Any]], names: Collection[str], every_step: bool = True) -> list[str]:
+def check_figures(
+    figures: Sequence[Mapping[str, Any]], names: Collection[str], every_step: bool = True
+) -> list[Problem]:
     """Every problem of the [[figures]] that can be found before a run.
 
     `names` are the signals to be recorded and the parameters; `every_step` says whether each step is recorded.
     """
-    problems: list[str] = []
+    problems: list[Problem] = []
     for number, figure in enumerate(figures, 1):
         place = f"[[figures]] entry {number} ({figure.get('title', 'no title')})"
         if not isinstance(figure.get("title"), str) or not figure["title"].strip():
-            problems.append(f"{place}: title is missing; it also names the file")
+            problems.append(Problem(place, "title is missing", "it also names the file"))
         panels = figure.get("panels")
         if panels is None:
-            problems += [f"{place}: {problem}" for problem in _panel_problems(figure, names, every_step)]
+            problems += [problem.at(place) for problem in _panel_problems(figure, names, every_step)]
             continue
         if not isinstance(panels, list) or not panels or not all(isinstance(panel, Mapping) for panel in panels):
-            problems.append(f"{place}: panels must be a list of tables, each with y")
+            problems.append(Problem(place, "panels must be a list of tables, each with y"))
             continue
         strange = [key for key in figure if key not in ("title", "x", "x_label", "x_range", "panels")]
-        problems += [f"{place}: '{key}' belongs into the panels" for key in strange]
+        problems += [Problem(place, f"'{key}' belongs into the panels") for key in strange]
         for which, panel in enumerate(panels_of(figure), 1):
-            problems += [f"{place}, panel {which}: {problem}" for problem in _panel_problems(panel, names, every_step)]
+            inner = f"{place}, panel {which}"
+            problems += [problem.at(inner) for problem in _panel_problems(panel, names, every_step)]
     return problems
 
 
-def _panel_problems(panel: Mapping[str, Any], names: Collection[str], every_step: bool) -> Iterator[str]:
+def _panel_problems(panel: Mapping[str, Any], names: Collection[str], every_step: bool) -> Iterator[Problem]:
     valid = (*PANEL_KEYS, "panels")
     for key in panel:
         if key not in valid:
-            yield f"unknown key '{key}'{did_you_mean(key, valid) or '; there are ' + ', '.join(valid)}"
+            near = suggestion(key, valid) or f"there are {', '.join(valid)}"
+            yield Problem("", f"unknown key '{key}'", near)
     yield from _shape_problems(panel)
     function = panel.get("x")
     variable = (str(function.get("name")),) if isinstance(function, Mapping) else ()
@@ -106,48 +111,51 @@ def _panel_problems(panel: Mapping[str, Any], names: Collection[str], every_step
             continue
         yield from expression.check(names, variable)
         if expression.calls("at_sample") and not every_step:
-            yield f"'{text}': at_sample needs every communication step recorded; set record = step"
+            yield Problem(f"'{text}'", "at_sample needs every communication step recorded", "set record = step")
 
 
-def _shape_problems(panel: Mapping[str, Any]) -> Iterator[str]:
+def _shape_problems(panel: Mapping[str, Any]) -> Iterator[Problem]:
     """Values of the wrong kind."""
     if not texts_of(panel.get("y")):
-        yield 'y is missing; give the expressions to draw, as in y = ["train[:].speed", "target.value"]'
+        remedy = 'give the expressions to draw, as in y = ["train[:].speed", "target.value"]'
+        yield Problem("", "y is missing", remedy)
     labels = panel.get("label")
     if labels is not None and len(texts_of(labels)) != len(texts_of(panel.get("y"))):
-        yield "label must be a list of texts, one for each entry of y"
+        yield Problem("", "label must be a list of texts, one for each entry of y")
     for key in ("x_label", "y_label", "title"):
         if key in panel and not isinstance(panel[key], str):
-            yield f"{key} must be text"
+            yield Problem("", f"{key} must be text")
     for key in ("x_range", "y_range"):
         if key in panel and not _is_range(panel[key]):
-            yield f"{key} must be two rising numbers, as in {key} = [0, 90]"
+            yield Problem("", f"{key} must be two rising numbers, as in {key} = [0, 90]")
     if "scale" in panel and not (_is_number(panel["scale"]) and panel["scale"] != 0):
-        yield "scale must be a number other than 0"
+        yield Problem("", "scale must be a number other than 0")
     elif "scale" in panel and "y_label" not in panel:
-        yield "scale needs y_label, which says the unit that is drawn"
+        yield Problem("", "scale needs y_label, which says the unit that is drawn")
     bands = panel.get("bands", [])
     if not isinstance(bands, list) or not all(map(_is_band, bands)):
-        yield "bands must be a list of levels and [low, high] pairs, each a number or an expression"
+        yield Problem("", "bands must be a list of levels and [low, high] pairs, each a number or an expression")
     x = panel.get("x")
     if isinstance(x, Mapping):
         yield from _function_problems(x)
     elif x is not None and not isinstance(x, str):
-        yield 'x must be an expression, or { name = "d", from = 0, to = 1, points = 400 } for a function plot'
+        function = '{ name = "d", from = 0, to = 1, points = 400 }'
+        yield Problem("", f"x must be an expression, or {function} for a function plot")
 
 
-def _function_problems(x: Mapping[str, Any]) -> Iterator[str]:
+def _function_problems(x: Mapping[str, Any]) -> Iterator[Problem]:
     for key in x:
         if key not in FUNCTION_KEYS:
-            yield f"unknown key '{key}' in x{did_you_mean(key, FUNCTION_KEYS) or '; there are name, from, to, points'}"
+            near = suggestion(key, FUNCTION_KEYS) or "there are name, from, to, points"
+            yield Problem("", f"unknown key '{key}' in x", near)
     name = x.get("name")
     if not isinstance(name, str) or not name.isidentifier() or name in {"i", "count", "time", "pi"}:
-        yield "x.name must be a plain word that is not taken, such as d"
+        yield Problem("", "x.name must be a plain word that is not taken, such as d")
     if not _is_range([x.get("from"), x.get("to")]):
-        yield "x.from and x.to must be two rising numbers"
+        yield Problem("", "x.from and x.to must be two rising numbers")
     points = x.get("points", 400)
     if not isinstance(points, int) or not 2 <= points <= MAX_POINTS:
-        yield f"x.points must be a whole number from 2 to {MAX_POINTS}"
+        yield Problem("", f"x.points must be a whole number from 2 to {MAX_POINTS}")
 
 
 def texts_of(value: Any) -> list[str]:
@@ -193,13 +201,15 @@ def draw(figures: Sequence[Mapping[str, Any]], signals: Signals, directory: Path
         ScenarioError: some figures could not be drawn; the others were.
     """
     paths: list[Path] = []
-    problems: list[str] = []
+    problems: list[Problem] = []
     for figure in figures:
         path = directory / file_name(prefix, figure["title"], paths)
         try:
             _draw_one(figure, signals, path)
-        except ValueError as error:  # an expression, or mathematics in a label that matplotlib cannot set
-            problems.append(f"figure '{figure['title']}' was not drawn: {error}")
+        except ExpressionError as error:
+            problems += error.at(f"figure '{figure['title']}' was not drawn")
+        except ValueError as error:  # mathematics in a label that matplotlib cannot set
+            problems.append(Problem(f"figure '{figure['title']}' was not drawn", str(error)))
         else:
             paths.append(path)
     if problems:
@@ -287,7 +297,7 @@ def level_of(end: str | float, signals: Signals) -> float:
     """The number that an end of a band stands for."""
     value = parse(end, FUNCTIONS).evaluate(signals) if isinstance(end, str) else end
     if isinstance(value, np.ndarray):
-        raise ExpressionError(f"the band '{end}' varies over time; draw it as an entry of y")
+        raise ExpressionError(Problem("", f"the band '{end}' varies over time", "draw it as an entry of y"))
     return float(value)
 
 
@@ -355,7 +365,7 @@ def _across(x: Any, signals: Signals, index: int | None, constants: Mapping[str,
         return signals.time
     values = np.asarray(parse(x, FUNCTIONS).evaluate(signals, index), dtype=np.float64)
     if not values.ndim:
-        raise ExpressionError(f"x = '{x}' is a single number; draw over a signal")
+        raise ExpressionError(Problem("", f"x = '{x}' is a single number", "draw over a signal"))
     return values
 
 

@@ -4,9 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
 
-from ..errors import did_you_mean
 from ..fmi import Interface
-from ..system import System, split
+from ..names import SignalName
+from ..problems import Problem, suggestion
+from ..system import System
 from ..wiring import Wiring
 from .algebraic_loops import find_loops
 from .algorithms.adaptive import is_watched
@@ -15,8 +16,8 @@ from .algorithms.iterative import find_blocks
 _SHOWN = 6
 
 
-def check_coupling(system: System, interfaces: Mapping[str, Interface], wiring: Wiring) -> list[str]:
-    """What is wrong with algorithm, steps and tolerances, one sentence each."""
+def check_coupling(system: System, interfaces: Mapping[str, Interface], wiring: Wiring) -> list[Problem]:
+    """What is wrong with algorithm, steps and tolerances."""
     problems = [
         *_check_rates(system),
         *_check_tolerances(system, interfaces),
@@ -25,7 +26,7 @@ def check_coupling(system: System, interfaces: Mapping[str, Interface], wiring: 
         blocks = find_blocks(interfaces, wiring.links)
         problems += _cannot(
             [name for name in interfaces if name in blocks.cyclic and not interfaces[name].can_save_state],
-            "in a cycle, and the state that iterative comes back to cannot be saved (canGetAndSetFMUstate is false); "
+            "in a cycle, and the state that iterative comes back to cannot be saved (canGetAndSetFMUstate is false)",
             "choose gauss-seidel or jacobi, or break the cycle by a delay",
         )
     elif system.algorithm == "adaptive":
@@ -33,43 +34,51 @@ def check_coupling(system: System, interfaces: Mapping[str, Interface], wiring: 
     return problems
 
 
-def _check_adaptive(system: System, interfaces: Mapping[str, Interface], wiring: Wiring) -> Iterable[str]:
+def _check_adaptive(system: System, interfaces: Mapping[str, Interface], wiring: Wiring) -> Iterable[Problem]:
     sampled = [name for name, interface in interfaces.items() if interface.vendor.get("sampled")]
     yield from _cannot(
-        sampled, "sampled at points of its own, which adaptive cannot step over; choose gauss-seidel or iterative"
+        sampled, "sampled at points of its own, which adaptive cannot step over", "choose gauss-seidel or iterative"
     )
     others = {name: interface for name, interface in interfaces.items() if name not in sampled}
     yield from _cannot(
         [name for name, interface in others.items() if not interface.can_save_state],
-        "the state that adaptive comes back to cannot be saved (canGetAndSetFMUstate is false); choose gauss-seidel",
+        "the state that adaptive comes back to cannot be saved (canGetAndSetFMUstate is false)",
+        "choose gauss-seidel",
     )
     yield from _cannot(
         [name for name, interface in others.items() if not interface.variable_step],
-        "the step cannot vary (canHandleVariableCommunicationStepSize is false); choose gauss-seidel or iterative",
+        "the step cannot vary (canHandleVariableCommunicationStepSize is false)",
+        "choose gauss-seidel or iterative",
     )
     late = sorted({link.connection.target for link in wiring.links if link.delay})
-    if late:
-        yield (
-            f"{_listed(late)}: a delay counts communication points, which adaptive sets anew at every run; leave the "
-            "delay out, or choose gauss-seidel"
-        )
+    yield from _cannot(
+        late,
+        "a delay counts communication points, which adaptive sets anew at every run",
+        "leave the delay out, or choose gauss-seidel",
+    )
 
 
-def _check_rates(system: System) -> Iterable[str]:
+def _check_rates(system: System) -> Iterable[Problem]:
     duration = system.stop_time - system.start_time
     for instance in system.instances.values():
         if instance.step is None or instance.step == system.step:
             continue
-        place = f"{instance.origin}: " if instance.origin else ""
+        name = SignalName(instance.name)
+        limit = ""
         if system.algorithm not in ("gauss-seidel", "jacobi"):
-            yield f"{place}{instance.name} has a step of its own, which goes with gauss-seidel and jacobi only"
+            limit = "which goes with gauss-seidel and jacobi only"
         elif system.algebraic_loops == "solve":
-            yield f"{place}{instance.name} has a step of its own, with which algebraic_loops = 'solve' does not go"
-        own = f"{place}{instance.name}: its step = {instance.step:g} s"
+            limit = "with which algebraic_loops = 'solve' does not go"
+        if limit:
+            yield Problem(instance.origin, f"{name} has a step of its own, {limit}", names=(name,))
+        own = f"its step = {instance.step:g} s"
         if not _is_multiple(instance.step, system.step):
-            yield f"{own} is not a whole multiple of the system's, {system.step:g} s"
+            own = f"{own} is not a whole multiple of the system's, {system.step:g} s"
         elif not _is_multiple(duration, instance.step):
-            yield f"{own} does not divide the run of {duration:g} s into whole steps"
+            own = f"{own} does not divide the run of {duration:g} s into whole steps"
+        else:
+            continue
+        yield Problem(str(name), own, names=(name,)).at(instance.origin)
 
 
 def _is_multiple(length: float, step: float) -> bool:
@@ -77,24 +86,24 @@ def _is_multiple(length: float, step: float) -> bool:
     return count > 0.5 and abs(count - round(count)) <= 1e-6
 
 
-def _check_tolerances(system: System, interfaces: Mapping[str, Interface]) -> Iterable[str]:
-    known = [
-        f"{name}.{variable}"
+def _check_tolerances(system: System, interfaces: Mapping[str, Interface]) -> Iterable[Problem]:
+    known = {
+        f"{name}.{variable}": None
         for name, interface in interfaces.items()
         for variable in (*(v.name for v in interface.of("output") if v.type == "Real"), *interface.arrays)
-    ]
+    }
     for signal in system.tolerances:
         if signal not in known:
-            origin = system.origins.get(f"simulation.tolerances.{signal}", "")
-            place = f"{origin}: " if origin else ""
-            yield f"{place}simulation.tolerances: {signal!r} is no Real output{did_you_mean(signal, known)}"
+            wrong, near = f"{signal!r} is no Real output", suggestion(signal, known)
+            problem = Problem("simulation.tolerances", wrong, near, (SignalName.parse(signal),))
+            yield problem.at(system.origins.get(f"simulation.tolerances.{signal}", ""))
     if system.min_step is not None and system.algorithm != "adaptive":
-        yield f"simulation.min_step is for adaptive; the algorithm is {system.algorithm}"
+        yield Problem("", "simulation.min_step is for adaptive", f"the algorithm is {system.algorithm}")
 
 
-def _cannot(names: Sequence[str], what: str) -> Iterable[str]:
+def _cannot(names: Sequence[str], what: str, remedy: str) -> Iterable[Problem]:
     if names:
-        yield f"{_listed(names)}: {what}"
+        yield Problem(_listed(names), what, remedy)
 
 
 def _listed(names: Sequence[str]) -> str:
@@ -134,7 +143,7 @@ def describe_coupling(system: System, interfaces: Mapping[str, Interface], wirin
 def _unwatched(system: System, interfaces: Mapping[str, Interface]) -> Iterable[str]:
     """Tolerances that `adaptive` has no use for."""
     for signal in system.tolerances:
-        instance, name = split(signal)
+        instance, name = SignalName.parse(signal)
         interface = interfaces[instance]
         if not any(is_watched(interface, interface.variables[scalar]) for scalar in interface.scalars(name) or ()):
             yield f"the tolerance of {signal} has no effect: adaptive watches continuous outputs without feed-through"

@@ -10,6 +10,8 @@ from railcosim.orchestrator.evaluation.metrics import Metric, MetricChange
 from railcosim.orchestrator.evaluation.published import PublishedRow
 from railcosim.orchestrator.evaluation.requirements import Verdict
 from railcosim.orchestrator.fmi.interface import Interface, Variable
+from railcosim.orchestrator.names import SignalName
+from railcosim.orchestrator.problems import Problem
 from rich.console import Console
 
 
@@ -119,8 +121,16 @@ def test_the_summary_names_what_went_wrong():
 
 
 def test_problems_that_differ_in_the_index_only_are_told_once():
-    problems = ["x.toml:3: train[1].a: wrong", "x.toml:3: train[2].a: wrong", "x.toml:4: train[1].a: wrong"]
-    assert console.folded(problems) == [f"{problems[0]} (and 1 more like it, for other indices)", problems[2]]
+    names = [SignalName(f"train[{k}]", "a") for k in (1, 2)]
+    first, second = (Problem(f"x.toml:3: {name}", "wrong", names=(name,)) for name in names)
+    other = Problem("x.toml:4: train[1].a", "wrong", names=(names[0],))
+    assert console.folded([first, second, other]) == [f"{first} (and 1 more like it, for other indices)", str(other)]
+
+
+def test_notes_that_differ_in_the_index_only_are_told_once():
+    assert console.folded(["train[1].a: so", "train[2].a: so"]) == [
+        "train[1].a: so (and 1 more like it, for other indices)"
+    ]
 
 
 def test_an_interface_stands_by_causality_with_what_each_output_depends_on():

@@ -216,7 +216,7 @@ def test_one_bad_figure_does_not_cost_the_others(tmp_path):
     with pytest.raises(ScenarioError) as caught:
         draw(figures, RUN, tmp_path)
     assert [path.name for path in tmp_path.iterdir()] == ["good.png"]
-    first, second, third, fourth = caught.value.problems
+    first, second, third, fourth = map(str, caught.value.problems)
     assert "x = 'max(train[1].speed)' is a single number; draw over a signal" in fourth
     assert "figure 'Bad' was not drawn: " in first
     assert "did you mean 'target.value'?" in first
@@ -282,8 +282,8 @@ X = {"name": "d", "from": 0, "to": 1}
 def test_problems_name_the_figure_and_the_remedy(figure, message):
     problems = check_figures([figure], NAMES, every_step=False)
     assert len(problems) == 1, problems
-    assert message in problems[0]
-    assert problems[0].startswith("[[figures]] entry 1 (")
+    assert message in str(problems[0])
+    assert problems[0].place.startswith("[[figures]] entry 1 (")
 
 
 def test_matplotlib_is_imported_only_to_draw():

@@ -59,7 +59,7 @@ def ring(components):
 def problems(it, workspace):
     with pytest.raises(ScenarioError) as caught:
         check(it, workspace, "plain")
-    return caught.value.problems
+    return [str(problem) for problem in caught.value.problems]
 
 
 def notes(it, workspace):

@@ -5,7 +5,8 @@ import pytest
 from railcosim.orchestrator.fmi.models import load_models
 from railcosim.orchestrator.fmi.reader import read_interface
 from railcosim.orchestrator.system import System
-from railcosim.orchestrator.wiring.resolution import instance_seed, is_direct, wire
+from railcosim.orchestrator.wiring import is_direct, wire
+from railcosim.orchestrator.wiring.starts import instance_seed
 
 BODY = """
 class Source(Base):
@@ -90,6 +91,13 @@ class Dice(Base):
     def outputs(self):
         return {"y": self.draw}
 """
+
+
+def said(wiring):
+    """The problems as they are printed."""
+    return [str(problem) for problem in wiring.problems]
+
+
 METRES_TO_TRACK = '<Unit name="km"><BaseUnit m="1" factor="1000"/></Unit><Unit name="m"><BaseUnit m="1"/></Unit>'
 
 
@@ -163,7 +171,7 @@ def test_scale_and_offset_apply_after_the_conversion(connected):
 
 
 def test_another_dimension_is_refused(connected):
-    assert connected("a.seconds", "b.metres").problems == ["'b.metres' = 'a.seconds': unit 's' does not convert to 'm'"]
+    assert said(connected("a.seconds", "b.metres")) == ["'b.metres' = 'a.seconds': unit 's' does not convert to 'm'"]
 
 
 def test_a_unit_that_nobody_defined_passes_values_as_they_are_and_is_told(resolve, foreign, xml, mine):
@@ -176,7 +184,7 @@ def test_a_unit_that_nobody_defined_passes_values_as_they_are_and_is_told(resolv
     system.connect("a.z", "b.speed")
     system.connect("a.z", "b.kelvin", scale=2.0)  # whoever gives a scale knows
     wiring = resolve(system)
-    assert wiring.problems == [p for p in wiring.problems if "required input" in p]
+    assert wiring.problems == [p for p in wiring.problems if "required input" in p.message]
     assert [(link.scale, link.offset) for link in wiring.links] == [(1.0, 0.0), (1.0, 0.0), (2.0, 0.0)]
     note = "'furlong' is not defined in SI units by Foreign: what is in 'furlong' is taken for"
     assert [text for text in wiring.notes if note in text] == [
@@ -218,19 +226,19 @@ def test_every_type_connects_to_its_own(connected, source, target):
 )
 def test_other_types_are_refused(connected, source, target, a, b):
     wiring = connected(f"a.{source}", f"b.{target}")
-    assert wiring.problems == [f"'b.{target}' = 'a.{source}': a {a} output cannot feed a {b} input"]
+    assert said(wiring) == [f"'b.{target}' = 'a.{source}': a {a} output cannot feed a {b} input"]
     assert wiring.links == []
 
 
 def test_an_integer_is_not_scaled(connected):
-    assert connected("a.whole", "b.whole", scale=2.0).problems == [
+    assert said(connected("a.whole", "b.whole", scale=2.0)) == [
         "'b.whole' = 'a.whole': scale and offset apply to Real inputs, not to Integer"
     ]
 
 
 @pytest.mark.parametrize("delay", [-1, 1.0, True, "1"])
 def test_a_delay_counts(connected, delay):
-    assert connected("a.metres", "b.metres", delay=delay).problems == [
+    assert said(connected("a.metres", "b.metres", delay=delay)) == [
         f"'b.metres' = 'a.metres': delay counts communication points: 0, 1, 2, ..., not {delay!r}"
     ]
 
@@ -253,7 +261,7 @@ def test_a_delay_counts(connected, delay):
     ],
 )
 def test_a_wrong_name_gets_the_nearest(connected, source, target, problem):
-    (found,) = connected(source, target).problems
+    (found,) = said(connected(source, target))
     assert found.startswith(f"{target!r} = {source!r}: {problem}")
 
 
@@ -265,7 +273,7 @@ def test_all_problems_are_found_and_say_where_they_were_written(pair, resolve):
     system.connections[0].origin, system.connections[1].origin = "x.toml:8", "x.toml:9"
     system.instances["b"].origin = "x.toml:4"
     system.instances["b"].start["wrod"] = "x"
-    found = resolve(system).problems
+    found = said(resolve(system))
     assert len(found) == 4
     assert found[0].startswith("x.toml:4: b.wrod: Sink has no such variable; did you mean 'word'?")
     assert [text.partition(": ")[0] for text in found] == ["x.toml:4", "x.toml:8", "x.toml:8", "x.toml:9"]
@@ -292,7 +300,7 @@ def test_one_element_connects_alone(connected):
     [("row", "pair", "the output has 3 elements, the input 2"), ("metres", "pair", "the output has 1 elements")],
 )
 def test_arrays_of_other_lengths_are_refused(connected, source, target, lengths):
-    (found,) = connected(f"a.{source}", f"b.{target}").problems
+    (found,) = said(connected(f"a.{source}", f"b.{target}"))
     assert found.startswith(f"'b.{target}' = 'a.{source}': {lengths}")
 
 
@@ -308,7 +316,7 @@ def started(resolve, mine):
         instance = system.add("s", mine("Settings"), **start)
         instance.index, instance.count, instance.swapped = index, count, swapped
         wiring = resolve(system)
-        return wiring.problems, wiring.starts["s"], wiring.notes
+        return said(wiring), wiring.starts["s"], wiring.notes
 
     return run
 
@@ -383,7 +391,7 @@ def test_a_constant_of_another_maker_cannot_be_set(resolve, foreign, xml):
     system = System()
     v = xml["variable"]("g", "local", start=9.81, variability="constant", initial="exact")
     system.add("a", foreign([v, xml["variable"]("y", "output")]), g=3.0)
-    assert resolve(system).problems == ["a.g: it is a constant of the model and cannot be set"]
+    assert said(resolve(system)) == ["a.g: it is a constant of the model and cannot be set"]
 
 
 def test_a_swap_drops_what_the_new_model_lacks(started):
@@ -399,7 +407,7 @@ def test_a_required_input_that_nothing_feeds(resolve, mine):
     system = System(step=0.2)
     system.add("it", mine("Needy"))
     remedy = "is a required input and nothing feeds it: connect it, or give it a start value to hold it constant"
-    assert resolve(system).problems == [f"it.{n} {remedy}" for n in ("needed", "needed_row[1]", "needed_row[2]")]
+    assert said(resolve(system)) == [f"it.{n} {remedy}" for n in ("needed", "needed_row[1]", "needed_row[2]")]
     system.instances["it"].start.update(needed=1.0, needed_row=2.0)
     assert resolve(system).problems == []
 
@@ -410,7 +418,7 @@ def test_an_input_with_a_broken_connection_is_not_told_twice(resolve, mine, pair
     system.add("it", mine("Needy"))
     system.connect("a.qqq", "it.needed")
     system.connect("a.row", "it.needed_row")
-    found = resolve(system).problems
+    found = said(resolve(system))
     assert len(found) == 2
     assert "has no variable 'qqq'" in found[0]
     assert "3 elements, the input 2" in found[1]
@@ -421,7 +429,7 @@ def test_fed_twice(pair, resolve):
     system.connect("a.metres", "b.row[2]")
     system.connect("a.row", "b.row")
     system.connections[1].origin = "x.toml:9"
-    assert resolve(system).problems == ["x.toml:9: b.row[2] is fed twice: by 'a.metres' and by 'a.row'"]
+    assert said(resolve(system)) == ["x.toml:9: b.row[2] is fed twice: by 'a.metres' and by 'a.row'"]
 
 
 def test_an_open_input_of_another_maker_s_fmu_keeps_its_start_value(resolve, foreign, xml):
@@ -467,7 +475,7 @@ def test_a_step_off_the_sample_time(resolve, mine, step, fits):
         f"it: the communication step {step:g} s is not a whole multiple of its sample_time 0.2 s: "
         "set step or it.sample_time"
     )
-    assert resolve(system).problems == ([] if fits else [problem])
+    assert said(resolve(system)) == ([] if fits else [problem])
 
 
 def test_a_sample_time_that_was_set_counts(resolve, mine):
@@ -479,7 +487,7 @@ def test_a_sample_time_that_was_set_counts(resolve, mine):
 def test_a_sample_time_that_divides_nothing(resolve, mine):
     system = System(step=0.3)
     system.add("it", mine("Needy"), needed=0.0, needed_row=0.0, sample_time=1e-320)
-    assert "is not a whole multiple of its sample_time 9.99989e-321 s" in resolve(system).problems[0]
+    assert "is not a whole multiple of its sample_time 9.99989e-321 s" in said(resolve(system))[0]
 
 
 @pytest.mark.parametrize("own", ["", "String"])

@@ -14,7 +14,7 @@ from railcosim.orchestrator.master.algorithms import iterative
 from railcosim.orchestrator.master.algorithms.iterative import _ACCELERATIONS, find_blocks
 from railcosim.orchestrator.run.execution import execute, run
 from railcosim.orchestrator.system import Connection, System
-from railcosim.orchestrator.wiring.resolution import Link
+from railcosim.orchestrator.wiring import Link
 
 BODY = """
 class Lag(Base):
