@@ -1,23 +1,10 @@
 """The errors of this package: one small family, each also the builtin a caller would catch."""
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from itertools import groupby
 
-from ..components.spelling import did_you_mean
-
-__all__ = [
-    "CouplingError",
-    "ExpressionError",
-    "FmuError",
-    "FmuFileError",
-    "LostError",
-    "RailcosimError",
-    "RunError",
-    "ScenarioError",
-    "StoppedError",
-    "WindowError",
-    "did_you_mean",
-]
+from .names import SignalName
+from .problems import Problem
 
 
 class RailcosimError(Exception):
@@ -25,14 +12,24 @@ class RailcosimError(Exception):
 
 
 class ScenarioError(RailcosimError, ValueError):
-    """The user's input is wrong. `problems` holds one sentence per mistake; `str()` lists them all."""
+    """The user's input is wrong. `problems` holds all mistakes; `str()` lists them, a line each."""
 
-    def __init__(self, problems: str | Sequence[str]) -> None:
-        self.problems: list[str] = [problems] if isinstance(problems, str) else list(problems)
+    def __init__(self, problems: str | Problem | Iterable[Problem]) -> None:
+        match problems:
+            case str():
+                self.problems = [Problem("", problems)]
+            case Problem():
+                self.problems = [problems]
+            case _:
+                self.problems = list(problems)
         super().__init__(self.problems)
 
     def __str__(self) -> str:
-        return "\n".join(self.problems)
+        return "\n".join(map(str, self.problems))
+
+    def at(self, place: str, *names: SignalName) -> list[Problem]:
+        """Its problems, seen from further out."""
+        return [problem.at(place, *names) for problem in self.problems]
 
 
 class ExpressionError(ScenarioError):

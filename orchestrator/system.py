@@ -173,9 +173,3 @@ class System:
     def connect(self, source: str, target: str, delay: int = 0, scale: float = 1.0, offset: float = 0.0) -> None:
         """Let an input follow an output; both are written ``"instance.variable"``."""
         self.connections.append(Connection(source, target, delay, scale, offset))
-
-
-def split(reference: str) -> tuple[str, str]:
-    """``"train[1].force"`` -> ``("train[1]", "force")``; the variable part is empty where there is no dot."""
-    instance, _, variable = reference.partition(".")
-    return instance, variable

@@ -8,8 +8,9 @@ from typing import Literal
 
 import numpy as np
 
-from ..errors import ExpressionError, ScenarioError, did_you_mean
+from ..errors import ExpressionError, ScenarioError
 from ..evaluation import FUNCTIONS, Call, Node, Number, Operation, Reference, parse
+from ..problems import Problem, suggestion
 
 Better = Literal["smaller", "larger", "none"]
 DIRECTIONS: tuple[Better, ...] = ("smaller", "larger", "none")
@@ -100,9 +101,10 @@ def read_directions(texts: Sequence[str], metrics: Mapping[str, str]) -> dict[st
         name, _, given = text.partition("=")
         direction = next((d for d in DIRECTIONS if d == given.strip()), None)
         if direction is None:
-            problems.append(f"--better {text}: write METRIC=smaller, METRIC=larger or METRIC=none")
+            problems.append(Problem(f"--better {text}", "write METRIC=smaller, METRIC=larger or METRIC=none"))
         elif name.strip() not in metrics:
-            problems.append(f"--better {text}: there is no metric '{name.strip()}'{did_you_mean(name, metrics)}")
+            unknown = f"there is no metric '{name.strip()}'"
+            problems.append(Problem(f"--better {text}", unknown, suggestion(name, metrics)))
         else:
             found[name.strip()] = direction
     if problems:

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from ..errors import ScenarioError, did_you_mean
+from ..errors import ScenarioError
+from ..problems import Problem, suggestion
 from ..scenario import load, shipped
 from ..system import System
 
@@ -38,7 +39,8 @@ def published_cases(paper: str | None = None) -> list[Case]:
             command = f"orchestrate run {name}" + ("" if plain else f" --preset {preset}")
             found.append(Case(load(name, preset=preset), command))
     if not found:
-        raise ScenarioError(f"no published case belongs to {paper!r}{did_you_mean(paper or '', names)}")
+        none = f"no published case belongs to {paper!r}"
+        raise ScenarioError(Problem("", none, suggestion(paper or "", names)))
     return found
 
 

@@ -14,6 +14,7 @@ from typing import Any
 
 from ..errors import FmuError, RailcosimError, ScenarioError
 from ..fmi import Kind
+from ..problems import Problem
 from ..run import Progress, Run, execute
 from ..scenario import load
 from ..system import System
@@ -167,7 +168,7 @@ def variants(
             found[name if name not in found else f"{title} {swap}"] = load(scenario, swaps=parts, **common)
     missing = [preset for preset in presets if preset not in owners]
     if missing:
-        raise ScenarioError([f"none of the scenarios has a preset '{preset}'" for preset in missing])
+        raise ScenarioError([Problem("", f"none of the scenarios has a preset '{preset}'") for preset in missing])
     return found
 
 
@@ -203,7 +204,7 @@ def compare(
     directory = Path(output) if output is not None else None
     comparison = Comparison([Variant(name, system) for name, system in systems.items()], directory=directory)
     if not comparison.variants:
-        raise ScenarioError("there is nothing to compare; name a scenario")
+        raise ScenarioError(Problem("", "there is nothing to compare", "name a scenario"))
     if directory is not None:
         directory.mkdir(parents=True, exist_ok=True)
         for variant, name in zip(comparison.variants, _folders(comparison.names), strict=True):
@@ -213,7 +214,7 @@ def compare(
         if variant.status == "interrupted":
             break
     if all(variant.run is None for variant in comparison.variants):
-        raise ScenarioError([f"{variant.name}: {variant.error}" for variant in comparison.variants])
+        raise ScenarioError([Problem(variant.name, variant.error) for variant in comparison.variants])
     comparison.rows = _rows(comparison.variants, directions or {})
     if directory is not None:
         if figures:

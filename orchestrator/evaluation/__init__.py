@@ -13,7 +13,7 @@ from .metrics import (
     metric_indices,
     unit_of,
 )
-from .published import PUBLISHED_KEYS, PublishedRow, check_published, judge_published, split_metric
+from .published import PUBLISHED_KEYS, PublishedRow, check_entry, check_published, judge_published, split_metric
 from .requirements import Verdict, check_requirements, judge_requirements, parse_requirement
 from .signals import Signals
 from .syntax import Call, Node, Number, Operation, Reference
@@ -33,6 +33,7 @@ __all__ = [
     "Reference",
     "Signals",
     "Verdict",
+    "check_entry",
     "check_metrics",
     "check_published",
     "check_requirements",

@@ -11,7 +11,8 @@ from typing import Any
 
 import numpy as np
 
-from ..errors import ExpressionError, did_you_mean
+from ..errors import ExpressionError
+from ..problems import Problem, suggestion
 from .functions import ARITHMETIC, LOGIC, Function, Value, call_problem, logical, where
 from .signals import Signals
 from .syntax import Call, Group, Name, Node, Number, Operation, Reference, Span
@@ -29,9 +30,9 @@ class Scope:
     functions: Mapping[str, Function]
     constants: Mapping[str, Any]
 
-    def error(self, message: str) -> ExpressionError:
+    def error(self, problem: str | Problem) -> ExpressionError:
         """An error that quotes the expression."""
-        return ExpressionError(f"'{self.text}': {message}")
+        return ExpressionError(ExpressionError(problem).at(f"'{self.text}'"))
 
     @cached_property
     def names(self) -> frozenset[str]:
@@ -90,21 +91,21 @@ class Scope:
         return [n for ks, n in sorted(found) if all(a <= k <= b for k, (a, b) in zip(ks, spans, strict=True))]
 
 
-def unknown_signal(reference: Reference, names: Collection[str]) -> str:
+def unknown_signal(reference: Reference, names: Collection[str]) -> Problem:
     """What to say about a reference that stands for nothing."""
     family = re.escape(re.sub(r"\[[^\]]*\]", "[:]", reference.text)).replace(r":\]", r"[\d,]+\]")
     near = [name for name in names if re.fullmatch(family, name)]
     if near:
         near.sort(key=lambda name: [(len(k), k) for k in re.findall(r"\d+", name)])
-        return f"there is no '{reference.text}'; there are '{near[0]}' to '{near[-1]}'"
+        return Problem("", f"there is no '{reference.text}'", f"there are '{near[0]}' to '{near[-1]}'")
     written = re.findall(r"\[[^\]]*\]", reference.text)
 
     def as_written(name: str) -> str:
         indices = iter(written)
         return re.sub(r"\[[^\]]*\]", lambda _: next(indices, "[i]"), name)
 
-    nearest = did_you_mean(reference.text, {as_written(name) for name in names}) or "; 'describe' lists an instance"
-    return f"there is no signal or parameter '{reference.text}'{nearest}"
+    nearest = suggestion(reference.text, {as_written(name) for name in names}) or "'describe' lists an instance"
+    return Problem("", f"there is no signal or parameter '{reference.text}'", nearest)
 
 
 def evaluate(node: Node, scope: Scope) -> Value:  # noqa: PLR0911 (one a kind of node)
@@ -114,7 +115,7 @@ def evaluate(node: Node, scope: Scope) -> Value:  # noqa: PLR0911 (one a kind of
             return np.asarray(value)
         case Name(name=name):
             if name not in scope.constants:
-                raise scope.error(f"'{name}' is not known here{did_you_mean(name, scope.constants)}")
+                raise scope.error(Problem("", f"'{name}' is not known here", suggestion(name, scope.constants)))
             return np.asarray(scope.constants[name])
         case Reference():
             return scope.reference(node)

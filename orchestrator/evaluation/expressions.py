@@ -11,7 +11,9 @@ from typing import Any, TypeVar
 
 import numpy as np
 
-from ..errors import ExpressionError, WindowError, did_you_mean
+from ..errors import ExpressionError, WindowError
+from ..names import SignalName
+from ..problems import Problem, suggestion
 from .calculation import INDEX, Scope, evaluate, unknown_signal
 from .functions import CONSTANTS, ELEMENTWISE, Function, Value, call_problem
 from .signals import Rehearsal, Signals
@@ -79,7 +81,7 @@ class Expression:
         scope = self._scope(Rehearsal(names), {} if index is None else {"i": index})
         return [scope.resolve(reference) for reference in self.references]
 
-    def check(self, names: Collection[str], constants: Collection[str] = ()) -> list[str]:
+    def check(self, names: Collection[str], constants: Collection[str] = ()) -> list[Problem]:
         """Every problem that can be found before a run, each with the column and the nearest valid name.
 
         `constants` are further bare names the expression may use, such as the variable of a function plot.
@@ -87,7 +89,7 @@ class Expression:
         known = {*CONSTANTS, *constants, "time", "count", *(["i"] if self.references else [])}
         try:
             problems = [
-                f"'{self.text}', column {node.column}: {problem}"
+                problem.at(f"'{self.text}', column {node.column}")
                 for node in walk(self.tree)
                 if not isinstance(node, Number | Group | Operation) and (problem := self._problem(node, names, known))
             ]
@@ -97,7 +99,7 @@ class Expression:
             return problems
         instances = (None,) if "i" in constants else self.instances(names)
         if not instances:
-            return [f"'{self.text}': there is no i for which all of its signals exist; mend the indices"]
+            return [Problem(f"'{self.text}'", "there is no i for which all of its signals exist", "mend the indices")]
         try:
             self.evaluate(Rehearsal(names), instances[0], **dict.fromkeys(constants, 1.0))
         except WindowError:
@@ -106,18 +108,18 @@ class Expression:
             return error.problems
         return []
 
-    def _problem(self, node: Name | Reference | Call, names: Collection[str], known: Collection[str]) -> str:
+    def _problem(self, node: Name | Reference | Call, names: Collection[str], known: Collection[str]) -> Problem | None:
         match node:
             case Name(name=name) if name not in known:
-                inside = next((full for full in names if re.match(re.escape(name) + r"[.\[]", full)), "")
-                remedy = f"; '{name}' is an instance: name a variable, as in '{inside}'" if inside else ""
-                remedy = "; an index stands in brackets, as in train[i].speed" if name == "i" else remedy
-                return f"unknown name '{name}'{remedy or did_you_mean(name, known)}"
+                inside = next((full for full in names if name == SignalName.parse(full).group), "")
+                remedy = f"'{name}' is an instance: name a variable, as in '{inside}'" if inside else ""
+                remedy = "an index stands in brackets, as in train[i].speed" if name == "i" else remedy
+                return Problem("", f"unknown name '{name}'", remedy or suggestion(name, known))
             case Call():
                 return call_problem(node, self.functions)
             case Reference() if not self._exists(node, names):
                 return unknown_signal(node, names)
-        return ""
+        return None
 
     def _exists(self, reference: Reference, names: Collection[str]) -> bool:
         """Whether it stands for something, for some i at least."""
@@ -139,11 +141,11 @@ class Expression:
             with np.errstate(all="ignore"):
                 return rule(self.tree, scope)
         except ExpressionError as error:
-            located = [p if p.startswith(f"'{self.text}'") else f"'{self.text}': {p}" for p in error.problems]
+            located = [problem if problem.place else problem.at(f"'{self.text}'") for problem in error.problems]
             raise type(error)(located) from None
         except ValueError as error:
-            reason = f"its parts differ in their number of rows ({error}); combine arrays of one size"
-            raise scope.error(reason) from None
+            reason = f"its parts differ in their number of rows ({error})"
+            raise scope.error(Problem("", reason, "combine arrays of one size")) from None
 
     def evaluate(self, signals: Signals, index: int | None = None, **constants: Any) -> float | Value:
         """The value: a number, or an array (T,), or (n, T) with one row per signal of a slice.
@@ -170,12 +172,12 @@ def evaluate_constant(text: str, **constants: float | bool) -> float | bool:
     expression = parse(text)
     if expression.references:
         signal = expression.references[0].text
-        raise ExpressionError(f"'{text}': a signal such as '{signal}' has no value before the run")
+        raise ExpressionError(Problem(f"'{text}'", f"a signal such as '{signal}' has no value before the run"))
     names = {*CONSTANTS, *constants}
     for node in walk(expression.tree):
         if isinstance(node, Name) and node.name not in names:
-            nearest = did_you_mean(node.name, names)
-            raise ExpressionError(f"'{text}', column {node.column}: unknown name '{node.name}'{nearest}")
+            nearest = suggestion(node.name, names)
+            raise ExpressionError(Problem(f"'{text}', column {node.column}", f"unknown name '{node.name}'", nearest))
     problems = expression.check((), names)
     if problems:
         raise ExpressionError(problems)

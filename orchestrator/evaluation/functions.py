@@ -12,7 +12,7 @@ from typing import Any, TypeAlias
 import numpy as np
 from numpy.typing import NDArray
 
-from ..errors import did_you_mean
+from ..problems import Problem, suggestion
 from .syntax import Call, Group
 
 CONSTANTS = {"pi": np.pi, "inf": np.inf, "nan": np.nan, "true": True, "false": False}
@@ -79,20 +79,20 @@ ELEMENTWISE: dict[str, Function] = {
 }
 
 
-def call_problem(call: Call, functions: Mapping[str, Function]) -> str:
+def call_problem(call: Call, functions: Mapping[str, Function]) -> Problem | None:
     """What is wrong with a call: an unknown function or argument, too many or too few of them, or a list among them."""
     if call.name not in functions:
-        nearest = did_you_mean(call.name, functions) or f"; there are {', '.join(sorted(functions))}"
-        return f"unknown function '{call.name}'{nearest}"
+        nearest = suggestion(call.name, functions) or f"there are {', '.join(sorted(functions))}"
+        return Problem("", f"unknown function '{call.name}'", nearest)
     signature = functions[call.name].arguments
     for word in call.keywords:
         if word not in signature.parameters:
-            return f"{call.name} has no argument '{word}'{did_you_mean(word, signature.parameters)}"
+            return Problem("", f"{call.name} has no argument '{word}'", suggestion(word, signature.parameters))
     plain = len(call.arguments) - len(call.keywords)
     named = dict(zip(call.keywords, call.arguments[plain:], strict=True))
     try:
         given = signature.bind(*call.arguments[:plain], **named).arguments
     except TypeError as error:
-        return f"{call.name}({', '.join(signature.parameters)}): {error}"
+        return Problem(f"{call.name}({', '.join(signature.parameters)})", str(error))
     lists = [word for word, argument in given.items() if isinstance(argument, Group) and word != "outside"]
-    return f"{call.name}: {lists[0]} takes a signal or a number, not a list" if lists else ""
+    return Problem(call.name, f"{lists[0]} takes a signal or a number, not a list") if lists else None

@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import ExpressionError, WindowError
+from ..problems import Problem
 from .expressions import Expression, parse
 from .functions import ELEMENTWISE, Function
 from .platoon import PLATOON
@@ -138,7 +139,7 @@ def _at_sample(signals: Signals, x: Array) -> Array:
     return np.concatenate([x[..., 1:], x[..., -1:]], axis=-1)
 
 
-EVERY_STEP = "at_sample needs every communication step recorded; set record = step, or leave record out"
+EVERY_STEP = Problem("", "at_sample needs every communication step recorded", "set record = step, or leave record out")
 _PLAIN: dict[str, tuple[str, Callable[[Window], Any]]] = {  # name: unit, rule
     "min": ("same", lambda w: w.kept.min()),
     "max": ("same", lambda w: w.kept.max()),
@@ -262,7 +263,7 @@ class MetricChange:
 
 def check_metrics(
     table: Mapping[str, str], names: Collection[str], every_step: bool = True, parameters: Collection[str] | None = None
-) -> list[str]:
+) -> list[Problem]:
     """Every problem of a [metrics] table that can be found before a run.
 
     Args:
@@ -271,19 +272,20 @@ def check_metrics(
         every_step: whether each communication step is recorded.
         parameters: which of the names are parameters; without it a forgotten reducer shows only after the run.
     """
-    problems: list[str] = []
+    problems: list[Problem] = []
     for name, text in table.items():
+        place = f"metric '{name}'"
         try:
             expression = parse(text, FUNCTIONS)
         except ExpressionError as error:
-            problems += [f"metric '{name}': {problem}" for problem in error.problems]
+            problems += error.at(place)
             continue
         found = expression.check(names)
         if not found and parameters is not None and _varies(expression, expression.tree, names, parameters):
             found = [_not_reduced(text)]
-        problems += [f"metric '{name}': {problem}" for problem in found]
+        problems += [problem.at(place) for problem in found]
         if expression.calls("at_sample") and not every_step:
-            problems.append(f"metric '{name}': '{text}': {EVERY_STEP}")
+            problems.append(EVERY_STEP.at(f"{place}: '{text}'"))
     return problems
 
 
@@ -298,8 +300,8 @@ def _varies(expression: Expression, node: Node, names: Collection[str], paramete
     return any(_varies(expression, child, names, parameters) for child in children)
 
 
-def _not_reduced(text: str) -> str:
-    return f"'{text}' is a signal, not a number; reduce it, as in max({text})"
+def _not_reduced(text: str) -> Problem:
+    return Problem("", f"'{text}' is a signal, not a number", f"reduce it, as in max({text})")
 
 
 def metric_indices(table: Mapping[str, str], names: Collection[str]) -> dict[str, tuple[int | None, ...]]:

@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import ExpressionError, WindowError
+from ..problems import Problem
 from .signals import Signals
 from .time_windows import Window, scalar, window_of
 
@@ -28,7 +29,7 @@ def _phase(signals: Signals, x: Any, after: Any, until: Any) -> tuple[Array, Arr
     if until is not None:
         inside = inside & (signals.time < scalar(until, "until") - 1e-6 * signals.step)
     if not inside.any():
-        raise WindowError("no recorded point lies in the phase; widen it, or record more often")
+        raise WindowError(Problem("", "no recorded point lies in the phase", "widen it, or record more often"))
     begin = float(signals.time[0]) if after is None else scalar(after, "after")
     return signals.time[inside] - begin, seen.rows[:, inside]
 

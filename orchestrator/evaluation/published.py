@@ -1,12 +1,12 @@
 """Published values beside measured ones. The numbers stand in the scenario (`[[published]]`), never in code."""
 
 import math
-import re
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, Literal
 
-from ..errors import did_you_mean
+from ..names import SignalName
+from ..problems import Problem, suggestion
 from .metrics import Metric
 
 PUBLISHED_KEYS = ("metric", "preset", "value", "tolerance", "where", "status", "claim")
@@ -34,15 +34,15 @@ class PublishedRow:
 
 def split_metric(text: str) -> tuple[str, int | None]:
     """`gap[3]` as ("gap", 3), `settling` as ("settling", None)."""
-    match = re.fullmatch(r"(.*)\[([0-9]{1,9})\]", text)
-    return (match[1], int(match[2])) if match else (text, None)
+    name = SignalName(text)
+    return name.group, name.number
 
 
 def check_published(
     entries: Sequence[Mapping[str, Any]],
     metrics: Mapping[str, Collection[int | None]],
     presets: Collection[str],
-) -> list[str]:
+) -> list[Problem]:
     """Every problem of the [[published]] entries.
 
     Args:
@@ -51,65 +51,71 @@ def check_published(
         presets: every valid preset name, the default one included.
     """
     return [
-        f"[[published]] entry {number} ({entry.get('metric', 'no metric')}): {problem}"
+        problem.at(f"[[published]] entry {number} ({entry.get('metric', 'no metric')})")
         for number, entry in enumerate(entries, 1)
-        for problem in _problems(entry, metrics, presets)
+        for _, problem in check_entry(entry, metrics, presets)
     ]
 
 
-def _problems(
+def check_entry(
     entry: Mapping[str, Any], metrics: Mapping[str, Collection[int | None]], presets: Collection[str]
-) -> list[str]:
-    problems = [
-        f"unknown key '{key}'{did_you_mean(key, PUBLISHED_KEYS) or _listed(PUBLISHED_KEYS)}"
-        for key in entry
-        if key not in PUBLISHED_KEYS
-    ]
+) -> Iterator[tuple[str, Problem]]:
+    """Every problem of one entry, each with the key that it stands under; the arguments are those of all entries."""
+    for key in entry:
+        if key not in PUBLISHED_KEYS:
+            near = suggestion(key, PUBLISHED_KEYS) or _listed(PUBLISHED_KEYS)
+            yield key, Problem("", f"unknown key '{key}'", near)
     for key in ("where", "claim", "preset", "metric", "status"):
         if key in entry and not isinstance(entry[key], str):
-            problems.append(f"{key} must be text, not {entry[key]!r}")
+            yield key, Problem("", f"{key} must be text, not {entry[key]!r}")
     if not isinstance(entry.get("metric", ""), str) or not isinstance(entry.get("preset", ""), str):
-        return problems
-    problems += _metric_problems(entry, metrics)
+        return
+    for problem in _metric_problems(entry, metrics):
+        yield "metric", problem
     status, preset = entry.get("status"), entry.get("preset")
     if status not in STATUSES:
-        problems.append(f"status must be one of {', '.join(STATUSES)}{did_you_mean(str(status), STATUSES)}")
+        near = suggestion(str(status), STATUSES)
+        yield "status", Problem("", f"status must be one of {', '.join(STATUSES)}", near)
     if preset is not None and preset not in presets:
-        problems.append(f"unknown preset '{preset}'{did_you_mean(preset, presets) or _listed(presets)}")
-    return problems + _number_problems(entry)
+        near = suggestion(preset, presets) or _listed(presets)
+        yield "preset", Problem("", f"unknown preset '{preset}'", near)
+    yield from _number_problems(entry)
 
 
-def _metric_problems(entry: Mapping[str, Any], metrics: Mapping[str, Collection[int | None]]) -> list[str]:
+def _metric_problems(entry: Mapping[str, Any], metrics: Mapping[str, Collection[int | None]]) -> Iterator[Problem]:
     if "metric" not in entry:
-        return ["metric is missing; name the metric that measures this value"]
+        yield Problem("", "metric is missing", "name the metric that measures this value")
+        return
     name, index = split_metric(entry["metric"])
     if name not in metrics:
-        return [f"unknown metric '{name}'{did_you_mean(name, metrics) or _listed(metrics)}"]
+        yield Problem("", f"unknown metric '{name}'", suggestion(name, metrics) or _listed(metrics))
+        return
     indices = metrics[name]
     if index in indices or not indices:  # none: the metric itself is wrong and has been told
-        return []
+        return
     if None in indices:
-        return [f"metric '{name}' has a single value; leave out [{index}]"]
+        yield Problem("", f"metric '{name}' has a single value", f"leave out [{index}]")
+        return
     valid = ", ".join(f"{name}[{i}]" for i in indices)
-    return [f"metric '{name}' has one value for each i; write one of {valid}"]
+    yield Problem("", f"metric '{name}' has one value for each i", f"write one of {valid}")
 
 
-def _number_problems(entry: Mapping[str, Any]) -> list[str]:
-    problems = []
+def _number_problems(entry: Mapping[str, Any]) -> Iterator[tuple[str, Problem]]:
     value, tolerance = entry.get("value"), entry.get("tolerance")
     if value is None and "claim" not in entry:
-        problems.append("give a value, or a claim in words")
+        yield "value", Problem("", "give a value, or a claim in words")
     if value is not None and (not isinstance(value, int | float) or math.isnan(value)):
-        problems.append(f"value must be a number, inf or a boolean, not {value!r}; put words into claim")
+        message = f"value must be a number, inf or a boolean, not {value!r}"
+        yield "value", Problem("", message, "put words into claim")
     if tolerance is not None and (
         isinstance(tolerance, bool) or not isinstance(tolerance, int | float) or not 0 <= tolerance < math.inf
     ):
-        problems.append(f"tolerance must be a number >= 0, absolute and in the unit of the metric, not {tolerance!r}")
-    return problems
+        message = f"tolerance must be a number >= 0, absolute and in the unit of the metric, not {tolerance!r}"
+        yield "tolerance", Problem("", message)
 
 
 def _listed(names: Collection[str]) -> str:
-    return f"; there are {', '.join(sorted(names))}" if names else "; there are none"
+    return f"there are {', '.join(sorted(names))}" if names else "there are none"
 
 
 def judge_published(

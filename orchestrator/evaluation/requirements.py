@@ -13,7 +13,9 @@ from typing import Any, Literal, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from ..errors import ExpressionError, WindowError, did_you_mean
+from ..errors import ExpressionError, WindowError
+from ..names import SignalName
+from ..problems import Problem, suggestion
 from .calculation import Scope, evaluate
 from .expressions import Expression, evaluate_constant, parse
 from .functions import CONSTANTS
@@ -119,13 +121,14 @@ class Requirement:
     end: float | None = None
     outside: tuple[tuple[float, float], ...] = ()
 
-    def check(self, names: Collection[str]) -> list[str]:
+    def check(self, names: Collection[str]) -> list[Problem]:
         """Every problem that can be found before a run; `names` are the signals to be recorded and the parameters."""
         problems = self.condition.check(names)
         shapeless = [node for node in _conditions(self.condition.tree) if not _can_be_true(node)]
         if shapeless and not problems:
-            problems = [f"'{self.condition.text}' is a number, not a condition; compare it, as in abs(x) <= 1"]
-        return [f"requirement '{self.name}': {problem}" for problem in problems]
+            number = f"'{self.condition.text}' is a number, not a condition"
+            return [Problem("", number, "compare it, as in abs(x) <= 1")]
+        return problems
 
     def evaluate(self, signals: Signals) -> Verdict:
         """Judge a run.
@@ -188,8 +191,8 @@ class Requirement:
         """The index a row of a slice stands for: 3 for the second row of `train[2:].speed`."""
         resolved = self.condition.resolve([*signals.names(), *signals.parameters])
         for reference, names in zip(self.condition.references, resolved, strict=True):
-            if reference.stacked and len(names) == rows and (number := re.search(r"\[(\d+)", names[row])):
-                return int(number[1])
+            if reference.stacked and len(names) == rows:
+                return next(iter(SignalName.parse(names[row]).indices), None)
         return None
 
 
@@ -250,10 +253,10 @@ def _time(word: str, text: str) -> float:
 def _window(text: str) -> tuple[float, float]:
     match = re.fullmatch(r"\[([^,]+),([^,]+)\]", text)
     if not match:
-        raise ExpressionError(f"'outside {text}' is not a time window; write outside [210, 240]")
+        raise ExpressionError(Problem("", f"'outside {text}' is not a time window", "write outside [210, 240]"))
     first, last = _time("outside", match[1]), _time("outside", match[2])
     if first > last:
-        raise ExpressionError(f"'outside {text}' ends before it starts; swap the two")
+        raise ExpressionError(Problem("", f"'outside {text}' ends before it starts", "swap the two"))
     return first, last
 
 
@@ -261,51 +264,52 @@ def parse_requirement(name: str, text: str) -> Requirement:
     """Read a requirement such as `always abs(train[i].acceleration) <= 1.0 outside [210, 240]`.
 
     Raises:
-        ExpressionError: with every problem of the text.
+        ExpressionError: with every problem of the text, which does not say the name.
     """
     text = re.sub(r"\s+", " ", text).strip()
     quantifier, _, rest = text.partition(" ")
     if quantifier not in QUANTIFIERS:
-        nearest = did_you_mean(quantifier, QUANTIFIERS)
-        raise ExpressionError(f"requirement '{name}': '{text}' does not say when{nearest or f'; {_MISSING}'}")
+        nearest = suggestion(quantifier, QUANTIFIERS) or _MISSING
+        raise ExpressionError(Problem("", f"'{text}' does not say when", nearest))
     (_, condition), *clauses = _clauses(rest)
     times: dict[str, float] = {}
     outside: list[tuple[float, float]] = []
-    problems: list[str] = []
+    problems: list[Problem] = []
     for word, argument in clauses:
         try:
             if word == "outside":
                 outside.append(_window(argument))
             elif word in times:
-                problems.append(f"'{word}' stands twice; keep one")
+                problems.append(Problem("", f"'{word}' stands twice", "keep one"))
             else:
                 times[word] = _time(word, argument)
         except ExpressionError as error:
             problems += error.problems
     start, end = times.get("from"), times.get("until")
     if start is not None and end is not None and start > end:
-        problems.append(f"'from {start:g} until {end:g}' ends before it starts; swap the two")
+        problems.append(Problem("", f"'from {start:g} until {end:g}' ends before it starts", "swap the two"))
     try:
         expression = parse(condition, FUNCTIONS)
     except ExpressionError as error:
         problems += error.problems
     if problems:
-        raise ExpressionError([f"requirement '{name}': {problem}" for problem in problems])
+        raise ExpressionError(problems)
     return Requirement(name, text, quantifier, expression, start, end, tuple(outside))
 
 
-def check_requirements(table: Mapping[str, str], names: Collection[str], every_step: bool = True) -> list[str]:
+def check_requirements(table: Mapping[str, str], names: Collection[str], every_step: bool = True) -> list[Problem]:
     """Every problem of a [require] table that can be found before a run, as `metrics.check_metrics` does it."""
-    problems: list[str] = []
+    problems: list[Problem] = []
     for name, text in table.items():
+        place = f"requirement '{name}'"
         try:
             requirement = parse_requirement(name, text)
         except ExpressionError as error:
-            problems += error.problems
+            problems += error.at(place)
             continue
-        problems += requirement.check(names)
+        problems += [problem.at(place) for problem in requirement.check(names)]
         if requirement.condition.calls("at_sample") and not every_step:
-            problems.append(f"requirement '{name}': {EVERY_STEP}")
+            problems.append(EVERY_STEP.at(place))
     return problems
 
 

@@ -12,6 +12,7 @@ from dataclasses import dataclass
 from typing import TypeAlias
 
 from ..errors import ExpressionError
+from ..problems import Problem
 
 MAX_LENGTH = 1000  # characters: Python's own parser may exhaust the C stack on monstrous input
 MAX_DEPTH = 100
@@ -128,18 +129,18 @@ class _Reader:
     def column(self, node: ast.expr) -> int:
         return len(self.text.encode()[: node.col_offset].decode(errors="replace")) + 1
 
-    def error(self, node: ast.expr, message: str) -> ExpressionError:
-        return ExpressionError(f"'{self.text}', column {self.column(node)}: {message}")
+    def error(self, node: ast.expr, message: str, remedy: str = "") -> ExpressionError:
+        return ExpressionError(Problem(f"'{self.text}', column {self.column(node)}", message, remedy))
 
     def operator(self, node: ast.expr, kind: ast.AST) -> str:
         if type(kind) not in _OPERATORS:
             remedy = _REMEDIES.get(type(kind), "there are + - * / ** < <= > >= == != and or not")
-            raise self.error(node, f"this operator is not understood; {remedy}")
+            raise self.error(node, "this operator is not understood", remedy)
         return _OPERATORS[type(kind)]
 
     def read(self, node: ast.expr, depth: int = 0) -> Node:  # noqa: PLR0911 (one a kind of node)
         if depth > MAX_DEPTH:
-            raise self.error(node, f"nested more than {MAX_DEPTH} levels deep; split the expression")
+            raise self.error(node, f"nested more than {MAX_DEPTH} levels deep", "split the expression")
         deeper = depth + 1
         match node:
             case ast.Constant(value=bool() | int() | float() as value):
@@ -170,7 +171,7 @@ class _Reader:
         """One comparison, or a chain as `and`: that evaluates what is inside twice, so no chain may stand there."""
         inner = [part for end in node.comparators[:-1] for part in ast.walk(end)]
         if any(isinstance(part, ast.Compare) and len(part.ops) > 1 for part in inner):
-            raise self.error(node, "a chain of comparisons stands inside another; part them with 'and'")
+            raise self.error(node, "a chain of comparisons stands inside another", "part them with 'and'")
         ends = [self.read(end, depth) for end in (node.left, *node.comparators)]
         signs = [self.operator(node, kind) for kind in node.ops]
         links = [Operation(sign, (a, b)) for sign, a, b in zip(signs, ends, ends[1:], strict=False)]
@@ -186,9 +187,9 @@ class _Reader:
             raise self.error(node, 'signal takes one name in quotes, exactly as recorded: signal("plant.der(x)")')
         keywords = tuple(keyword.arg for keyword in node.keywords if keyword.arg is not None)
         if len(keywords) < len(node.keywords) or any(isinstance(argument, ast.Starred) for argument in node.args):
-            raise self.error(node, "* and ** arguments are not understood; write the arguments out")
+            raise self.error(node, "* and ** arguments are not understood", "write the arguments out")
         if len(set(keywords)) < len(keywords):
-            raise self.error(node, "an argument stands twice; keep one")
+            raise self.error(node, "an argument stands twice", "keep one")
         arguments = [*node.args, *(keyword.value for keyword in node.keywords)]
         return Call(node.func.id, tuple(self.argument(x, depth) for x in arguments), keywords, self.column(node))
 
@@ -219,7 +220,7 @@ class _Reader:
 
     def span(self, node: ast.Slice, depth: int) -> Span:
         if node.step is not None:
-            raise self.error(node.step, "a slice has no step; write train[2:] or train[1:3], both ends included")
+            raise self.error(node.step, "a slice has no step", "write train[2:] or train[1:3], both ends included")
         first, last = (self.index(end, depth) if end else None for end in (node.lower, node.upper))
         return Span(first, last)
 
@@ -243,9 +244,11 @@ def read(text: str) -> tuple[str, Node]:
     """
     text = re.sub(r"\s", " ", text).strip()
     if not text:
-        raise ExpressionError("an expression is empty; write a signal or a formula, such as train[1].speed")
+        remedy = "write a signal or a formula, such as train[1].speed"
+        raise ExpressionError(Problem("", "an expression is empty", remedy))
     if len(text) > MAX_LENGTH:
-        raise ExpressionError(f"'{text[:40]}...': longer than {MAX_LENGTH} characters; split the expression")
+        message = f"longer than {MAX_LENGTH} characters"
+        raise ExpressionError(Problem(f"'{text[:40]}...'", message, "split the expression"))
     try:
         with warnings.catch_warnings():
             warnings.simplefilter("ignore")
@@ -255,8 +258,8 @@ def read(text: str) -> tuple[str, Node]:
         raise
     except SyntaxError as error:
         remedy = 'a name with other characters or a reserved word goes into signal("...")'
-        raise ExpressionError(f"'{text}', column {error.offset or 1}: {error.msg}; {remedy}") from None
+        raise ExpressionError(Problem(f"'{text}', column {error.offset or 1}", error.msg, remedy)) from None
     except (RecursionError, MemoryError):
-        raise ExpressionError(f"'{text}': nested too deeply; split the expression") from None
+        raise ExpressionError(Problem(f"'{text}'", "nested too deeply", "split the expression")) from None
     except (ValueError, OverflowError) as error:
-        raise ExpressionError(f"'{text}': {error}; write plain names and numbers") from None
+        raise ExpressionError(Problem(f"'{text}'", str(error), "write plain names and numbers")) from None

@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import ExpressionError, WindowError
+from ..problems import Problem
 from .signals import Signals
 
 Array = NDArray[np.float64]
@@ -78,7 +79,8 @@ def time_windows(outside: Any) -> list[tuple[float, float]]:
             raise ExpressionError("outside takes a window [from, to] or a list of them, as in outside = [210, 240]")
         first, last = (scalar(end, "an end of outside") for end in pair)
         if first > last:
-            raise ExpressionError(f"outside = [{first:g}, {last:g}] ends before it starts; swap the two")
+            message = f"outside = [{first:g}, {last:g}] ends before it starts"
+            raise ExpressionError(Problem("", message, "swap the two"))
         windows.append((first, last))
     return windows
 
@@ -117,7 +119,7 @@ def window_of(signals: Signals, x: Any, after: Any = None, until: Any = None, ou
         raise WindowError(f"the window lasts until {end:g} s but the recorded points end at {last:g} s")
     points = select(signals, start, end, excluded)
     if not points.any():
-        raise WindowError("no recorded point lies in the window; widen it, or record more often")
+        raise WindowError(Problem("", "no recorded point lies in the window", "widen it, or record more often"))
     intervals = points[:-1] & points[1:]
     for a, b in excluded:
         intervals &= ~((time[:-1] <= b) & (time[1:] >= a))

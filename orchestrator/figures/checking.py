@@ -5,43 +5,48 @@ from typing import Any
 
 import numpy as np
 
-from ..errors import ExpressionError, did_you_mean
+from ..errors import ExpressionError
 from ..evaluation import FUNCTIONS, parse
+from ..problems import Problem, suggestion
 from .panels import PANEL_KEYS, bands_of, panels_of, texts_of
 
 _FUNCTION_KEYS = ("name", "from", "to", "points")
 _MAX_POINTS = 100_000
 
 
-def check_figures(figures: Sequence[Mapping[str, Any]], names: Collection[str], every_step: bool = True) -> list[str]:
+def check_figures(
+    figures: Sequence[Mapping[str, Any]], names: Collection[str], every_step: bool = True
+) -> list[Problem]:
     """Every problem of the [[figures]] that can be found before a run.
 
     `names` are the signals to be recorded and the parameters; `every_step` says whether each step is recorded.
     """
-    problems: list[str] = []
+    problems: list[Problem] = []
     for number, figure in enumerate(figures, 1):
         place = f"[[figures]] entry {number} ({figure.get('title', 'no title')})"
         if not isinstance(figure.get("title"), str) or not figure["title"].strip():
-            problems.append(f"{place}: title is missing; it also names the file")
+            problems.append(Problem(place, "title is missing", "it also names the file"))
         panels = figure.get("panels")
         if panels is None:
-            problems += [f"{place}: {problem}" for problem in _panel_problems(figure, names, every_step)]
+            problems += [problem.at(place) for problem in _panel_problems(figure, names, every_step)]
             continue
         if not isinstance(panels, list) or not panels or not all(isinstance(panel, Mapping) for panel in panels):
-            problems.append(f"{place}: panels must be a list of tables, each with y")
+            problems.append(Problem(place, "panels must be a list of tables, each with y"))
             continue
         strange = [key for key in figure if key not in ("title", "x", "x_label", "x_range", "panels")]
-        problems += [f"{place}: '{key}' belongs into the panels" for key in strange]
+        problems += [Problem(place, f"'{key}' belongs into the panels") for key in strange]
         for which, panel in enumerate(panels_of(figure), 1):
-            problems += [f"{place}, panel {which}: {problem}" for problem in _panel_problems(panel, names, every_step)]
+            inner = f"{place}, panel {which}"
+            problems += [problem.at(inner) for problem in _panel_problems(panel, names, every_step)]
     return problems
 
 
-def _panel_problems(panel: Mapping[str, Any], names: Collection[str], every_step: bool) -> Iterator[str]:
+def _panel_problems(panel: Mapping[str, Any], names: Collection[str], every_step: bool) -> Iterator[Problem]:
     valid = (*PANEL_KEYS, "panels")
     for key in panel:
         if key not in valid:
-            yield f"unknown key '{key}'{did_you_mean(key, valid) or '; there are ' + ', '.join(valid)}"
+            near = suggestion(key, valid) or f"there are {', '.join(valid)}"
+            yield Problem("", f"unknown key '{key}'", near)
     yield from _shape_problems(panel)
     function = panel.get("x")
     variable = (str(function.get("name")),) if isinstance(function, Mapping) else ()
@@ -55,48 +60,51 @@ def _panel_problems(panel: Mapping[str, Any], names: Collection[str], every_step
             continue
         yield from expression.check(names, variable)
         if expression.calls("at_sample") and not every_step:
-            yield f"'{text}': at_sample needs every communication step recorded; set record = step"
+            yield Problem(f"'{text}'", "at_sample needs every communication step recorded", "set record = step")
 
 
-def _shape_problems(panel: Mapping[str, Any]) -> Iterator[str]:
+def _shape_problems(panel: Mapping[str, Any]) -> Iterator[Problem]:
     """Values of the wrong kind."""
     if not texts_of(panel.get("y")):
-        yield 'y is missing; give the expressions to draw, as in y = ["train[:].speed", "target.value"]'
+        remedy = 'give the expressions to draw, as in y = ["train[:].speed", "target.value"]'
+        yield Problem("", "y is missing", remedy)
     labels = panel.get("label")
     if labels is not None and len(texts_of(labels)) != len(texts_of(panel.get("y"))):
-        yield "label must be a list of texts, one for each entry of y"
+        yield Problem("", "label must be a list of texts, one for each entry of y")
     for key in ("x_label", "y_label", "title"):
         if key in panel and not isinstance(panel[key], str):
-            yield f"{key} must be text"
+            yield Problem("", f"{key} must be text")
     for key in ("x_range", "y_range"):
         if key in panel and not _is_range(panel[key]):
-            yield f"{key} must be two rising numbers, as in {key} = [0, 90]"
+            yield Problem("", f"{key} must be two rising numbers, as in {key} = [0, 90]")
     if "scale" in panel and not (_is_number(panel["scale"]) and panel["scale"] != 0):
-        yield "scale must be a number other than 0"
+        yield Problem("", "scale must be a number other than 0")
     elif "scale" in panel and "y_label" not in panel:
-        yield "scale needs y_label, which says the unit that is drawn"
+        yield Problem("", "scale needs y_label, which says the unit that is drawn")
     bands = panel.get("bands", [])
     if not isinstance(bands, list) or not all(map(_is_band, bands)):
-        yield "bands must be a list of levels and [low, high] pairs, each a number or an expression"
+        yield Problem("", "bands must be a list of levels and [low, high] pairs, each a number or an expression")
     x = panel.get("x")
     if isinstance(x, Mapping):
         yield from _function_problems(x)
     elif x is not None and not isinstance(x, str):
-        yield 'x must be an expression, or { name = "d", from = 0, to = 1, points = 400 } for a function plot'
+        function = '{ name = "d", from = 0, to = 1, points = 400 }'
+        yield Problem("", f"x must be an expression, or {function} for a function plot")
 
 
-def _function_problems(x: Mapping[str, Any]) -> Iterator[str]:
+def _function_problems(x: Mapping[str, Any]) -> Iterator[Problem]:
     for key in x:
         if key not in _FUNCTION_KEYS:
-            yield f"unknown key '{key}' in x{did_you_mean(key, _FUNCTION_KEYS) or '; there are name, from, to, points'}"
+            near = suggestion(key, _FUNCTION_KEYS) or "there are name, from, to, points"
+            yield Problem("", f"unknown key '{key}' in x", near)
     name = x.get("name")
     if not isinstance(name, str) or not name.isidentifier() or name in {"i", "count", "time", "pi"}:
-        yield "x.name must be a plain word that is not taken, such as d"
+        yield Problem("", "x.name must be a plain word that is not taken, such as d")
     if not _is_range([x.get("from"), x.get("to")]):
-        yield "x.from and x.to must be two rising numbers"
+        yield Problem("", "x.from and x.to must be two rising numbers")
     points = x.get("points", 400)
     if not isinstance(points, int) or not 2 <= points <= _MAX_POINTS:
-        yield f"x.points must be a whole number from 2 to {_MAX_POINTS}"
+        yield Problem("", f"x.points must be a whole number from 2 to {_MAX_POINTS}")
 
 
 def _is_number(value: Any) -> bool:

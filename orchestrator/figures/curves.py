@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 from ..errors import ExpressionError
 from ..evaluation import FUNCTIONS, Expression, Reference, Signals, parse, unit_of
+from ..problems import Problem
 from .panels import texts_of
 
 Array = NDArray[np.float64]
@@ -76,7 +77,7 @@ def _across(x: Any, signals: Signals, index: int | None, constants: Mapping[str,
         return signals.time
     values = np.asarray(parse(x, FUNCTIONS).evaluate(signals, index), dtype=np.float64)
     if not values.ndim:
-        raise ExpressionError(f"x = '{x}' is a single number; draw over a signal")
+        raise ExpressionError(Problem("", f"x = '{x}' is a single number", "draw over a signal"))
     return values
 
 

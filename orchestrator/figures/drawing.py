@@ -11,6 +11,7 @@ import numpy as np
 
 from ..errors import ExpressionError, ScenarioError
 from ..evaluation import FUNCTIONS, Signals, parse
+from ..problems import Problem
 from .curves import Curve, curves_of, x_label_of, y_label_of
 from .panels import bands_of, panels_of, share_x
 from .style import DASHES, colour, colour_and_dashes, legend, page
@@ -29,13 +30,15 @@ def draw(figures: Sequence[Mapping[str, Any]], signals: Signals, directory: Path
         ScenarioError: some figures could not be drawn; the others were.
     """
     paths: list[Path] = []
-    problems: list[str] = []
+    problems: list[Problem] = []
     for figure in figures:
         path = directory / file_name(prefix, figure["title"], paths)
         try:
             _draw_one(figure, signals, path)
-        except ValueError as error:  # an expression, or mathematics in a label that matplotlib cannot set
-            problems.append(f"figure '{figure['title']}' was not drawn: {error}")
+        except ExpressionError as error:
+            problems += error.at(f"figure '{figure['title']}' was not drawn")
+        except ValueError as error:  # mathematics in a label that matplotlib cannot set
+            problems.append(Problem(f"figure '{figure['title']}' was not drawn", str(error)))
         else:
             paths.append(path)
     if problems:
@@ -136,7 +139,7 @@ def _level(end: str | float, signals: Signals) -> float:
     """The number that an end of a band stands for."""
     value = parse(end, FUNCTIONS).evaluate(signals) if isinstance(end, str) else end
     if isinstance(value, np.ndarray):
-        raise ExpressionError(f"the band '{end}' varies over time; draw it as an entry of y")
+        raise ExpressionError(Problem("", f"the band '{end}' varies over time", "draw it as an entry of y"))
     return float(value)
 
 

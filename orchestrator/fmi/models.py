@@ -8,6 +8,8 @@ from pathlib import Path
 from ...fmus.build import Plain, package, plain
 from ...fmus.kinds import Kind, ModelKind
 from ..errors import FmuFileError, ScenarioError
+from ..names import SignalName
+from ..problems import Problem
 from ..system import Instance, System
 from .archive import Workspace
 from .binding.libraries import library
@@ -58,7 +60,7 @@ def load_models(system: System, workspace: Workspace, kind: Kind = "auto") -> di
     """
     shared: dict[str, Model] = {}
     models: dict[str, Model] = {}
-    problems: dict[str, None] = {}
+    problems: dict[Problem, None] = {}
     for instance in system.instances.values():
         key = f"{instance.model} {sorted(instance.build.items())}"
         try:
@@ -66,10 +68,10 @@ def load_models(system: System, workspace: Workspace, kind: Kind = "auto") -> di
                 shared[key] = _load(instance, workspace, kind)
             models[instance.name] = shared[key]
         except (ValueError, OSError) as error:  # ComponentError and FmuFileError among them
-            family = instance.name.partition("[")[0]
-            problems[f"{instance.origin + ': ' if instance.origin else ''}instance {family!r}: {error}"] = None
+            place = f"instance {SignalName(instance.name).group!r}"
+            problems[Problem(place, str(error)).at(instance.origin)] = None
     if problems:
-        raise ScenarioError(list(problems))
+        raise ScenarioError(problems)
     return models
 
 

@@ -6,8 +6,10 @@ import math
 from collections.abc import Iterable, Mapping
 from dataclasses import replace
 
-from ..errors import ScenarioError, did_you_mean
+from ..errors import ScenarioError
 from ..fmi import Interface, Model, Slave
+from ..names import SignalName
+from ..problems import Problem, suggestion
 from ..system import Instance, System
 from .proxy import IsolatedSlave
 
@@ -48,20 +50,19 @@ def isolate(system: System, names: Iterable[str]) -> System:
     """
     groups: dict[str, list[str]] = {ALL: list(system.instances)}
     for name in system.instances:
-        groups.setdefault(name.partition("[")[0], []).append(name)
+        groups.setdefault(SignalName(name).group, []).append(name)
     groups |= {name: [name] for name in system.instances}
     wanted = list(names)
     unknown = [name for name in wanted if name not in groups]
     if unknown:
-        raise ScenarioError(
-            [f"isolate {name!r}: the system has no such instance{did_you_mean(name, groups)}" for name in unknown]
-        )
+        none = "the system has no such instance"
+        raise ScenarioError([Problem(f"isolate {name!r}", none, suggestion(name, groups)) for name in unknown])
     chosen = {member for name in wanted for member in groups[name]}
     instances = {name: replace(x, isolate=x.isolate or name in chosen) for name, x in system.instances.items()}
     return replace(system, instances=instances)
 
 
-def check_isolation(system: System) -> list[str]:
+def check_isolation(system: System) -> list[Problem]:
     """What is wrong with how instances are to be isolated."""
     useless: dict[tuple[str, str], list[str]] = {}
     problems = []
@@ -70,30 +71,26 @@ def check_isolation(system: System) -> list[str]:
             value = getattr(instance, key)
             origin = system.origins.get(f"instances.{instance.name}.{key}", instance.origin)
             if value is not None and not instance.isolate:
-                useless.setdefault((f"{origin}: " if origin else "", key), []).append(instance.name)
+                useless.setdefault((origin, key), []).append(instance.name)
             elif value is not None and not 0.0 < value < math.inf:
-                problems.append(f"{instance.name}: {key} takes a number greater than 0, not {value!r}")
+                wrong = f"{key} takes a number greater than 0, not {value!r}"
+                problems.append(Problem(instance.name, wrong, names=(SignalName(instance.name),)))
     for (origin, key), names in useless.items():
-        family = names[0].partition("[")[0]
-        problems.append(
-            f"{origin}{', '.join(names)}: {key} is for an instance in a process of its own; set isolate = true, or run "
-            f"with --isolate {family}"
-        )
+        remedy = f"set isolate = true, or run with --isolate {SignalName(names[0]).group}"
+        problem = Problem(", ".join(names), f"{key} is for an instance in a process of its own", remedy)
+        problems.append(problem.at(origin))
     return problems
 
 
-def check_once_per_process(system: System, interfaces: Mapping[str, Interface]) -> list[str]:
+def check_once_per_process(system: System, interfaces: Mapping[str, Interface]) -> list[Problem]:
     """FMUs of which several instances share this process though they say that they cannot."""
     users: dict[str, list[str]] = {}
     for name, interface in interfaces.items():
         if interface.single_instance and not system.instances[name].isolate:
             users.setdefault(interface.guid, []).append(name)
-    return [
-        f"{', '.join(names)}: this FMU can be instantiated only once per process; give all but one of them a process "
-        "of its own by isolate = true"
-        for names in users.values()
-        if len(names) > 1
-    ]
+    what = "this FMU can be instantiated only once per process"
+    remedy = "give all but one of them a process of its own by isolate = true"
+    return [Problem(", ".join(names), what, remedy) for names in users.values() if len(names) > 1]
 
 
 def isolation_notes(system: System, models: Mapping[str, Model]) -> list[str]:

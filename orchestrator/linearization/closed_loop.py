@@ -17,17 +17,16 @@ from typing import Any
 import networkx as nx
 import numpy as np
 
-from ..errors import FmuError, ScenarioError, did_you_mean
+from ..errors import FmuError, ScenarioError
 from ..fmi import Kind, Workspace
 from ..fmi.binding import forget_paths
 from ..master import ALGORITHMS, Explicit, Master, Operation, settle
+from ..names import SignalName
+from ..problems import Problem, suggestion
 from ..run import Checked, Progress, assembled, check
 from ..system import System
 from .blocks import Array, Continuous, Stepped, make_block
 from .composition import Composition
-
-Signal = tuple[str, str]
-"""(instance, scalar variable)."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -156,9 +155,9 @@ class Loop:
 
     # ---------------------------------------------------------------- what is looked at
 
-    def _chosen_inputs(self, wanted: Sequence[str]) -> list[Signal]:
+    def _chosen_inputs(self, wanted: Sequence[str]) -> list[SignalName]:
         valid = [
-            (name, v.name)
+            SignalName(name, v.name)
             for name, block in self.blocks.items()
             for v in block.slave.interface.of("input", "output")
             if v.type == "Real"
@@ -169,23 +168,25 @@ class Loop:
         read = {link.source for target, link in self.links.items() if target not in disturbances}
         return disturbances + [s for s in valid if s in read and self.blocks[s[0]].way == "source"]
 
-    def _given_outputs(self) -> set[Signal]:
-        return {(name, v.name) for name, block in self.blocks.items() for v in block.slave.interface.of("output")}
+    def _given_outputs(self) -> set[SignalName]:
+        return {
+            SignalName(name, v.name) for name, block in self.blocks.items() for v in block.slave.interface.of("output")
+        }
 
-    def _chosen_outputs(self, wanted: Sequence[str]) -> list[Signal]:
+    def _chosen_outputs(self, wanted: Sequence[str]) -> list[SignalName]:
         """Outputs, and states that are none: for both there are derivatives."""
         moving = {name: b for name, b in self.blocks.items() if b.way != "source"}
         shown = [s for s in self._given_outputs() if self._is_real(s)]
         valid = [s for name in moving for s in sorted(shown, key=self._rank) if s[0] == name]
-        hidden = [(n, s) for n, b in moving.items() for s in b.states if (n, s) not in valid]
+        hidden = [SignalName(n, s) for n, b in moving.items() for s in b.states if (n, s) not in valid]
         if wanted:
             return _resolve(wanted, [*valid, *hidden], "--outputs")
         return [s for s in valid if s[1] in moving[s[0]].states] or valid
 
-    def _is_real(self, signal: Signal) -> bool:
+    def _is_real(self, signal: SignalName) -> bool:
         return self.blocks[signal[0]].slave.interface.variables[signal[1]].type == "Real"
 
-    def _rank(self, signal: Signal) -> int:
+    def _rank(self, signal: SignalName) -> int:
         return list(self.blocks[signal[0]].slave.interface.variables).index(signal[1])
 
     def _choose_signals(self) -> None:
@@ -204,7 +205,7 @@ class Loop:
     def linearize(self, sampled: bool) -> Linearization:
         """The continuous model where every part is continuous and no step is asked for, else that of a step."""
         stepped = [name for name, block in self.blocks.items() if not block.is_continuous]
-        delayed = [".".join(target) for target, link in self.links.items() if link.delay]
+        delayed = [str(target) for target, link in self.links.items() if link.delay]
         if not (stepped or delayed or sampled):
             return self._continuous()
         why = []
@@ -219,7 +220,7 @@ class Loop:
     def _continuous(self) -> Linearization:
         settle(self.master.exchange, self.master.coupling.sequence, self.master.time)
         sizes = {name: (block.states, block.inputs, block.outputs) for name, block in self.blocks.items()}
-        x, u, y = ([(n, s) for n, names in sizes.items() for s in names[k]] for k in range(3))
+        x, u, y = ([SignalName(n, s) for n, names in sizes.items() for s in names[k]] for k in range(3))
         a, b = np.zeros((len(x), len(x))), np.zeros((len(x), len(u)))
         c, d = np.zeros((len(y), len(x))), np.zeros((len(y), len(u)))
         at = [0, 0, 0]
@@ -237,9 +238,9 @@ class Loop:
         from_x, from_e = inner[:, : len(x)], inner[:, len(x) :]
         rows = [y.index(signal) for signal in self.outputs]
         closed: Any = a + b @ link @ from_x, b @ (link @ from_e + drive), from_x[rows], from_e[rows] + at_output[rows]
-        return self._result(Continuous(*closed), [".".join(signal) for signal in x], None)
+        return self._result(Continuous(*closed), [str(signal) for signal in x], None)
 
-    def _exchange(self, u: Sequence[Signal], y: Sequence[Signal]) -> tuple[Array, Array, Array]:
+    def _exchange(self, u: Sequence[SignalName], y: Sequence[SignalName]) -> tuple[Array, Array, Array]:
         """Which output feeds which input (times its scale), and where the chosen inputs are added."""
         place = {signal: k for k, signal in enumerate(y)}
         link = np.zeros((len(u), len(y)))
@@ -254,13 +255,13 @@ class Loop:
                 at_input[u.index(signal), column] = 1.0
         return link, at_output, at_input
 
-    def _check_loops(self, through: Array, mixing: Array, y: Sequence[Signal]) -> None:
+    def _check_loops(self, through: Array, mixing: Array, y: Sequence[SignalName]) -> None:
         """Note algebraic loops, and refuse those without a unique solution."""
         graph = nx.DiGraph((int(j), int(i)) for i, j in np.argwhere(through))
         for members in map(sorted, nx.strongly_connected_components(graph)):
             if len(members) == 1 and not through[members[0], members[0]]:
                 continue
-            names = ", ".join(".".join(y[k]) for k in members[:6]) + (", ..." if len(members) > 6 else "")
+            names = ", ".join(str(y[k]) for k in members[:6]) + (", ..." if len(members) > 6 else "")
             inside = mixing[np.ix_(members, members)]
             if 1.0 / np.linalg.cond(inside) < 1e-13:
                 raise ScenarioError(
@@ -301,16 +302,17 @@ class Loop:
     def _result(self, matrices: Continuous, states: Sequence[str], step: float | None) -> Linearization:
         if not np.isfinite(matrices.a).all():
             raise FmuError("a derivative is not finite", time=self.time)
-        signals = [*self.inputs, *self.outputs, *((n, s) for n, block in self.blocks.items() for s in block.states)]
-        units = {".".join(s): unit for s in signals if (unit := self.blocks[s[0]].slave.interface.variables[s[1]].unit)}
+        hidden = (SignalName(n, s) for n, block in self.blocks.items() for s in block.states)
+        signals = [*self.inputs, *self.outputs, *hidden]
+        units = {str(s): unit for s in signals if (unit := self.blocks[s[0]].slave.interface.variables[s[1]].unit)}
         return Linearization(
             matrices.a,
             matrices.b,
             matrices.c,
             matrices.d,
             tuple(states),
-            tuple(".".join(signal) for signal in self.inputs),
-            tuple(".".join(signal) for signal in self.outputs),
+            tuple(str(signal) for signal in self.inputs),
+            tuple(str(signal) for signal in self.outputs),
             step,
             self.time,
             self.system,
@@ -321,18 +323,18 @@ class Loop:
 
     def _values(self) -> dict[str, float]:
         known = dict(zip(self.master.signals, self.master.values, strict=True))
-        return {".".join(s): float(known[".".join(s)]) for s in self.outputs if ".".join(s) in known}
+        return {str(s): float(known[str(s)]) for s in self.outputs if str(s) in known}
 
 
-def _resolve(wanted: Sequence[str], valid: Sequence[Signal], option: str) -> list[Signal]:
+def _resolve(wanted: Sequence[str], valid: Sequence[SignalName], option: str) -> list[SignalName]:
     """The signals behind names; ``[:]`` stands for all indices, commas part several in one text.
 
     Raises:
         ScenarioError: some name stands for nothing; the nearest one is suggested.
     """
-    found: dict[Signal, None] = {}
+    found: dict[SignalName, None] = {}
     problems = []
-    names = {".".join(signal): signal for signal in valid}
+    names = {str(signal): signal for signal in valid}
     for name in (part.strip() for text in wanted for part in re.split(r",(?![^\[]*\])", text) if part.strip()):
         pattern = re.compile(re.escape(name).replace(re.escape("[:]"), r"\[[\d,]+\]") + r"(\[[\d,]+\])?")
         hits = [signal for full, signal in names.items() if full == name] or [
@@ -340,7 +342,8 @@ def _resolve(wanted: Sequence[str], valid: Sequence[Signal], option: str) -> lis
         ]
         found |= dict.fromkeys(hits)
         if not hits:
-            problems.append(f"{option} {name}: there is no such signal with a slope{did_you_mean(name, names)}")
+            none = "there is no such signal with a slope"
+            problems.append(Problem(f"{option} {name}", none, suggestion(name, names)))
     if problems:
         raise ScenarioError(problems)
     return list(found)

@@ -8,11 +8,12 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ..master import Operation
+from ..names import SignalName
 from ..wiring import Link
 from .blocks import Array, Continuous, Stepped
 
 if TYPE_CHECKING:
-    from .closed_loop import Loop, Signal
+    from .closed_loop import Loop
 
 
 class Composition:
@@ -23,12 +24,12 @@ class Composition:
 
     def __init__(self, loop: Loop, models: Mapping[str, Stepped], steps: Sequence[tuple[Operation, str]]) -> None:
         self.loop, self.models, self.steps = loop, models, steps
-        self.states = [(n, s) for n, block in loop.blocks.items() for s in block.states]
-        self.registers: list[tuple[Signal, int]] = []
+        self.states = [SignalName(n, s) for n, block in loop.blocks.items() for s in block.states]
+        self.registers: list[tuple[SignalName, int]] = []
         self._register()
         self.width = len(self.states) + len(self.registers)
         self.rows = np.eye(self.width, self.width + len(loop.inputs))
-        self.fresh: dict[Signal, Array] = {}
+        self.fresh: dict[SignalName, Array] = {}
 
     def _register(self) -> None:
         """What is read of former communication points and does not follow from the states: (signal, how old)."""
@@ -46,8 +47,8 @@ class Composition:
         rank = {slave.name: k for k, slave in enumerate(self.loop.master.coupling.sequence)}
         self.registers.sort(key=lambda r: (rank[r[0][0]], r[0][1], r[1]))
 
-    def _targets(self, name: str) -> list[Signal]:
-        return [(name, i) for i in self.loop.blocks[name].inputs if (name, i) in self.loop.links]
+    def _targets(self, name: str) -> list[SignalName]:
+        return [s for i in self.loop.blocks[name].inputs if (s := SignalName(name, i)) in self.loop.links]
 
     def _age(self, link: Link, is_fresh: bool) -> int | None:
         """How many communication points before the begin of the step the value read was recorded; None: just now."""
@@ -56,14 +57,14 @@ class Composition:
             return None if is_fresh else 0
         return age
 
-    def _must_keep(self, signal: Signal, age: int) -> bool:
+    def _must_keep(self, signal: SignalName, age: int) -> bool:
         """A present value that states determine is computed from them."""
         block = self.loop.blocks[signal[0]]
         if block.way == "source":
             return False
         return age > 0 or self._passes(signal)
 
-    def _passes(self, signal: Signal) -> bool:
+    def _passes(self, signal: SignalName) -> bool:
         block = self.loop.blocks[signal[0]]
         k = block.outputs.index(signal[1])
         return bool(self.models[signal[0]].d[k].any())
@@ -73,7 +74,7 @@ class Composition:
     def _state_rows(self, name: str) -> Array:
         return self.rows[[k for k, (n, _) in enumerate(self.states) if n == name]]
 
-    def _added(self, signal: Signal, row: Array) -> Array:
+    def _added(self, signal: SignalName, row: Array) -> Array:
         """With the deviation that is added to this signal, if one is."""
         if signal not in self.loop.inputs:
             return row
@@ -81,7 +82,7 @@ class Composition:
         row[self.width + self.loop.inputs.index(signal)] += 1.0
         return row
 
-    def _recorded(self, signal: Signal, age: int) -> Array:
+    def _recorded(self, signal: SignalName, age: int) -> Array:
         """A recorded value, ``age`` points before the begin of the step."""
         if (signal, age) in self.registers:
             return np.asarray(self.rows[len(self.states) + self.registers.index((signal, age))])
@@ -94,7 +95,7 @@ class Composition:
         block = self.loop.blocks[name]
         rows = np.zeros((len(block.inputs), self.rows.shape[1]))
         for k, variable in enumerate(block.inputs):
-            target = (name, variable)
+            target = SignalName(name, variable)
             if target in self.loop.links:
                 link = self.loop.links[target]
                 age = self._age(link, link.source[0] in stepped)
@@ -107,7 +108,7 @@ class Composition:
         """The composed matrices, and the names of the states."""
         loop, stepped = self.loop, set[str]()
         following = np.zeros_like(self.rows)
-        seen: dict[Signal, Array] = {}
+        seen: dict[SignalName, Array] = {}
         given: dict[str, Array] = {}
         for operation, name in self.steps:
             if operation == Operation.SET:
@@ -120,8 +121,9 @@ class Composition:
                 following[[k for k, (n, _) in enumerate(self.states) if n == name]] = model.phi @ x + model.gamma @ u
                 after, before = model.e @ x + model.f @ u, model.c @ x + model.d @ u
                 for k, output in enumerate(block.outputs):
-                    self.fresh[name, output] = after[k]
-                    seen[name, output] = self._added((name, output), before[k])
+                    signal = SignalName(name, output)
+                    self.fresh[signal] = after[k]
+                    seen[signal] = self._added(signal, before[k])
         for k, (signal, age) in enumerate(self.registers, len(self.states)):
             following[k] = self.fresh[signal] if age == 0 else self._recorded(signal, age - 1)
         outputs = np.array([seen[signal] for signal in loop.outputs]).reshape(-1, self.rows.shape[1])

@@ -4,8 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
 
-from ..errors import did_you_mean
 from ..fmi import Interface
+from ..names import SignalName
+from ..problems import Problem, suggestion
 from ..system import System
 from ..wiring import Wiring
 from .algebraic_loops import find_loops
@@ -13,8 +14,8 @@ from .algorithms import ALGORITHMS
 from .algorithms.refusals import listed
 
 
-def check_coupling(system: System, interfaces: Mapping[str, Interface], wiring: Wiring) -> list[str]:
-    """What is wrong with algorithm, steps and tolerances, one sentence each."""
+def check_coupling(system: System, interfaces: Mapping[str, Interface], wiring: Wiring) -> list[Problem]:
+    """What is wrong with algorithm, steps and tolerances."""
     return [
         *_check_rates(system),
         *_check_tolerances(system, interfaces),
@@ -22,22 +23,28 @@ def check_coupling(system: System, interfaces: Mapping[str, Interface], wiring: 
     ]
 
 
-def _check_rates(system: System) -> Iterable[str]:
+def _check_rates(system: System) -> Iterable[Problem]:
     duration = system.stop_time - system.start_time
     for instance in system.instances.values():
         if instance.step is None or instance.step == system.step:
             continue
-        place = f"{instance.origin}: " if instance.origin else ""
+        name = SignalName(instance.name)
+        limit = ""
         if not ALGORITHMS[system.algorithm].takes_own_steps:
             able = " and ".join(name for name, one in ALGORITHMS.items() if one.takes_own_steps)
-            yield f"{place}{instance.name} has a step of its own, which goes with {able} only"
+            limit = f"which goes with {able} only"
         elif system.algebraic_loops == "solve":
-            yield f"{place}{instance.name} has a step of its own, with which algebraic_loops = 'solve' does not go"
-        own = f"{place}{instance.name}: its step = {instance.step:g} s"
+            limit = "with which algebraic_loops = 'solve' does not go"
+        if limit:
+            yield Problem(instance.origin, f"{name} has a step of its own, {limit}", names=(name,))
+        own = f"its step = {instance.step:g} s"
         if not _is_multiple(instance.step, system.step):
-            yield f"{own} is not a whole multiple of the system's, {system.step:g} s"
+            own = f"{own} is not a whole multiple of the system's, {system.step:g} s"
         elif not _is_multiple(duration, instance.step):
-            yield f"{own} does not divide the run of {duration:g} s into whole steps"
+            own = f"{own} does not divide the run of {duration:g} s into whole steps"
+        else:
+            continue
+        yield Problem(str(name), own, names=(name,)).at(instance.origin)
 
 
 def _is_multiple(length: float, step: float) -> bool:
@@ -45,20 +52,20 @@ def _is_multiple(length: float, step: float) -> bool:
     return count > 0.5 and abs(count - round(count)) <= 1e-6
 
 
-def _check_tolerances(system: System, interfaces: Mapping[str, Interface]) -> Iterable[str]:
-    known = [
-        f"{name}.{variable}"
+def _check_tolerances(system: System, interfaces: Mapping[str, Interface]) -> Iterable[Problem]:
+    known = {
+        f"{name}.{variable}": None
         for name, interface in interfaces.items()
         for variable in (*(v.name for v in interface.of("output") if v.type == "Real"), *interface.arrays)
-    ]
+    }
     for signal in system.tolerances:
         if signal not in known:
-            origin = system.origins.get(f"simulation.tolerances.{signal}", "")
-            place = f"{origin}: " if origin else ""
-            yield f"{place}simulation.tolerances: {signal!r} is no Real output{did_you_mean(signal, known)}"
+            wrong, near = f"{signal!r} is no Real output", suggestion(signal, known)
+            problem = Problem("simulation.tolerances", wrong, near, (SignalName.parse(signal),))
+            yield problem.at(system.origins.get(f"simulation.tolerances.{signal}", ""))
     if system.min_step is not None and not ALGORITHMS[system.algorithm].varies_step:
         able = " and ".join(name for name, one in ALGORITHMS.items() if one.varies_step)
-        yield f"simulation.min_step is for {able}; the algorithm is {system.algorithm}"
+        yield Problem("", f"simulation.min_step is for {able}", f"the algorithm is {system.algorithm}")
 
 
 def describe_coupling(system: System, interfaces: Mapping[str, Interface], wiring: Wiring) -> list[str]:

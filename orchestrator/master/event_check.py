@@ -4,91 +4,98 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Mapping
+from itertools import islice
 from typing import Any
 
-from ..errors import did_you_mean
+from ..errors import ScenarioError
 from ..fmi import Interface, Variable
-from ..system import ACTIONS, Event, System, split
+from ..names import SignalName
+from ..problems import Problem, suggestion
+from ..system import ACTIONS, Event, System
 from ..wiring import Wiring, bounded
 from .algorithms import ALGORITHMS
 
 
-def check_events(system: System, interfaces: Mapping[str, Interface], wiring: Wiring) -> list[str]:
-    """What is wrong with the events, one sentence for each that is."""
+def check_events(system: System, interfaces: Mapping[str, Interface], wiring: Wiring) -> list[Problem]:
+    """What is wrong with the events, the first thing of each."""
     fed = {link.target for link in wiring.links}
-    return [
-        f"{event.origin + ': ' if event.origin else ''}event on {event.signal!r}: {problem}"
-        for event in system.events
-        if (problem := next(_problems(event, system, interfaces, fed), ""))
-    ]
+    problems = []
+    for event in system.events:
+        signal = SignalName.parse(event.signal)
+        for problem in islice(_problems(event, signal, system, interfaces, fed), 1):
+            problems.append(problem.at(f"event on {event.signal!r}", signal).at(event.origin))
+    return problems
 
 
 def _problems(
-    event: Event, system: System, interfaces: Mapping[str, Interface], fed: set[tuple[str, str]]
-) -> Iterator[str]:
-    instance, name = split(event.signal)
+    event: Event, signal: SignalName, system: System, interfaces: Mapping[str, Interface], fed: set[SignalName]
+) -> Iterator[Problem]:
+    instance, name = signal
     if instance not in interfaces:
-        yield f"there is no instance {instance!r}{did_you_mean(instance, interfaces)}"
+        yield Problem("", f"there is no instance {instance!r}", suggestion(instance, interfaces))
         return
     if event.action not in ACTIONS:
-        yield f"there is no action {event.action!r}{did_you_mean(event.action, ACTIONS)}"
+        yield Problem("", f"there is no action {event.action!r}", suggestion(event.action, ACTIONS))
         return
     interface = interfaces[instance]
     scalars = interface.scalars(name)
     if scalars is None:
         valid = [v.name for v in interface.of("input", "output", "parameter")]
-        hint = interface.why_left_out(name) or did_you_mean(name, [*valid, *interface.arrays])
-        yield f"{interface.model} has no variable {name!r}{hint}"
+        why = interface.why_left_out(name)
+        near = "" if why else suggestion(name, [*valid, *interface.arrays])
+        yield Problem("", f"{interface.model} has no variable {name!r}{why}", near)
         return
     for scalar in scalars:
         variable = interface.variables[scalar]
-        yield from _misplaced(event, variable, (instance, scalar) in fed)
+        yield from _misplaced(event, variable, SignalName(instance, scalar) in fed)
         yield from _wrong_value(event, variable)
         yield from _wrong_times(event, _step(system, instance, variable))
 
 
-def _misplaced(event: Event, variable: Variable, is_fed: bool) -> Iterator[str]:
+def _misplaced(event: Event, variable: Variable, is_fed: bool) -> Iterator[Problem]:
     """Why such an event cannot happen to such a variable."""
     causality = variable.causality
     if event.action == "set":
         if causality == "parameter" and variable.variability != "tunable":
-            yield "it is a fixed parameter: only tunable ones can change"
+            yield Problem("", "it is a fixed parameter: only tunable ones can change")
         elif causality not in ("input", "parameter"):
-            yield f"'set' is for inputs and tunable parameters, not for a variable of causality {causality}"
+            wrong = f"'set' is for inputs and tunable parameters, not for a variable of causality {causality}"
+            yield Problem("", wrong)
         elif is_fed:
-            yield "it is connected; 'override' replaces what it receives"
+            yield Problem("", "it is connected", "'override' replaces what it receives")
     elif causality == "input":
         if not is_fed:
-            yield f"nothing is connected to it, so there is nothing to {event.action}; use 'set'"
+            wrong = f"nothing is connected to it, so there is nothing to {event.action}"
+            yield Problem("", wrong, "use 'set'")
     elif causality != "output":
-        yield f"{event.action!r} is for outputs and connected inputs, not for causality {causality}"
+        yield Problem("", f"{event.action!r} is for outputs and connected inputs, not for causality {causality}")
 
 
-def _wrong_value(event: Event, variable: Variable) -> Iterator[str]:
+def _wrong_value(event: Event, variable: Variable) -> Iterator[Problem]:
     if event.action in ("bias", "ramp"):
         if variable.type != "Real":
-            yield f"{event.action!r} is for Real variables, not for {variable.type}"
+            yield Problem("", f"{event.action!r} is for Real variables, not for {variable.type}")
         key = "value" if event.action == "bias" else "rate"
         if not _is_finite(getattr(event, key)):
-            yield f"{key} takes a finite number, not {getattr(event, key)!r}"
+            yield Problem("", f"{key} takes a finite number, not {getattr(event, key)!r}")
     elif event.action != "freeze":
         try:
             _typed(event.value, variable)
-        except ValueError as error:
-            yield str(error)
+        except ScenarioError as error:
+            yield from error.problems
 
 
 def _typed(value: Any, variable: Variable) -> None:
-    """Raise ValueError unless a variable can take this value."""
+    """Raise ScenarioError unless a variable can take this value."""
     if variable.type == "String":
         if not isinstance(value, str):
-            raise ValueError(f"takes a text, not {value!r}")
+            raise ScenarioError(f"takes a text, not {value!r}")
     elif variable.type == "Boolean":
         if not isinstance(value, bool):
-            raise ValueError(f"takes true or false, not {value!r}")
+            raise ScenarioError(f"takes true or false, not {value!r}")
     elif not isinstance(value, str) or value not in dict(variable.choices):
         if isinstance(value, bool) or not isinstance(value, int | float):
-            raise ValueError(f"takes a finite number, not {value!r}")
+            raise ScenarioError(f"takes a finite number, not {value!r}")
         bounded(value, variable)
 
 
@@ -98,21 +105,22 @@ def _step(system: System, instance: str, variable: Variable) -> float:
     return 0.0 if ALGORITHMS[system.algorithm].varies_step else own or system.step
 
 
-def _wrong_times(event: Event, step: float) -> Iterator[str]:
+def _wrong_times(event: Event, step: float) -> Iterator[Problem]:
     if not _is_finite(event.at):
-        yield f"at takes a finite number, not {event.at!r}"
+        yield Problem("", f"at takes a finite number, not {event.at!r}")
     for key in ("duration", "every"):
         length = getattr(event, key)
         if length is None:
             continue
         if not _is_finite(length) or length <= 0.0:
-            yield f"{key} takes a number greater than 0, not {length!r}"
+            yield Problem("", f"{key} takes a number greater than 0, not {length!r}")
         elif length < step * (1.0 - 1e-6):
-            yield f"{key} = {length:g} s is shorter than the step, {step:g} s: it may pass between two points unnoticed"
+            shorter = f"{key} = {length:g} s is shorter than the step, {step:g} s"
+            yield Problem("", f"{shorter}: it may pass between two points unnoticed")
     if event.action == "set" and event.duration is not None:
-        yield "'set' takes no duration; take 'override' for a value that lasts a while"
+        yield Problem("", "'set' takes no duration", "take 'override' for a value that lasts a while")
     if event.action != "set" and event.every is not None and not (event.duration or math.inf) <= event.every:
-        yield "what begins again must end before: give a duration that is not longer than every"
+        yield Problem("", "what begins again must end before: give a duration that is not longer than every")
 
 
 def _is_finite(value: Any) -> bool:

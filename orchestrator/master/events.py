@@ -13,13 +13,12 @@ from dataclasses import dataclass
 from typing import Any
 
 from ..fmi import Variable
-from ..system import Event, split
+from ..names import SignalName
+from ..system import Event
 from .exchange import Change, Exchange
 
 LATE = 1e-6
 """Part of a communication step by which an event may come late and still count as being of that point."""
-Target = tuple[str, str]
-"""An instance and one of its scalar variables."""
 
 
 @dataclass(frozen=True, order=True)
@@ -61,12 +60,12 @@ class Schedule:
     ) -> None:
         self._exchange = exchange
         self._events = [
-            (event, (split(event.signal)[0], scalar))
-            for event in events
-            for scalar in exchange.slaves[split(event.signal)[0]].interface.scalars(split(event.signal)[1]) or ()
+            (event, SignalName(signal.instance, scalar))
+            for event, signal in ((event, SignalName.parse(event.signal)) for event in events)
+            for scalar in exchange.slaves[signal.instance].interface.scalars(signal.variable) or ()
         ]
         self._slots = {target: self._slot(target) for event, target in self._events if event.action != "set"}
-        self._acting: dict[Target, list[_Fault]] = {target: [] for target in self._slots}
+        self._acting: dict[SignalName, list[_Fault]] = {target: [] for target in self._slots}
         self._parts = {
             target: part
             for target in self._slots
@@ -75,7 +74,7 @@ class Schedule:
         }
         self._slow = {t: rates[t[0]] for t, part in self._parts.items() if rates and t[0] in rates and not part.direct}
         """Outputs that appear at the end of a longer step only, with the number of steps in it."""
-        self._kept: dict[Target, Any] = {}
+        self._kept: dict[SignalName, Any] = {}
         """What those were, unchanged, at the last end of such a step."""
         self.happened: list[dict[str, Any]] = []
         """What has happened so far, for the record of the run."""
@@ -85,7 +84,7 @@ class Schedule:
             if first is not None:
                 self._plan(number, first)
 
-    def _slot(self, target: Target) -> Change:
+    def _slot(self, target: SignalName) -> Change:
         place = self._exchange.places.get(target)
         if place is None:
             return self._exchange.change_of_input(*target)
@@ -157,39 +156,39 @@ class Schedule:
         void = {one.occurrence for one in taken if not one.is_begin and one.occurrence in begun}
         return sorted((one for one in taken if one.occurrence not in void), key=lambda one: one.is_begin)
 
-    def _read(self, target: Target) -> Any:
+    def _read(self, target: SignalName) -> Any:
         """What an instance says of an output now."""
         part = self._parts[target]
         return part.channel.get()[self._exchange.places[target] - part.begin]
 
-    def _true(self, target: Target, number: int) -> Any:
+    def _true(self, target: SignalName, number: int) -> Any:
         """The value of an output as it would be without events."""
         if not self._slots[target].active:
             return self._exchange.values[self._exchange.places[target]]
         return self._kept[target] if number % self._slow.get(target, 1) else self._read(target)
 
-    def _show(self, target: Target, true: Any, time: float) -> None:
+    def _show(self, target: SignalName, true: Any, time: float) -> None:
         """Change the present value of an output, of which the true one is given."""
         place, slot = self._exchange.places[target], self._slots[target]
         self._exchange.values[place] = slot.apply(true, self._exchange.kinds[place], time) if slot.active else true
         if target in self._slow:
             self._kept[target] = true
 
-    def _set(self, event: Event, target: Target, time: float) -> None:
+    def _set(self, event: Event, target: SignalName, time: float) -> None:
         slave = self._exchange.slaves[target[0]]
         variable = slave.interface.variables[target[1]]
         before, slave.time = slave.time, time  # for what it says if it fails
         slave.channel(variable.type, [target[1]]).set([given(event.value, variable)])
         slave.time = before
 
-    def _present(self, target: Target, time: float) -> Any:
+    def _present(self, target: SignalName, time: float) -> Any:
         """The value that passes now."""
         if target in self._exchange.places:
             return self._exchange.values[self._exchange.places[target]]
         feed = next(feed for feed in self._exchange.feeds[target[0]] if target[1] in feed.targets)
         return self._exchange.inputs(feed, time)[feed.targets.index(target[1])]
 
-    def _fill(self, target: Target) -> None:
+    def _fill(self, target: SignalName) -> None:
         """Let the event that began last act on the signal."""
         slot = self._slots[target]
         slot.active = bool(self._acting[target])
@@ -211,10 +210,10 @@ class Schedule:
         else:
             slot.slope = float(event.rate or 0.0)
 
-    def _note(self, time: float, event: Event, target: Target, is_begin: bool, held: Any) -> None:
+    def _note(self, time: float, event: Event, target: SignalName, is_begin: bool, held: Any) -> None:
         """For the record: what a freeze holds is its value."""
         value = event.value if held is None else held
-        what = {"signal": ".".join(target), "action": event.action, "phase": "begin" if is_begin else "end"}
+        what = {"signal": str(target), "action": event.action, "phase": "begin" if is_begin else "end"}
         self.happened.append({"time": time, **what, "value": value, "rate": event.rate})
 
     # ---------------------------------------------------------------- checkpoints
@@ -235,12 +234,12 @@ class Schedule:
         for acting in self._acting.values():
             acting.clear()
         for instance, variable, number, count, since, held in saved["acting"]:
-            self._acting[instance, variable].append(_Fault((int(number), int(count)), float(since), held))
+            self._acting[SignalName(instance, variable)].append(_Fault((int(number), int(count)), float(since), held))
         self._due = [
             _Due(float(time), bool(begin), int(number), int(count)) for time, begin, number, count in saved["due"]
         ]
         heapq.heapify(self._due)
-        self._kept = {(instance, variable): value for instance, variable, value in saved["kept"]}
+        self._kept = {SignalName(instance, variable): value for instance, variable, value in saved["kept"]}
         self.happened = list(saved["happened"])
         for target in self._slots:
             self._fill(target)

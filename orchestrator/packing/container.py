@@ -25,9 +25,10 @@ from ...fmus.build import build, write_archive
 from ..errors import RailcosimError, ScenarioError
 from ..fmi import Model, Workspace
 from ..master import ALGORITHMS, Explicit
+from ..problems import Problem
 from ..run import Checked, check
 from ..system import System
-from ..wiring import Link
+from ..wiring import Link, described
 from .description import describe, page, start_text
 from .exposure import Exposed, select
 
@@ -72,7 +73,7 @@ def pack(system: System, path: Path, *, expose: Sequence[str] = (), platforms: S
         RailcosimError: fmu-manipulation-toolbox is missing or refuses.
     """
     if path.suffix != ".fmu":
-        raise ScenarioError(f"{path}: an FMU is a file that ends in .fmu")
+        raise ScenarioError(Problem(str(path), "an FMU is a file that ends in .fmu"))
     platforms = _chosen(platforms)
     with Workspace() as workspace:
         checked = check(system, workspace, "native")
@@ -103,7 +104,7 @@ def _chosen(platforms: Sequence[str]) -> tuple[str, ...]:
 # -------------------------------------------------------------------- what a container cannot do
 
 
-def _refused(system: System, checked: Checked, platforms: Sequence[str]) -> list[str]:
+def _refused(system: System, checked: Checked, platforms: Sequence[str]) -> list[Problem]:
     problems = [problem for link in checked.wiring.links for problem in _refused_link(link)]
     lost = {
         f"algorithm = {system.algorithm}": not issubclass(ALGORITHMS[system.algorithm], Explicit),
@@ -112,49 +113,48 @@ def _refused(system: System, checked: Checked, platforms: Sequence[str]) -> list
         "[[events]]": bool(system.events),
         **{f"{name}: a step of its own": x.step not in (None, system.step) for name, x in system.instances.items()},
     }
-    problems += [f"{what} cannot be packed: a container has one step, and holds values" for what in lost if lost[what]]
+    why = "cannot be packed: a container has one step, and holds values"
+    problems += [Problem("", f"{what} {why}") for what in lost if lost[what]]
     for name, model in checked.models.items():
         if model.interface.own_kind == "python" or "pythonfmu" in model.interface.generator.lower():
-            problems.append(
-                f"{name}: {model.interface.model} is a Python FMU, which a host without Python cannot load; only "
-                "native FMUs are packed"
-            )
+            python = f"{model.interface.model} is a Python FMU, which a host without Python cannot load"
+            problems.append(Problem(name, python, "only native FMUs are packed"))
         if model.interface.version != "2.0":
-            problems.append(f"{name}: {model.interface.model} is FMI {model.interface.version}; only FMI 2.0 is packed")
+            other = f"{model.interface.model} is FMI {model.interface.version}"
+            problems.append(Problem(name, other, "only FMI 2.0 is packed"))
         binaries = model.folder / "binaries"
         if system.instances[name].model.endswith(".fmu"):  # the others are built for what is asked
             problems += [
-                f"{name}: {system.instances[name].model} has no binary for {platform}"
+                Problem(name, f"{system.instances[name].model} has no binary for {platform}")
                 for platform in platforms
                 if platform in RUNTIMES and not (binaries / platform).is_dir()
             ]
         if model.interface.single_instance:
-            problems.append(f"{name}: {model.interface.model} can be instantiated only once per process")
+            problems.append(Problem(name, f"{model.interface.model} can be instantiated only once per process"))
         for variable, value in checked.wiring.starts[name].items():
             if isinstance(value, str) and (not value or any(c.isspace() for c in value)):
-                problems.append(
-                    f"{name}.{variable}: a text with blanks, or none, cannot be a start value in a container"
-                )
+                text = "a text with blanks, or none, cannot be a start value in a container"
+                problems.append(Problem(f"{name}.{variable}", text))
     problems += [
-        f"there is no container runtime for {platform}; there is one for {', '.join(RUNTIMES)}"
+        Problem("", f"there is no container runtime for {platform}", f"there is one for {', '.join(RUNTIMES)}")
         for platform in platforms
         if platform not in RUNTIMES
     ]
     return problems
 
 
-def _refused_link(link: Link) -> Iterator[str]:
+def _refused_link(link: Link) -> Iterator[Problem]:
     connection = link.connection
-    place = f"{connection.origin}: " if connection.origin else ""
-    where = f"{place}{connection.target!r} = {connection.source!r}"
+    where, ends = described(connection), (link.target, link.source)
     if link.delay:
-        yield f"{where}: delay = {link.delay} cannot be packed: a container hands values on without delay"
+        delay = f"delay = {link.delay} cannot be packed: a container hands values on without delay"
+        yield Problem(where, delay, names=ends)
     if (link.scale, link.offset) == (1.0, 0.0):
         return
+    what = f"scale {link.scale:g} and offset {link.offset:g}"
     if (connection.scale, connection.offset) == (1.0, 0.0):
-        yield f"{where}: the conversion of units (times {link.scale:g}, plus {link.offset:g}) cannot be packed"
-    else:
-        yield f"{where}: scale {link.scale:g} and offset {link.offset:g} cannot be packed"
+        what = f"the conversion of units (times {link.scale:g}, plus {link.offset:g})"
+    yield Problem(where, f"{what} cannot be packed", names=ends)
 
 
 # -------------------------------------------------------------------- the container

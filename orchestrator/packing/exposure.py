@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 
-from ..errors import did_you_mean
+from ..errors import ScenarioError
 from ..fmi import Interface, Variable
+from ..names import SignalName
+from ..problems import Problem, suggestion
 from ..run import Checked
 from ..scenario import NAME
 from ..system import System
@@ -35,8 +37,8 @@ class Exposed:
         return f"{self.instance}.{self.variable.name}"
 
 
-def select(wanted: Sequence[str], system: System, checked: Checked) -> tuple[tuple[Exposed, ...], list[str]]:
-    """What the patterns stand for, each variable once, and sentences on those that stand for nothing.
+def select(wanted: Sequence[str], system: System, checked: Checked) -> tuple[tuple[Exposed, ...], list[Problem]]:
+    """What the patterns stand for, each variable once, and what is wrong with those that stand for nothing.
 
     Args:
         wanted: patterns, several to a text where commas part them; none for the default.
@@ -49,57 +51,54 @@ def select(wanted: Sequence[str], system: System, checked: Checked) -> tuple[tup
         trains = [name for name in system.instances if name.startswith(DEFAULT_FAMILY)]
         patterns = trains or list(system.instances)
     found: dict[str, Exposed] = {}
-    problems: list[str] = []
-    fed = {link.target: ".".join(link.source) for link in checked.wiring.links}
+    problems: list[Problem] = []
+    fed = {link.target: link.source for link in checked.wiring.links}
     for pattern in patterns:
-        problem, shown = _match(pattern, interfaces, fed)
-        found |= {each.name: each for each in shown}
-        if problem:
-            problems.append(f"expose {pattern!r}: {problem}")
+        try:
+            found |= {each.name: each for each in _match(pattern, interfaces, fed)}
+        except ScenarioError as error:
+            problems += error.at(f"expose {pattern!r}")
     return tuple(found.values()), problems
 
 
-def _family(instance: str) -> str:
-    return instance.partition("[")[0]
-
-
 def _match(
-    pattern: str, interfaces: Mapping[str, Interface], fed: Mapping[tuple[str, str], str]
-) -> tuple[str, list[Exposed]]:
+    pattern: str, interfaces: Mapping[str, Interface], fed: Mapping[SignalName, SignalName]
+) -> Iterator[Exposed]:
+    """What one pattern stands for.
+
+    Raises:
+        ScenarioError: what is wrong with it.
+    """
     match = _PATTERN.fullmatch(pattern)
     if match is None:
-        return "write instance.variable, as in train[1].speed, or train[:].speed for all trains", []
+        raise ScenarioError("write instance.variable, as in train[1].speed, or train[:].speed for all trains")
     family, index, name = match.groups()
-    members = [n for n in interfaces if _family(n) == family]
+    groups = {instance: SignalName(instance).group for instance in interfaces}
+    members = [n for n in interfaces if groups[n] == family]
     chosen = members if index == ":" else [n for n in members if n == (f"{family}[{index}]" if index else family)]
     if not members:
-        return f"there is no instance {family!r}{did_you_mean(family, map(_family, interfaces))}", []
+        raise ScenarioError(Problem("", f"there is no instance {family!r}", suggestion(family, groups.values())))
     if not chosen:
-        return f"there is {', '.join(members)}; for all of them write {family}[:]", []
-    shown: list[Exposed] = []
+        raise ScenarioError(Problem("", f"there is {', '.join(members)}", f"for all of them write {family}[:]"))
     for instance in chosen:
-        problem, variables = _variables(instance, name, interfaces[instance], fed)
-        if problem:
-            return problem, []
-        shown += variables
-    return "", shown
+        yield from _variables(instance, name, interfaces[instance], fed)
 
 
 def _variables(
-    instance: str, name: str | None, interface: Interface, fed: Mapping[tuple[str, str], str]
-) -> tuple[str, list[Exposed]]:
+    instance: str, name: str | None, interface: Interface, fed: Mapping[SignalName, SignalName]
+) -> Iterator[Exposed]:
     if name is None or name == "*":
-        return "", [Exposed(instance, v, "output") for v in interface.of("output")]
+        yield from (Exposed(instance, v, "output") for v in interface.of("output"))
+        return
     scalars = interface.scalars(name)
     if scalars is None:
-        near = did_you_mean(name, [*interface.variables, *interface.arrays])
-        return f"{interface.model} ({instance}) has no variable {name!r}{near}", []
-    shown = []
+        near = suggestion(name, [*interface.variables, *interface.arrays])
+        raise ScenarioError(Problem("", f"{interface.model} ({instance}) has no variable {name!r}", near))
     for variable in (interface.variables[scalar] for scalar in scalars):
+        signal = SignalName(instance, variable.name)
         causality = _CAUSALITY.get(variable.causality)
         if causality is None or variable.variability == "constant":
-            return f"{instance}.{variable.name} is {variable.causality} and cannot be shown", []
-        if (instance, variable.name) in fed:
-            return f"the input {instance}.{variable.name} is fed by {fed[instance, variable.name]} inside", []
-        shown.append(Exposed(instance, variable, causality))
-    return "", shown
+            raise ScenarioError(f"{signal} is {variable.causality} and cannot be shown")
+        if signal in fed:
+            raise ScenarioError(f"the input {signal} is fed by {fed[signal]} inside")
+        yield Exposed(instance, variable, causality)

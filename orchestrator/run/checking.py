@@ -3,16 +3,19 @@
 from __future__ import annotations
 
 import math
+from collections import Counter
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 
-from ..errors import ScenarioError, did_you_mean
+from ..errors import ScenarioError
 from ..evaluation import check_metrics, check_published, check_requirements, metric_indices, split_metric
 from ..figures import check_figures
 from ..fmi import Interface, Kind, Model, Workspace, load_models
 from ..isolation import check_isolation, check_once_per_process, isolation_notes
 from ..master import ALGORITHMS, check_coupling, check_events, describe_coupling
-from ..system import System, split
+from ..names import SignalName
+from ..problems import Problem, suggestion
+from ..system import System
 from ..wiring import Order, Wiring, derive_order, wire
 
 _MOST_STEPS = 1e15
@@ -104,7 +107,7 @@ def _without_the_missing(
 
 
 def _is_there(signal: str, interfaces: Mapping[str, Interface]) -> bool:
-    instance, name = split(signal)
+    instance, name = SignalName.parse(signal)
     return instance in interfaces and interfaces[instance].scalars(name) is not None
 
 
@@ -119,23 +122,28 @@ def signal_names(interfaces: Mapping[str, Interface], wiring: Wiring) -> list[st
     ]
 
 
-def _check_simulation(system: System) -> list[str]:
+def _check_simulation(system: System) -> list[Problem]:
     problems = []
     if not system.instances:
-        problems.append("the system has no instances")
+        problems.append(Problem("", "the system has no instances"))
     if system.algorithm not in ALGORITHMS:
-        problems.append(f"algorithm {system.algorithm!r} is unknown{did_you_mean(system.algorithm, ALGORITHMS)}")
-    problems += _check_times(system)
+        near = suggestion(system.algorithm, ALGORITHMS)
+        problems.append(Problem("", f"algorithm {system.algorithm!r} is unknown", near))
+    problems += [Problem("", message) for message in _check_times(system)]
     if system.order:
         missing = [name for name in system.instances if name not in system.order]
         unknown = [name for name in system.order if name not in system.instances]
-        problems += [f"order: there is no instance {n!r}{did_you_mean(n, system.instances)}" for n in unknown]
-        problems += [f"order: {n!r} is missing" for n in missing]
-        problems += [f"order: {n!r} stands twice" for n in dict.fromkeys(system.order) if system.order.count(n) > 1]
+        twice = [name for name, times in Counter(system.order).items() if times > 1]
+        for name in unknown:
+            near = suggestion(name, system.instances)
+            problems.append(Problem("order", f"there is no instance {name!r}", near, (SignalName(name),)))
+        problems += [Problem("order", f"{name!r} is missing", names=(SignalName(name),)) for name in missing]
+        problems += [Problem("order", f"{name!r} stands twice", names=(SignalName(name),)) for name in twice]
     return problems
 
 
 def _check_times(system: System) -> list[str]:
+    """What is wrong with step, end and rows, a sentence each."""
     if not 0.0 < system.step < math.inf:
         return [f"step must be a positive number, not {system.step!r} s"]
     if not 0.0 < system.stop_time - system.start_time < math.inf:

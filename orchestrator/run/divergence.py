@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 from ..errors import FmuError
 from ..fmi import Interface
 from ..master import ALGORITHMS, find_loops
+from ..names import SignalName
 from ..system import System
 from ..wiring import Link
 from .results import Results
@@ -65,7 +66,7 @@ def explain_divergence(
         return ""
     failed = isinstance(error, FmuError)
     for group in _cycles(links):
-        signals = dict.fromkeys(".".join(link.source) for link in links if {link.source[0], link.target[0]} <= group)
+        signals = dict.fromkeys(link.source for link in links if {link.source[0], link.target[0]} <= group)
         found = dict(_growing(signals, interfaces, results, failed=failed))
         if found:
             names = ", ".join(list(found)[:_SHOWN]) + (", ..." if len(found) > _SHOWN else "")
@@ -89,16 +90,15 @@ def _cycles(links: Iterable[Link]) -> Iterator[set[str]]:
 
 
 def _growing(
-    signals: Iterable[str], interfaces: Mapping[str, Interface], results: Results, *, failed: bool
+    signals: Iterable[SignalName], interfaces: Mapping[str, Interface], results: Results, *, failed: bool
 ) -> Iterator[tuple[str, Growth]]:
     for signal in signals:
-        instance, _, name = signal.partition(".")
-        variable = interfaces[instance].variables[name]
-        if variable.type == "Real" and signal in results.names():
+        variable, name = interfaces[signal.instance].variables[signal.variable], str(signal)
+        if variable.type == "Real" and name in results.names():
             size = abs(variable.nominal or 1.0)
-            growth = find_growth(results.time, results[signal], results.step, size=size, failed=failed)
+            growth = find_growth(results.time, results[name], results.step, size=size, failed=failed)
             if growth is not None:
-                yield signal, growth
+                yield name, growth
 
 
 def find_growth(time: Array, values: Array, step: float, *, size: float = 1.0, failed: bool = False) -> Growth | None:

@@ -8,14 +8,14 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
-from ..errors import ScenarioError, did_you_mean
+from ..errors import ScenarioError
+from ..problems import Problem, suggestion
 from .groups import OPTION_KEYS, Draft, Entry, Group, Member, build_argument, is_plain, resolve_model, shown
-from .patterns import NAME, check_instance
+from .patterns import check_instance, read_reference
 from .reader import check_count, flatten, place_of
 from .simulation import SIMULATION_KEYS, set_tolerance
 from .toml_source import Source, parse_value
 
-_TARGET = re.compile(rf"({NAME})(?:\[([^\[\]]*)\])?(?:\.(.+))?", re.DOTALL)
 _BUILD = re.compile(r"[A-Za-z_]\w*(?:\[[^\[\]]*\])?\.build\.[^.]+")
 
 
@@ -34,21 +34,18 @@ def read_target(text: str, draft: Draft) -> Target:
     Raises:
         ScenarioError: there is no such instance.
     """
-    match = _TARGET.fullmatch(text.strip())
     counts = draft.counts
-    if not match:
-        near = did_you_mean(text, counts) or f"; instances are {', '.join(counts) or 'none yet'}"
-        raise ScenarioError(f"'{text}' is not of the form instance.variable, as in train[4].speed or train.speed{near}")
-    name, index, rest = match.groups()
+    name, index, rest = read_reference(text, counts, "train[4].speed or train.speed", whole=True)
     if name not in counts or index is not None:
         read = check_instance(name, index, counts)
         if read and read.free:
-            raise ScenarioError(f"'{text}': i has no meaning here; write {name} for all or {name}[1] for one")
-        return Target(draft.groups[name], read.offset if read else None, rest or "")
-    return Target(draft.groups[name], None, rest or "")
+            remedy = f"write {name} for all or {name}[1] for one"
+            raise ScenarioError(Problem(f"'{text}'", "i has no meaning here", remedy))
+        return Target(draft.groups[name], read.offset if read else None, rest)
+    return Target(draft.groups[name], None, rest)
 
 
-def change(draft: Draft, key: str, entry: Entry, folder: str, problems: list[str]) -> None:
+def change(draft: Draft, key: str, entry: Entry, folder: str, problems: list[Problem]) -> None:
     """Apply one line of a preset or one `--set`; what is wrong with it is added to `problems`.
 
     Args:
@@ -65,7 +62,7 @@ def change(draft: Draft, key: str, entry: Entry, folder: str, problems: list[str
         else:
             _change_instance(read_target(key, draft), entry, folder, problems)
     except ScenarioError as error:
-        problems += [entry.problem(problem) for problem in error.problems]
+        problems += error.at(entry.where)
 
 
 def _change_simulation(draft: Draft, key: str, entry: Entry) -> None:
@@ -74,8 +71,8 @@ def _change_simulation(draft: Draft, key: str, entry: Entry) -> None:
         _change_tolerances(draft, signal, entry)
         return
     if key not in SIMULATION_KEYS:
-        near = did_you_mean(key, SIMULATION_KEYS) or f"; valid here: {', '.join(SIMULATION_KEYS)}"
-        raise ScenarioError(f"unknown key 'simulation.{key}'{near}")
+        near = suggestion(key, SIMULATION_KEYS) or f"valid here: {', '.join(SIMULATION_KEYS)}"
+        raise ScenarioError(Problem("", f"unknown key 'simulation.{key}'", near))
     draft.simulation[key] = entry
 
 
@@ -86,31 +83,28 @@ def _change_tolerances(draft: Draft, signal: str, entry: Entry) -> None:
         for keys, value in flatten(entry.value):
             set_tolerance(draft.simulation, ".".join(keys), Entry(value, entry.origin, entry.place), draft.counts)
     else:
-        raise ScenarioError(
-            f"is a table, not {shown(entry.value)}; "
-            "write simulation.tolerances.INSTANCE.VARIABLE = [relative, absolute]"
-        )
+        remedy = "write simulation.tolerances.INSTANCE.VARIABLE = [relative, absolute]"
+        raise ScenarioError(Problem("", f"is a table, not {shown(entry.value)}", remedy))
 
 
-def _change_instance(target: Target, entry: Entry, folder: str, problems: list[str]) -> None:
+def _change_instance(target: Target, entry: Entry, folder: str, problems: list[Problem]) -> None:
     group, (word, _, rest) = target.group, target.rest.partition(".")
     if not word:
-        raise ScenarioError(
-            f"names an instance but not what to change; write {group.name}.VARIABLE or {group.name}.component"
-        )
+        remedy = f"write {group.name}.VARIABLE or {group.name}.component"
+        raise ScenarioError(Problem("", "names an instance but not what to change", remedy))
     if word in ("component", "fmu") and not rest:
         group.swap(resolve_model(entry.value, folder, word), target.index)
     elif word == "count" and not rest:
         if target.index is not None:
-            raise ScenarioError(f"a count belongs to all; write {group.name}.count")
+            raise ScenarioError(Problem("", "a count belongs to all", f"write {group.name}.count"))
         if group.count is None:
-            raise ScenarioError(f"'{group.name}' has no count to change; give it one in [instances.{group.name}]")
+            remedy = f"give it one in [instances.{group.name}]"
+            raise ScenarioError(Problem("", f"'{group.name}' has no count to change", remedy))
         group.count = check_count(entry, problems)
         group.members = {k: one for k, one in group.members.items() if k <= group.count}
         if not group.model and len(group.members) < group.count:
-            raise ScenarioError(
-                f"the instances of '{group.name}' are listed singly; there are only {len(group.members)}"
-            )
+            listed = f"the instances of '{group.name}' are listed singly"
+            raise ScenarioError(Problem("", listed, f"there are only {len(group.members)}"))
     elif word in OPTION_KEYS and not rest:
         group.set_option(word, entry, target.index)
     elif word == "build" and rest:
@@ -122,13 +116,12 @@ def _change_instance(target: Target, entry: Entry, folder: str, problems: list[s
         group.set_start(name, entry, target.index)
 
 
-def apply_preset(draft: Draft, source: Source, name: str, folder: str, problems: list[str]) -> None:
+def apply_preset(draft: Draft, source: Source, name: str, folder: str, problems: list[Problem]) -> None:
     """Apply a preset of the file: models first, so that what else it says is meant for them."""
     table = source.data["presets"][name]
     if not isinstance(table, dict):
-        problems.append(
-            f"{source.origin('presets', name)}: {place_of(('presets', name))}: is a table, not {shown(table)}"
-        )
+        entry = Entry(table, source.origin("presets", name), place_of(("presets", name)))
+        problems.append(entry.problem(f"is a table, not {shown(table)}"))
         return
     lines = list(_preset_lines(table))
     lines.sort(key=lambda line: ".".join(line[0]).rpartition(".")[2] not in ("component", "fmu", "count"))
@@ -147,7 +140,7 @@ def _preset_lines(table: Mapping[str, Any], path: tuple[str, ...] = ()) -> Itera
             yield keys, value
 
 
-def apply_settings(draft: Draft, settings: Sequence[str], problems: list[str], option: str = "--set") -> None:
+def apply_settings(draft: Draft, settings: Sequence[str], problems: list[Problem], option: str = "--set") -> None:
     """Apply `--set train[4].speed=10` (or `--with train.carriages=8`); values are TOML, or the text as it is."""
     for text in settings:
         key, equals, value = text.partition("=")
@@ -166,23 +159,23 @@ def _build_key(key: str) -> str:
     return f"{name}.build.{argument.removeprefix('build.')}" if argument else key
 
 
-def apply_swaps(draft: Draft, swaps: Sequence[str], problems: list[str]) -> None:
+def apply_swaps(draft: Draft, swaps: Sequence[str], problems: list[Problem]) -> None:
     """Apply `--swap cruise=PATH.fmu|Component|file.py:Class`; paths are relative to the current directory."""
     for text in swaps:
         key, equals, model = text.partition("=")
         where = f"--swap {text}"
         if not equals or not model.strip():
-            problems.append(
-                f"{where}: is not of the form instance=model, as in --swap cruise=my_controller.py:MyController"
-            )
+            example = "--swap cruise=my_controller.py:MyController"
+            problems.append(Problem(where, f"is not of the form instance=model, as in {example}"))
             continue
         try:
             target = read_target(key.strip(), draft)
             if target.rest:
-                raise ScenarioError(f"a swap replaces a whole instance; write --swap {target.group.name}=...")
+                remedy = f"write --swap {target.group.name}=..."
+                raise ScenarioError(Problem("", "a swap replaces a whole instance", remedy))
             target.group.swap(resolve_model(os.path.expanduser(model.strip()), os.getcwd(), ""), target.index)
         except ScenarioError as error:
-            problems += [f"{where}: {problem}" for problem in error.problems]
+            problems += error.at(where)
 
 
 def apply_step(draft: Draft, entry: Entry) -> float | None:

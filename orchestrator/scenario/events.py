@@ -7,9 +7,11 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 from ..errors import ScenarioError
+from ..names import SignalName
+from ..problems import Problem
 from ..system import ACTIONS, Event
 from .groups import Entry, choice, number, positive, shown
-from .patterns import Counts, read_signal
+from .patterns import Counts, members, read_signal
 from .reader import Reader
 
 EVENT_KEYS = ("signal", "action", "at", "value", "rate", "duration", "every")
@@ -58,7 +60,8 @@ def read_events(reader: Reader) -> list[EventRule]:
 
 def _signals(table: Mapping[str, Any], reader: Reader, k: int) -> list[Entry]:
     if "signal" not in table:
-        reader.problem('signal is missing; name what it happens to: signal = "instance.variable"', "events", k)
+        remedy = 'name what it happens to: signal = "instance.variable"'
+        reader.problem("signal is missing", "events", k, remedy=remedy)
         return []
     texts = table["signal"]
     if isinstance(texts, str):
@@ -69,38 +72,38 @@ def _signals(table: Mapping[str, Any], reader: Reader, k: int) -> list[Entry]:
     return []
 
 
-def _action(entries: Mapping[str, Entry], whole: Entry, problems: list[str]) -> str:
+def _action(entries: Mapping[str, Entry], whole: Entry, problems: list[Problem]) -> str:
     """The action; empty, with a problem noted, where there is none."""
     if "action" not in entries:
-        problems.append(whole.problem(f"action is missing; say what happens: {', '.join(ACTIONS)}"))
+        problems.append(whole.problem("action is missing", f"say what happens: {', '.join(ACTIONS)}"))
         return ""
     before = len(problems)
     action = choice(entries["action"], problems, ACTIONS, "action")
     return action if len(problems) == before else ""
 
 
-def _begin(entries: Mapping[str, Entry], whole: Entry, problems: list[str]) -> float:
+def _begin(entries: Mapping[str, Entry], whole: Entry, problems: list[Problem]) -> float:
     if "at" in entries:
         return number(entries["at"], problems)
-    problems.append(whole.problem("at is missing; say when it begins, in s: at = 60.0"))
+    problems.append(whole.problem("at is missing", "say when it begins, in s: at = 60.0"))
     return 0.0
 
 
-def _misfits(action: str, entries: Mapping[str, Entry], whole: Entry) -> list[str]:
+def _misfits(action: str, entries: Mapping[str, Entry], whole: Entry) -> list[Problem]:
     """What the action needs and is not given, and what it is given and does not take."""
     needed, remedy = _NEEDED.get(action, ("", ""))
     problems = []
     if needed and needed not in entries:
-        problems.append(whole.problem(f"{needed} is missing; {remedy}"))
+        problems.append(whole.problem(f"{needed} is missing", remedy))
     excluded = [key for key in ("value", "rate") if key != needed] + ["duration"] * (action == "set")
     for key in excluded:
         if key in entries:
             why = _NOT_TAKEN.get((action, key), "take 'ramp' for an added value that grows")
-            problems.append(entries[key].problem(f"'{action}' takes no {key}; {why}"))
+            problems.append(entries[key].problem(f"'{action}' takes no {key}", why))
     return problems
 
 
-def _value(action: str, entry: Entry, problems: list[str]) -> Any:
+def _value(action: str, entry: Entry, problems: list[Problem]) -> Any:
     value = entry.value
     if action == "bias":
         return number(entry, problems)
@@ -109,42 +112,40 @@ def _value(action: str, entry: Entry, problems: list[str]) -> Any:
     if isinstance(value, int | float):
         number(entry, problems)
         return value
-    each = "; write an event for each element" if isinstance(value, list) else ""
-    problems.append(entry.problem(f"takes a number, true or false, or a text, not {shown(value)}{each}"))
+    each = "write an event for each element" if isinstance(value, list) else ""
+    problems.append(entry.problem(f"takes a number, true or false, or a text, not {shown(value)}", each))
     return None
 
 
-def _repetition(event: Event, entries: Mapping[str, Entry]) -> list[str]:
+def _repetition(event: Event, entries: Mapping[str, Entry]) -> list[Problem]:
     """What is wrong with the period."""
     if event.every is None or event.action in ("", "set"):
         return []
     if event.duration is None:
-        return [entries["every"].problem("what begins again must end before; give a duration, in s: duration = 5.0")]
+        remedy = "give a duration, in s: duration = 5.0"
+        return [entries["every"].problem("what begins again must end before", remedy)]
     if event.every < event.duration:
-        return [
-            entries["every"].problem(
-                f"the period, {event.every:g} s, must not be shorter than the duration, {event.duration:g} s"
-            )
-        ]
+        shorter = f"the period, {event.every:g} s, must not be shorter than the duration, {event.duration:g} s"
+        return [entries["every"].problem(shorter)]
     return []
 
 
-def expand_events(rules: Sequence[EventRule], counts: Counts, problems: list[str]) -> list[Event]:
+def expand_events(rules: Sequence[EventRule], counts: Counts, problems: list[Problem]) -> list[Event]:
     """The events of every single signal, in the order they are written."""
     events = []
     for rule in rules:
-        names: dict[str, None] = {}
+        names: dict[SignalName, None] = {}
         for entry in rule.signals:
             try:
-                found = read_signal(entry.value, counts).names(counts)
+                found = members(read_signal(entry.value, counts), counts)
             except ScenarioError as error:
-                problems += [entry.problem(problem) for problem in error.problems]
+                problems += error.at(entry.where)
                 continue
             problems += [
-                entry.problem(f"'{name}' stands there twice; an event happens to a signal once")
+                Problem(entry.where, f"'{name}' stands there twice", "an event happens to a signal once", (name,))
                 for name in found
                 if name in names
             ]
             names |= dict.fromkeys(found)
-        events += [replace(rule.event, signal=name) for name in names]
+        events += [replace(rule.event, signal=str(name)) for name in names]
     return events

@@ -13,7 +13,8 @@ from collections.abc import Callable, Collection
 from dataclasses import dataclass, field
 from typing import Any
 
-from ..errors import ScenarioError, did_you_mean
+from ..errors import ScenarioError
+from ..problems import Problem, suggestion
 from ..system import Instance
 from .patterns import NAME, Rule, member
 
@@ -33,9 +34,14 @@ class Entry:
     origin: str
     place: str = ""
 
-    def problem(self, message: str) -> str:
-        """A message that says where."""
-        return f"{self.origin}: {self.place}: {message}" if self.place else f"{self.origin}: {message}"
+    @property
+    def where(self) -> str:
+        """Where it stands and what it is called there."""
+        return f"{self.origin}: {self.place}" if self.place else self.origin
+
+    def problem(self, message: str, remedy: str = "") -> Problem:
+        """Something wrong with it."""
+        return Problem(self.where, message, remedy)
 
 
 @dataclass
@@ -137,18 +143,17 @@ def resolve_model(text: Any, folder: str, kind: str = "component") -> str:
         raise ScenarioError("takes a text: a component's name, 'file.py:Class', or the path of an .fmu")
     is_fmu = text.lower().endswith(".fmu")
     if kind == "component" and is_fmu:
-        raise ScenarioError(f"'{text}' is an FMU file; write fmu = ... instead of component = ...")
+        raise ScenarioError(Problem("", f"'{text}' is an FMU file", "write fmu = ... instead of component = ..."))
     if is_fmu or kind == "fmu":
         if not is_fmu:
-            raise ScenarioError(
-                f"'{text}' does not end in .fmu; for a component of the catalogue write component = ..."
-            )
+            remedy = "for a component of the catalogue write component = ..."
+            raise ScenarioError(Problem("", f"'{text}' does not end in .fmu", remedy))
         return _existing(text, folder)
     match = _PYTHON_CLASS.fullmatch(text)
     if match:
         return f"{_existing(match[1], folder)}:{match[2]}"
     if text.endswith(".py") or ".py:" in text:
-        raise ScenarioError(f"'{text}' does not name a class; write 'file.py:Class'")
+        raise ScenarioError(Problem("", f"'{text}' does not name a class", "write 'file.py:Class'"))
     if not re.fullmatch(NAME, text):
         raise ScenarioError(f"'{text}' is neither a component's name, nor 'file.py:Class', nor the path of an .fmu")
     return text
@@ -160,8 +165,8 @@ def _existing(text: str, folder: str) -> str:
         return path
     near = ""
     if os.path.isdir(os.path.dirname(path)):
-        near = did_you_mean(os.path.basename(path), os.listdir(os.path.dirname(path)))
-    raise ScenarioError(f"there is no file '{path}'{near}")
+        near = suggestion(os.path.basename(path), os.listdir(os.path.dirname(path)))
+    raise ScenarioError(Problem("", f"there is no file '{path}'", near))
 
 
 def build_argument(value: Any, folder: str) -> Any:
@@ -173,7 +178,9 @@ def build_argument(value: Any, folder: str) -> Any:
     if isinstance(value, str) and value.endswith(".json"):
         return _existing(value, folder)
     if not is_plain(value, tables=True):
-        raise ScenarioError("takes numbers, texts, true or false, lists and tables of these; quote a date")
+        raise ScenarioError(
+            Problem("", "takes numbers, texts, true or false, lists and tables of these", "quote a date")
+        )
     return value
 
 
@@ -186,19 +193,15 @@ def is_plain(value: Any, tables: bool = False) -> bool:
     return isinstance(value, bool | int | float | str)
 
 
-def expand_group(group: Group, problems: list[str]) -> list[tuple[Instance, dict[str, str]]]:
+def expand_group(group: Group, problems: list[Problem]) -> list[tuple[Instance, dict[str, str]]]:
     """The instances of a group, each with the origins of its options and start values."""
     members: list[tuple[Instance, dict[str, str]]] = []
     total = 1 if group.count is None else group.count
     for entry_name, entry in group.start.items():
         if group.count is not None and isinstance(entry.value, list) and len(entry.value) != total:
             values = f"{len(entry.value)} value{'s' * (len(entry.value) != 1)}"
-            problems.append(
-                entry.problem(
-                    f"{entry_name} has {values} for the {total} instances of '{group.name}'; "
-                    "give one for each, or a single value for all"
-                )
-            )
+            message = f"{entry_name} has {values} for the {total} instances of '{group.name}'"
+            problems.append(entry.problem(message, "give one for each, or a single value for all"))
     for k in range(total):
         index = None if group.count is None else k + 1
         one = group.members.get(k + 1, Member()) if index else Member()
@@ -211,9 +214,8 @@ def expand_group(group: Group, problems: list[str]) -> list[tuple[Instance, dict
         build = {**group.build, **one.build}
         if build and model.lower().endswith(".fmu"):  # what a swap left behind is nobody's mistake
             if not swapped:
-                problems.append(
-                    f"{one.origin or group.origin}: '{model}' is a finished FMU and takes no build arguments"
-                )
+                finished = f"'{model}' is a finished FMU and takes no build arguments"
+                problems.append(Problem(one.origin or group.origin, finished))
             build = {}
         instance = Instance(
             member(group.name, index),
@@ -232,7 +234,7 @@ def expand_group(group: Group, problems: list[str]) -> list[tuple[Instance, dict
     return members
 
 
-def _options(entries: dict[str, Entry], problems: list[str]) -> dict[str, Any]:
+def _options(entries: dict[str, Entry], problems: list[Problem]) -> dict[str, Any]:
     """The values of `OPTION_KEYS`, checked."""
     values: dict[str, Any] = {}
     for key, entry in entries.items():
@@ -252,7 +254,7 @@ def _share(entry: Entry, k: int, index: int | None) -> Entry:
 
 def number(
     entry: Entry,
-    problems: list[str],
+    problems: list[Problem],
     default: float = 0.0,
     what: str = "a finite number",
     fits: Callable[[float], bool] = math.isfinite,
@@ -268,12 +270,12 @@ def number(
     return default
 
 
-def positive(entry: Entry, problems: list[str], unit: str = "s") -> float:
+def positive(entry: Entry, problems: list[Problem], unit: str = "s") -> float:
     """A finite number greater than 0."""
     return number(entry, problems, 1.0, f"a number greater than 0, in {unit}", lambda value: value > 0)
 
 
-def whole(entry: Entry, problems: list[str], fits: Callable[[int], bool], what: str, default: int = 1) -> int:
+def whole(entry: Entry, problems: list[Problem], fits: Callable[[int], bool], what: str, default: int = 1) -> int:
     """A whole number that fits; `what` it has to be is said otherwise."""
     value = entry.value
     if isinstance(value, int) and not isinstance(value, bool) and fits(value):
@@ -282,19 +284,19 @@ def whole(entry: Entry, problems: list[str], fits: Callable[[int], bool], what: 
     return default
 
 
-def truth(entry: Entry, problems: list[str]) -> bool:
+def truth(entry: Entry, problems: list[Problem]) -> bool:
     """True or false."""
     if not isinstance(entry.value, bool):
         problems.append(entry.problem(f"takes true or false, not {shown(entry.value)}"))
     return entry.value is True
 
 
-def choice(entry: Entry, problems: list[str], valid: Collection[str], what: str) -> str:
+def choice(entry: Entry, problems: list[Problem], valid: Collection[str], what: str) -> str:
     """One of a few words; `what` they are called in the message."""
     if entry.value in valid:
         return str(entry.value)
-    near = did_you_mean(str(entry.value), valid) or f"; there are {', '.join(valid)}"
-    problems.append(entry.problem(f"there is no {what} {shown(entry.value)}{near}"))
+    near = suggestion(str(entry.value), valid) or f"there are {', '.join(valid)}"
+    problems.append(entry.problem(f"there is no {what} {shown(entry.value)}", near))
     return next(iter(valid))
 
 

@@ -18,7 +18,8 @@ from typing import Any
 
 from railcosim import models
 
-from ..errors import ScenarioError, did_you_mean
+from ..errors import ScenarioError
+from ..problems import Problem, suggestion
 from ..system import Instance, System
 from .changes import apply_preset, apply_settings, apply_step, apply_swaps
 from .events import expand_events, read_events
@@ -64,14 +65,16 @@ def find(name_or_path: str | os.PathLike[str]) -> Path:
     names = [name for name, _ in shipped()]
     folder, file = os.path.split(text)
     if not text.endswith(".toml") and not folder:
-        here = f"; did you mean './{text}.toml'?" if os.path.isfile(f"{text}.toml") else did_you_mean(text, names)
-        raise ScenarioError(f"there is no shipped scenario '{text}'{here or '; there are ' + ', '.join(names)}")
+        here = f"did you mean './{text}.toml'?" if os.path.isfile(f"{text}.toml") else suggestion(text, names)
+        remedy = here or f"there are {', '.join(names)}"
+        raise ScenarioError(Problem("", f"there is no shipped scenario '{text}'", remedy))
     if os.path.isdir(text):
-        raise ScenarioError(f"'{text}' is a folder; name the scenario file in it")
+        raise ScenarioError(Problem("", f"'{text}' is a folder", "name the scenario file in it"))
     if not os.path.isfile(text):
         around = os.listdir(folder or ".") if os.path.isdir(folder or ".") else []
-        near = did_you_mean(file, [other for other in around if other.endswith(".toml")])
-        raise ScenarioError(f"there is no file '{text}'{near or '; shipped scenarios are ' + ', '.join(names)}")
+        near = suggestion(file, [other for other in around if other.endswith(".toml")])
+        remedy = near or f"shipped scenarios are {', '.join(names)}"
+        raise ScenarioError(Problem("", f"there is no file '{text}'", remedy))
     return Path(text)
 
 
@@ -128,7 +131,7 @@ class _Changes:
     step: float | None = None
     algorithm: str | None = None
 
-    def apply(self, draft: Draft, problems: list[str]) -> float | None:
+    def apply(self, draft: Draft, problems: list[Problem]) -> float | None:
         """Change the draft; returns the old step where a new one was given."""
         apply_swaps(draft, self.swaps, problems)
         apply_settings(draft, self.builds, problems, "--with")
@@ -160,7 +163,7 @@ def _system(source: Source, path: Path, changes: _Changes) -> System:
             system.rescaled_from = old_step
         return system
     except RecursionError:
-        raise ScenarioError(f"{source.label}: nested too deeply; no scenario needs that") from None
+        raise ScenarioError(Problem(source.label, "nested too deeply", "no scenario needs that")) from None
 
 
 class _Scenario:
@@ -176,10 +179,8 @@ class _Scenario:
         presets = self.reader.table(source.data, "presets")
         self.default = default if isinstance(default := source.data.get("default_preset"), str) else None
         if self.default in presets:
-            both = (
-                f"names the values as they stand, but there is [presets.{self.default}] as well; rename one of the two"
-            )
-            self.reader.problem(both, "default_preset")
+            both = f"names the values as they stand, but there is [presets.{self.default}] as well"
+            self.reader.problem(both, "default_preset", remedy="rename one of the two")
         self.names = tuple(dict.fromkeys([*([self.default] if self.default else []), *presets]))
         self.preset: str | None = self.default
         self.events = read_events(self.reader)
@@ -198,10 +199,10 @@ class _Scenario:
                 self._check(draft)
                 chosen = draft if name == preset else chosen
         if preset is not None and preset not in self.names:
-            known = did_you_mean(preset, self.names) or (
-                f"; there are {', '.join(self.names)}" if self.names else "; the scenario has none"
+            known = suggestion(preset, self.names) or (
+                f"there are {', '.join(self.names)}" if self.names else "the scenario has none"
             )
-            self.problems.append(f"{self.source.label}: there is no preset '{preset}'{known}")
+            self.problems.append(Problem(self.source.label, f"there is no preset '{preset}'", known))
         self.preset = self.default if preset is None else preset
         return chosen
 
@@ -266,7 +267,7 @@ class _Scenario:
         return origins
 
 
-def _order(entry: Entry, draft: Draft, names: Sequence[str], problems: list[str]) -> list[str]:
+def _order(entry: Entry, draft: Draft, names: Sequence[str], problems: list[Problem]) -> list[str]:
     """The instances in the order they step; `train` stands for all trains."""
     if not isinstance(entry.value, list) or not all(isinstance(name, str) for name in entry.value):
         problems.append(entry.problem('is a list of instance names, as in ["cruise", "train", "gust"]'))
@@ -275,14 +276,14 @@ def _order(entry: Entry, draft: Draft, names: Sequence[str], problems: list[str]
     for name in entry.value:
         count = draft.counts.get(name)
         if name not in names and count is None:
-            near = did_you_mean(name, [*names, *draft.counts]) or f"; instances are {', '.join(draft.counts)}"
-            problems.append(entry.problem(f"there is no instance '{name}'{near}"))
+            near = suggestion(name, [*names, *draft.counts]) or f"instances are {', '.join(draft.counts)}"
+            problems.append(entry.problem(f"there is no instance '{name}'", near))
         order += [f"{name}[{k + 1}]" for k in range(count)] if count is not None else [name]
     stands = Counter(order)
     twice = next((name for name, times in stands.items() if times > 1), None)
     if twice:
-        problems.append(entry.problem(f"'{twice}' stands there twice; each instance steps once"))
+        problems.append(entry.problem(f"'{twice}' stands there twice", "each instance steps once"))
     missing = [name for name in names if name not in stands]
     if order and missing:
-        problems.append(entry.problem(f"lacks {', '.join(missing)}; name every instance, or leave order out"))
+        problems.append(entry.problem(f"lacks {', '.join(missing)}", "name every instance, or leave order out"))
     return order

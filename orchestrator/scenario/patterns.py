@@ -9,16 +9,19 @@ from __future__ import annotations
 import re
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
+from typing import NamedTuple
 
-from ..errors import ScenarioError, did_you_mean
+from ..errors import ScenarioError
+from ..names import SignalName
+from ..problems import Problem, suggestion
 from ..system import Connection
 
 NAME = r"[A-Za-z_][A-Za-z0-9_]*"
 # Blanks are taken possessively: a key of nothing but blanks would otherwise be tried in every possible division.
-_ENDPOINT = re.compile(rf"({NAME})\s*+(?:\[([^\[\]]*)\]\s*+)?\.\s*+(.+)", re.DOTALL)
+_REFERENCE = re.compile(rf"({NAME})\s*+(?:\[([^\[\]]*)\]\s*+)?(?:\.\s*+(.+))?", re.DOTALL)
 _INDEX = re.compile(r"\s*+(?:(\d{1,9})|i\s*+(?:([+-])\s*+(\d{1,9}))?)\s*+")
 _BRACKETS = re.compile(r"\[([^\[\]]*)\]")
-_ELEMENT = re.compile(r"(.*)\[\d+(?:,\d+)*\]", re.DOTALL)
+
 
 Counts = Mapping[str, int | None]  # instances by name with their count; None for one without a count
 
@@ -80,30 +83,6 @@ class Endpoint:
 
 
 @dataclass(frozen=True)
-class Signal:
-    """A signal of one instance or of all of a name; `index` is None for all, and where there is no count."""
-
-    instance: str
-    index: int | None
-    variable: str
-
-    def names(self, counts: Counts) -> list[str]:
-        """The full names: `cruise[1].speed`, `cruise[2].speed`, ..."""
-        count = counts[self.instance]
-        if self.index is None and count is not None:
-            return [f"{member(self.instance, k + 1)}.{self.variable}" for k in range(count)]
-        return [f"{member(self.instance, self.index)}.{self.variable}"]
-
-    def covers(self, other: Signal) -> bool:
-        """Whether it stands for all that the other stands for: all instances for one, an array for its elements."""
-        return (
-            self.instance == other.instance
-            and self.index in (None, other.index)
-            and (other.variable == self.variable or other.variable.startswith(f"{self.variable}["))
-        )
-
-
-@dataclass(frozen=True)
 class Rule:
     """One line of `[connections]`: a target, a source, and the options of the connections it makes."""
 
@@ -122,45 +101,73 @@ def member(instance: str, index: int | None) -> str:
     return instance if index is None else f"{instance}[{index}]"
 
 
+def members(signal: SignalName, counts: Counts) -> list[SignalName]:
+    """The signals of single instances that one of a group stands for: of `cruise[1]`, `cruise[2]`, ..."""
+    count = counts.get(signal.instance)
+    if count is None:
+        return [signal]
+    return [SignalName(member(signal.instance, k + 1), signal.variable) for k in range(count)]
+
+
+class Reference(NamedTuple):
+    """`train[i].speed` as it is written: a name, what stands in its brackets, and what follows the dot."""
+
+    name: str
+    inside: str | None
+    rest: str
+
+
+def read_reference(text: str, counts: Counts, example: str, *, whole: bool = False) -> Reference:
+    """Take a text apart; nothing of it needs to exist.
+
+    Args:
+        text: `instance.variable`.
+        counts: for the message.
+        example: how it is written.
+        whole: whether `instance` alone will do as well; its rest is empty.
+
+    Raises:
+        ScenarioError: it is something else.
+    """
+    match = _REFERENCE.fullmatch(text.strip())
+    if match and (match[3] or whole):
+        return Reference(match[1], match[2], match[3] or "")
+    near = suggestion(text, counts.keys() - {text}) or f"instances are {', '.join(counts) or 'none yet'}"
+    raise ScenarioError(Problem("", f"'{text}' is not of the form instance.variable, as in {example}", near))
+
+
 def read_endpoint(text: str, counts: Counts) -> Endpoint:
     """Read `instance.variable`.
 
     Raises:
         ScenarioError: it is something else, or there is no such instance (with the nearest one).
     """
-    match = _ENDPOINT.fullmatch(text.strip())
-    if not match:
-        near = did_you_mean(text, counts.keys() - {text}) or f"; instances are {', '.join(counts) or 'none yet'}"
-        raise ScenarioError(f"'{text}' is not of the form instance.variable, as in train[i].position{near}")
-    instance, index, variable = match.groups()
-    read = check_instance(instance, index, counts)
-    return Endpoint(text, instance, read, _elements(variable))
+    name, index, variable = read_reference(text, counts, "train[i].position")
+    return Endpoint(text, name, check_instance(name, index, counts), _elements(variable))
 
 
-def read_signal(text: str, counts: Counts) -> Signal:
+def read_signal(text: str, counts: Counts) -> SignalName:
     """Read `instance.variable` where `i` means nothing: the bare name of instances that have a count means all.
 
     Raises:
         ScenarioError: it is something else, or there is no such instance (with the nearest one).
     """
-    match = _ENDPOINT.fullmatch(text.strip())
-    if not match:
-        near = did_you_mean(text, counts.keys() - {text}) or f"; instances are {', '.join(counts) or 'none yet'}"
-        raise ScenarioError(f"'{text}' is not of the form instance.variable, as in train[4].speed or train.speed{near}")
-    instance, index, variable = match.groups()
+    instance, index, variable = read_reference(text, counts, "train[4].speed or train.speed")
     parts = _elements(variable)
     if any(isinstance(part, Index) for part in parts):
-        whole = f"{match.string[: match.start(3)].strip()}{_BRACKETS.sub('', variable)}"
-        raise ScenarioError(f"'{text}': i has no meaning here; write {whole} for the whole array or {whole}[1] for one")
+        whole = f"{instance}{'' if index is None else f'[{index}]'}.{_BRACKETS.sub('', variable)}"
+        remedy = f"write {whole} for the whole array or {whole}[1] for one"
+        raise ScenarioError(Problem(f"'{text}'", "i has no meaning here", remedy))
     name = "".join(map(str, parts))
     read = None
     if instance not in counts or index is not None:
         number = Index.read(index or "")
         if counts.get(instance) and (number is None or number.free):
             why = "an index is a number here" if number is None else "i has no meaning here"
-            raise ScenarioError(f"'{text}': {why}; write {instance}.{name} for all or {instance}[1].{name} for one")
+            remedy = f"write {instance}.{name} for all or {instance}[1].{name} for one"
+            raise ScenarioError(Problem(f"'{text}'", why, remedy))
         read = check_instance(instance, index, counts)
-    return Signal(instance, read.offset if read else None, name)
+    return SignalName(member(instance, read.offset if read else None), name)
 
 
 def check_instance(instance: str, index: str | None, counts: Counts) -> Index | None:
@@ -170,8 +177,8 @@ def check_instance(instance: str, index: str | None, counts: Counts) -> Index | 
         ScenarioError: no such instance, no such member, or an index where none belongs or none where one does.
     """
     if instance not in counts:
-        near = did_you_mean(instance, counts) or f"; instances are {', '.join(counts) or 'none yet'}"
-        raise ScenarioError(f"there is no instance '{instance}'{near}")
+        near = suggestion(instance, counts) or f"instances are {', '.join(counts) or 'none yet'}"
+        raise ScenarioError(Problem("", f"there is no instance '{instance}'", near))
     count = counts[instance]
     if index is None:
         if count is not None:
@@ -183,11 +190,11 @@ def check_instance(instance: str, index: str | None, counts: Counts) -> Index | 
         raise ScenarioError(f"'{instance}' has no count: write {instance} without [{index}]")
     read = Index.read(index)
     if read is None:
-        raise ScenarioError(
-            f"'{instance}[{index}]': an index is a number, i, i-1 or i+1; for all of them write {instance}[i]"
-        )
+        remedy = f"for all of them write {instance}[i]"
+        raise ScenarioError(Problem(f"'{instance}[{index}]'", "an index is a number, i, i-1 or i+1", remedy))
     if not read.free and not 1 <= read.offset <= count:
-        raise ScenarioError(f"there is no '{instance}[{index}]'; there are {instance}[1] to {instance}[{count}]")
+        there = f"there are {instance}[1] to {instance}[{count}]"
+        raise ScenarioError(Problem("", f"there is no '{instance}[{index}]'", there))
     return read
 
 
@@ -234,12 +241,12 @@ def _range(rule: Rule, counts: Counts) -> range:
     if not rule.is_pattern:
         return range(1)
     if not rule.target.free:
-        raise ScenarioError(
-            f"every i would drive the one input '{rule.target.text}'; write i there too, or a number here"
-        )
+        message = f"every i would drive the one input '{rule.target.text}'"
+        raise ScenarioError(Problem("", message, "write i there too, or a number here"))
     bounded = [end.indices(counts) for end in ends if end.index and end.index.free]
     if not bounded:
-        raise ScenarioError("i has no range, because no instance carries it; whole arrays connect by their bare names")
+        remedy = "whole arrays connect by their bare names"
+        raise ScenarioError(Problem("", "i has no range, because no instance carries it", remedy))
     common = range(max(r.start for r in bounded), min(r.stop for r in bounded))
     shifts = [part.offset for end in ends for part in end.elements if isinstance(part, Index)]
     common = range(max([common.start, *(1 - shift for shift in shifts)]), common.stop)
@@ -247,11 +254,11 @@ def _range(rule: Rule, counts: Counts) -> range:
         known = ", ".join(
             f"{name} {count}" for name in dict.fromkeys(e.instance for e in ends) if (count := counts[name])
         )
-        raise ScenarioError(f"there is no i for which both ends exist; counts are: {known}")
+        raise ScenarioError(Problem("", "there is no i for which both ends exist", f"counts are: {known}"))
     return common
 
 
-def connect(rules: list[Rule], counts: Counts, problems: list[str]) -> list[Connection]:
+def connect(rules: list[Rule], counts: Counts, problems: list[Problem]) -> list[Connection]:
     """All connections of a scenario, each target once; what is wrong is added to `problems`."""
     made: dict[str, tuple[Rule, Connection]] = {}
     for explicit in (False, True):  # so that explicit ones replace what patterns made
@@ -262,29 +269,26 @@ def connect(rules: list[Rule], counts: Counts, problems: list[str]) -> list[Conn
             try:
                 connections = expand(rule, counts)
             except ScenarioError as error:
-                problems += [f"{where}: {problem}" for problem in error.problems]
+                problems += error.at(where)
                 continue
             for connection in connections:
                 earlier = made.get(connection.target)
                 if earlier and earlier[0].is_pattern == rule.is_pattern:
-                    problems.append(
-                        f"{where}: '{connection.target}' is already driven by '{earlier[1].source}' "
-                        f"({earlier[1].origin}); an input has one source, remove one of the two"
-                    )
+                    driven = f"'{connection.target}' is already driven by '{earlier[1].source}' ({earlier[1].origin})"
+                    ends = SignalName.parse(connection.target), SignalName.parse(earlier[1].source)
+                    problems.append(Problem(where, driven, "an input has one source, remove one of the two", ends))
                 made[connection.target] = (rule, connection)
     connections = [connection for _, connection in made.values()]
     problems += _overlaps(connections)
     return connections
 
 
-def _overlaps(connections: list[Connection]) -> Iterator[str]:
+def _overlaps(connections: list[Connection]) -> Iterator[Problem]:
     """Arrays that are driven as a whole and by element as well."""
-    targets = {connection.target: connection for connection in connections}
+    targets = {SignalName.parse(connection.target): connection for connection in connections}
     for target, connection in targets.items():
-        match = _ELEMENT.fullmatch(target)
-        if match and "." in match[1] and match[1] in targets:
-            yield (
-                f'{connection.origin}: connections."{target}": '
-                f"the whole of '{match[1]}' is driven already "
-                f"({targets[match[1]].origin}); connect either the array or its elements"
-            )
+        array = SignalName(target.instance, target.array)
+        if target.element and array in targets:
+            where = f'{connection.origin}: connections."{target}"'
+            driven = f"the whole of '{array}' is driven already ({targets[array].origin})"
+            yield Problem(where, driven, "connect either the array or its elements", (target, array))

@@ -7,9 +7,11 @@ import re
 from collections.abc import Collection, Iterator, Mapping
 from typing import Any
 
-from ..errors import ExpressionError, ScenarioError, did_you_mean
-from ..evaluation import FUNCTIONS, PUBLISHED_KEYS, check_published, parse, parse_requirement
+from ..errors import ExpressionError, ScenarioError
+from ..evaluation import FUNCTIONS, PUBLISHED_KEYS, check_entry, parse, parse_requirement
 from ..figures import PANEL_KEYS
+from ..names import SignalName
+from ..problems import Problem, suggestion
 from ..system import Connection
 from .groups import (
     MAX_COUNT,
@@ -45,7 +47,6 @@ TOP_KEYS = (
 )
 INSTANCE_KEYS = ("component", "fmu", "count", *OPTION_KEYS, "swapped", "build", "start")
 CONNECTION_KEYS = ("from", "delay", "scale", "offset")
-_MEMBER = re.compile(rf"({NAME})\[(\d{{1,9}})\]")
 
 
 class Reader:
@@ -54,7 +55,7 @@ class Reader:
     def __init__(self, source: Source, folder: str) -> None:
         self.source = source
         self.folder = folder
-        self.problems: list[str] = []
+        self.problems: list[Problem] = []
         self.draft = Draft()
 
     def read(self) -> Draft:
@@ -75,9 +76,13 @@ class Reader:
         """A value with its place."""
         return Entry(value, self.source.origin(*path), place_of(path))
 
-    def problem(self, message: str, *path: str | int) -> None:
+    def problem(self, message: str, *path: str | int, remedy: str = "") -> None:
         """Note something wrong at a place."""
-        self.problems.append(self.entry(None, *path).problem(message))
+        self.problems.append(self.entry(None, *path).problem(message, remedy))
+
+    def failed(self, error: ScenarioError, *path: str | int) -> None:
+        """Note all that is wrong at a place."""
+        self.problems += error.at(self.entry(None, *path).where)
 
     def table(self, parent: Mapping[str, Any], key: str, *path: str | int) -> dict[str, Any]:
         """The table under a key; empty, with a problem noted, where something else stands there."""
@@ -101,8 +106,7 @@ class Reader:
             try:
                 parse_requirement(name, text)
             except ExpressionError as error:
-                for problem in error.problems:
-                    self.problem(problem.removeprefix(f"requirement '{name}': "), section, name)
+                self.failed(error, section, name)
         return found
 
     def tables(self, section: str) -> list[dict[str, Any]]:
@@ -110,7 +114,7 @@ class Reader:
         found = self.source.data.get(section, [])
         if isinstance(found, list) and all(isinstance(entry, dict) for entry in found):
             return found
-        self.problem(f"is a list of tables; each begins with [[{section}]]", section)
+        self.problem("is a list of tables", section, remedy=f"each begins with [[{section}]]")
         return []
 
     def published(self, metrics: Collection[str], presets: Collection[str]) -> list[dict[str, Any]]:
@@ -125,20 +129,21 @@ class Reader:
                 if preset in strange:
                     del known["preset"]
                 strange.add(preset)
-            prefix = f"[[published]] entry 1 ({entry.get('metric', 'no metric')}): "
-            for located in check_published([known], {name: _AnyIndex() for name in metrics}, presets):
-                problem = located.removeprefix(prefix)
-                key = next((key for key in known if re.search(rf"\b{key}\b", problem)), None)
-                self.problem(problem, "published", k, *([key] if key else []))
+            for key, problem in check_entry(known, {name: _AnyIndex() for name in metrics}, presets):
+                place = ("published", k, key) if key in known else ("published", k)
+                self.problems.append(problem.at(self.entry(None, *place).where))
         return found
 
     def figures(self) -> list[dict[str, Any]]:
         """The figures; the signals they draw are looked up when the interfaces are known."""
         found = self.tables("figures")
         for k, figure in enumerate(found):
-            self._panel(figure, (*PANEL_KEYS, "panels"), "figures", k)
+            place = ("figures", k)
+            self._panel(figure, (*PANEL_KEYS, "panels"), *place)
             if not is_plain(figure, tables=True):
-                self.problem("takes numbers, texts, true or false, lists and tables of these; no dates", "figures", k)
+                self.problem(
+                    "takes numbers, texts, true or false, lists and tables of these", *place, remedy="no dates"
+                )
             panels = figure.get("panels", [])
             for j, panel in enumerate(panels if isinstance(panels, list) else []):
                 if isinstance(panel, dict):
@@ -158,15 +163,14 @@ class Reader:
         try:
             parse(text, FUNCTIONS)
         except ExpressionError as error:
-            for problem in error.problems:
-                self.problem(problem, *path)
+            self.failed(error, *path)
 
     def check_keys(self, table: Mapping[str, Any], valid: Collection[str], *path: str | int) -> None:
         """Note every key that does not belong there."""
         for key in table:
             if key not in valid:
-                near = did_you_mean(key, valid) or f"; valid here: {', '.join(valid)}"
-                self.problem(f"unknown key '{key}'{near}", *path, key)
+                near = suggestion(key, valid) or f"valid here: {', '.join(valid)}"
+                self.problem(f"unknown key '{key}'", *path, key, remedy=near)
 
     # ---------------------------------------------------------------- times, instances
 
@@ -181,15 +185,17 @@ class Reader:
 
     def _instances(self, tables: Mapping[str, Any]) -> None:
         if not tables and "instances" not in self.source.data:
-            self.problems.append(f"{self.source.label}: there are no instances; begin one with [instances.NAME]")
+            none = Problem(self.source.label, "there are no instances", "begin one with [instances.NAME]")
+            self.problems.append(none)
         singles: dict[str, dict[int, dict[str, Any]]] = {}
         written: dict[str, None] = {}
         for name in tables:
             table = self.table(tables, name, "instances")
-            match = _MEMBER.fullmatch(name)
-            written[match[1] if match else name] = None
-            if match:
-                singles.setdefault(match[1], {})[int(match[2])] = table
+            one = SignalName(name)
+            is_member = one.number is not None and re.fullmatch(NAME, one.group)
+            written[one.group if is_member else name] = None
+            if is_member and one.number is not None:
+                singles.setdefault(one.group, {})[one.number] = table
             elif self._name(name, "instances", name):
                 self.draft.groups[name] = self._group(name, table)
         for name, members in singles.items():
@@ -204,7 +210,7 @@ class Reader:
             if name in RESERVED or keyword.iskeyword(name)
             else "takes letters, digits and _, not first a digit"
         )
-        self.problem(f"an instance's name {why}; choose another for '{name}'", *path)
+        self.problem(f"an instance's name {why}", *path, remedy=f"choose another for '{name}'")
         return False
 
     def _group(self, name: str, table: Mapping[str, Any]) -> Group:
@@ -212,7 +218,7 @@ class Reader:
         self.check_keys(table, INSTANCE_KEYS, *path)
         group = Group(name, self.source.origin(*path))
         if "component" not in table and "fmu" not in table:
-            self.problem("says neither component = ... nor fmu = ...; name the model", *path)
+            self.problem("says neither component = ... nor fmu = ...", *path, remedy="name the model")
         group.model = self._model(table, *path) or ""
         if "count" in table:
             group.count = check_count(self.entry(table["count"], *path, "count"), self.problems)
@@ -232,7 +238,8 @@ class Reader:
             group = Group(name, self.source.origin("instances", first), count=max(tables))
             missing = next((k for k in range(1, len(tables) + 1) if k not in tables), None)
             if missing is not None:
-                self.problem(f"there is no {name}[{missing}]; number from 1 without gaps", "instances", first)
+                wanted = "number from 1 without gaps"
+                self.problem(f"there is no {name}[{missing}]", "instances", first, remedy=wanted)
                 group.count = max(1, min(max(tables), MAX_COUNT))
             self.draft.groups[name] = group
         for k, table in tables.items():
@@ -244,7 +251,7 @@ class Reader:
                 continue
             model = self._model(table, *path)
             if not group.model and not ("component" in table or "fmu" in table):
-                self.problem("says neither component = ... nor fmu = ...; name the model", *path)
+                self.problem("says neither component = ... nor fmu = ...", *path, remedy="name the model")
             group.members[k] = Member(
                 self.source.origin(*path),
                 model,
@@ -257,13 +264,13 @@ class Reader:
     def _model(self, table: Mapping[str, Any], *path: str) -> str | None:
         kinds = [kind for kind in ("component", "fmu") if kind in table]
         if len(kinds) > 1:
-            self.problem("component and fmu exclude each other; keep one", *path, "fmu")
+            self.problem("component and fmu exclude each other", *path, "fmu", remedy="keep one")
         if not kinds:
             return None
         try:
             return resolve_model(table[kinds[0]], self.folder, kinds[0])
         except ScenarioError as error:
-            self.problem(str(error), *path, kinds[0])
+            self.failed(error, *path, kinds[0])
             return None
 
     def _swapped(self, table: Mapping[str, Any], *path: str) -> bool | None:
@@ -278,7 +285,7 @@ class Reader:
             try:
                 build[name] = build_argument(value, self.folder)
             except ScenarioError as error:
-                self.problem(str(error), *path, "build", name)
+                self.failed(error, *path, "build", name)
         return build
 
     def _start(self, table: Mapping[str, Any], *path: str) -> dict[str, Entry]:
@@ -304,7 +311,7 @@ class Reader:
                 try:
                     ends.append(read_endpoint(end, self.draft.counts))
                 except ScenarioError as error:
-                    self.problem(str(error), *path)
+                    self.failed(error, *path)
             if len(ends) == 2:
                 self.draft.rules.append(Rule(ends[0], ends[1], options))
 
@@ -331,7 +338,7 @@ class Reader:
             return made
         self.check_keys(value, CONNECTION_KEYS, *path)
         if not isinstance(value.get("from"), str):
-            self.problem('names no source; write { from = "instance.output", ... }', *path)
+            self.problem("names no source", *path, remedy='write { from = "instance.output", ... }')
         else:
             made.source = value["from"]
         delay = value.get("delay", 0)
@@ -357,7 +364,7 @@ class _AnyIndex(Collection[int | None]):
         return 0
 
 
-def check_count(entry: Entry, problems: list[str]) -> int:
+def check_count(entry: Entry, problems: list[Problem]) -> int:
     """How many instances; 1, with a problem noted, where the value is unusable."""
     count = entry.value
     if isinstance(count, int) and not isinstance(count, bool) and 1 <= count <= MAX_COUNT:

@@ -8,9 +8,10 @@ from typing import Any
 
 from ..errors import ScenarioError
 from ..master import ALGORITHMS
+from ..problems import Problem
 from ..system import ACCELERATIONS, LOOPS
 from .groups import Entry, choice, number, positive, shown, whole, whole_multiple
-from .patterns import Counts, read_signal
+from .patterns import Counts, members, read_signal
 
 SIMULATION_KEYS = (
     "stop_time",
@@ -39,11 +40,12 @@ _CHOICES = {
 }
 
 
-def read_simulation(entries: Mapping[str, Entry], origin: str, problems: list[str]) -> dict[str, Any]:
+def read_simulation(entries: Mapping[str, Entry], origin: str, problems: list[Problem]) -> dict[str, Any]:
     """The values of `[simulation]`, checked; `order` and the signals of `tolerances` are left as written."""
     before = len(problems)
     if "stop_time" not in entries:
-        problems.append(f"{origin}: simulation.stop_time is missing; say how long to run, in s: stop_time = 350.0")
+        remedy = "say how long to run, in s: stop_time = 350.0"
+        problems.append(Problem(origin, "simulation.stop_time is missing", remedy))
     values: dict[str, Any] = {
         key: number(entries[key], problems, 1.0)
         for key in ("stop_time", "step", "start_time", "record")
@@ -60,7 +62,7 @@ def read_simulation(entries: Mapping[str, Entry], origin: str, problems: list[st
     return values | _numerics(entries, problems)
 
 
-def _numerics(entries: Mapping[str, Entry], problems: list[str]) -> dict[str, Any]:
+def _numerics(entries: Mapping[str, Entry], problems: list[Problem]) -> dict[str, Any]:
     """What steers extrapolation, iterations and steps of variable length."""
     values: dict[str, Any] = {}
     if "extrapolation" in entries:
@@ -84,25 +86,22 @@ def _numerics(entries: Mapping[str, Entry], problems: list[str]) -> dict[str, An
     return values
 
 
-def _shortest(entries: Mapping[str, Entry]) -> list[str]:
+def _shortest(entries: Mapping[str, Entry]) -> list[Problem]:
     """What is wrong with a shortest step that is a number, beside a step that is one."""
-    unsaid: list[str] = []
+    unsaid: list[Problem] = []
     step = number(entries["step"], unsaid) if "step" in entries else 0.1
     shortest = positive(entries["min_step"], unsaid)
     if unsaid or step <= 0 or shortest <= step:
         return []
     where = f" ({entries['step'].origin})" if "step" in entries else ""
-    return [
-        entries["min_step"].problem(
-            f"the shortest step, {shortest:.10g} s, must not be longer than the step, {step:.10g} s{where}"
-        )
-    ]
+    longer = f"the shortest step, {shortest:.10g} s, must not be longer than the step, {step:.10g} s{where}"
+    return [entries["min_step"].problem(longer)]
 
 
-def _pair(entry: Entry, problems: list[str]) -> list[float]:
+def _pair(entry: Entry, problems: list[Problem]) -> list[float]:
     """`[relative, absolute]`."""
     if isinstance(entry.value, list) and len(entry.value) == 2:
-        unfit: list[str] = []
+        unfit: list[Problem] = []
         pair = [number(Entry(one, ""), unfit, 0.0, "", lambda value: value >= 0) for one in entry.value]
         if not unfit and any(pair):
             return pair
@@ -112,7 +111,7 @@ def _pair(entry: Entry, problems: list[str]) -> list[float]:
     return [0.0, 1.0]
 
 
-def _grid(entries: Mapping[str, Entry], values: Mapping[str, Any]) -> list[str]:
+def _grid(entries: Mapping[str, Entry], values: Mapping[str, Any]) -> list[Problem]:
     """What is wrong with the points in time."""
     step, start, stop = values.get("step", 0.1), values.get("start_time", 0.0), values["stop_time"]
     steps_of = f"steps of {step:.10g} s" + (f" ({entries['step'].origin})" if "step" in entries else "")
@@ -131,22 +130,16 @@ def _grid(entries: Mapping[str, Entry], values: Mapping[str, Any]) -> list[str]:
     if not whole_multiple(stop - start, step):
         steps = max(1, math.floor((stop - start) / step)) if math.isfinite((stop - start) / step) else 1
         near = " or ".join(f"{start + k * step:.10g} s" for k in (steps, steps + 1))
-        problems.append(
-            entries["stop_time"].problem(
-                f"{stop - start:.10g} s is not a whole number of {steps_of}; change the step, or stop at {near}"
-            )
-        )
+        message = f"{stop - start:.10g} s is not a whole number of {steps_of}"
+        problems.append(entries["stop_time"].problem(message, f"change the step, or stop at {near}"))
     if record is not None and not whole_multiple(record, step):
         fitting = max(1, round(record / step)) * step if 0 < record / step < 1e15 else step
-        problems.append(
-            entries["record"].problem(
-                f"{record:.10g} s is not a whole number of {steps_of}; take {fitting:.10g} s (simulation.record)"
-            )
-        )
+        message = f"{record:.10g} s is not a whole number of {steps_of}"
+        problems.append(entries["record"].problem(message, f"take {fitting:.10g} s (simulation.record)"))
     return problems
 
 
-def spread_tolerances(entries: Mapping[str, Entry], counts: Counts, problems: list[str]) -> dict[str, str]:
+def spread_tolerances(entries: Mapping[str, Entry], counts: Counts, problems: list[Problem]) -> dict[str, str]:
     """For every signal that has a tolerance of its own, the key in `entries` that says so; one beats all."""
     lines = []
     for key, entry in entries.items():
@@ -154,9 +147,9 @@ def spread_tolerances(entries: Mapping[str, Entry], counts: Counts, problems: li
             try:
                 lines.append((read_signal(key.removeprefix(TOLERANCES), counts), key))
             except ScenarioError as error:
-                problems += [entry.problem(problem) for problem in error.problems]
-    lines.sort(key=lambda line: line[0].index is not None)
-    return {name: key for signal, key in lines for name in signal.names(counts)}
+                problems += error.at(entry.where)
+    lines.sort(key=lambda line: line[0].number is not None)
+    return {str(name): key for signal, key in lines for name in members(signal, counts)}
 
 
 def set_tolerance(entries: dict[str, Entry], text: str, entry: Entry, counts: Counts) -> None:

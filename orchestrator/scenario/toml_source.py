@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from ..errors import ScenarioError
+from ..problems import Problem
 
 MAX_DEPTH = 100
 Path_ = tuple[str | int, ...]  # where a value stands: ("instances", "train", "count"), ("published", 0, "value")
@@ -39,9 +40,8 @@ class Source:
         self._lines = _locate(self.text)
         huge = [self.origin(*path) for path in _huge_integers(self.data, ())]
         if huge:
-            raise ScenarioError(
-                [f"{origin}: an integer beyond 64 bits; write it with a decimal point" for origin in huge]
-            )
+            beyond = Problem("", "an integer beyond 64 bits", "write it with a decimal point")
+            raise ScenarioError([beyond.at(origin) for origin in huge])
 
     @classmethod
     def read(cls, path: Path, label: str) -> Source:
@@ -53,11 +53,10 @@ class Source:
         try:
             return cls(path.read_text(encoding="utf-8"), label)
         except UnicodeDecodeError as error:
-            raise ScenarioError(
-                f"{label}: not a text in UTF-8 ({error.reason} at byte {error.start}); save it as UTF-8"
-            ) from None
+            message = f"not a text in UTF-8 ({error.reason} at byte {error.start})"
+            raise ScenarioError(Problem(label, message, "save it as UTF-8")) from None
         except OSError as error:
-            raise ScenarioError(f"{label}: cannot be read: {error.strerror or error}") from None
+            raise ScenarioError(Problem(label, f"cannot be read: {error.strerror or error}")) from None
 
     def line(self, *path: str | int) -> int | None:
         """The line (from 1) of the key at `path`, or of the nearest thing around it; None where that is unknown."""
@@ -77,26 +76,27 @@ class Source:
         except tomllib.TOMLDecodeError as error:
             raise ScenarioError(self._explain(str(error))) from None
         except RecursionError:
-            raise ScenarioError(f"{self.label}: nested too deeply; no scenario needs that") from None
+            raise ScenarioError(Problem(self.label, "nested too deeply", "no scenario needs that")) from None
         except ValueError as error:  # an integer of more digits than Python converts
-            raise ScenarioError(f"{self.label}: {error}") from None
+            raise ScenarioError(Problem(self.label, str(error))) from None
         if _is_deeper(data, MAX_DEPTH):
-            raise ScenarioError(f"{self.label}: nested more than {MAX_DEPTH} levels deep; no scenario needs that")
+            message = f"nested more than {MAX_DEPTH} levels deep"
+            raise ScenarioError(Problem(self.label, message, "no scenario needs that"))
         return data
 
-    def _explain(self, message: str) -> str:
+    def _explain(self, message: str) -> Problem:
         """A syntax error as `file:line: column n: what`, with the remedy for the mistake that is made most."""
         found = re.search(r" \(at line (\d+), column (\d+)\)$", message)
         if not found:
             what = message.removesuffix(" (at end of document)")
-            return f"{self.label}:{len(self.text.splitlines()) or 1}: {what} at the end of the file"
+            return Problem(f"{self.label}:{len(self.text.splitlines()) or 1}", f"{what} at the end of the file")
         number = int(found[1])
         lines = self.text.split("\n")
         line = lines[number - 1] if number <= len(lines) else ""
-        remedy = "; a key stands once in its section" if message.startswith("Cannot overwrite") else ""
+        remedy = "a key stands once in its section" if message.startswith("Cannot overwrite") else ""
         if _UNQUOTED_INDEX.match(line):
-            remedy = '; a key with [ ] stands in quotes: "train[1].speed" = ...'
-        return f"{self.label}:{number}: column {found[2]}: {message[: found.start()]}{remedy}"
+            remedy = 'a key with [ ] stands in quotes: "train[1].speed" = ...'
+        return Problem(f"{self.label}:{number}: column {found[2]}", message[: found.start()], remedy)
 
 
 def _is_deeper(value: Any, levels: int) -> bool:

@@ -12,7 +12,7 @@ from dataclasses import dataclass
 
 import networkx as nx
 
-from .resolution import Link
+from .links import Link
 
 
 @dataclass(frozen=True)
@@ -79,12 +79,13 @@ def _late(sequence: Sequence[str], links: Sequence[Link]) -> Iterable[str]:
     told: set[tuple[str, str]] = set()
     for link in links:
         first, second = _before(link)
-        source, target = ".".join(link.source), ".".join(link.target)
+
         in_time = at[first] < at[second] or (first == second and not link.direct)
         if in_time or (link.source[0], link.target[0]) in told:
             continue
         told.add((link.source[0], link.target[0]))
         if link.direct:
-            yield f"{target} receives {source} one communication step late: the order has a cycle there"
+            yield f"{link.target} receives {link.source} one communication step late: the order has a cycle there"
         else:
-            yield f"{target} receives {source} of the end of the step instead of its begin: the order has a cycle there"
+            late = f"{link.target} receives {link.source} of the end of the step instead of its begin"
+            yield f"{late}: the order has a cycle there"

@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..fmi import Interface
-from .resolution import Link, Wiring
+from .links import Link, Wiring
 
 SIDES = ("ahead", "behind", "leader")
 _SHOWN = 10

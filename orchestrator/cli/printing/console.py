@@ -10,6 +10,8 @@ from collections.abc import Iterable
 from rich.console import Console
 from rich.text import Text
 
+from ...problems import Problem
+
 _PIPE_WIDTH = 160
 
 
@@ -25,13 +27,17 @@ def say(out: Console, text: str, style: str = "", *, whole: bool = False) -> Non
     out.print(Text(text, style=style), soft_wrap=whole or not out.is_terminal)
 
 
-def folded(problems: Iterable[str]) -> list[str]:
-    """Problems that differ in an instance's index only, told once: four trains make one mistake, not four."""
-    alike: dict[str, list[str]] = {}
+def folded(problems: Iterable[Problem | str]) -> list[str]:
+    """Problems that differ in an instance's index only, told once: four trains make one mistake, not four.
+
+    A problem knows its kind; of notes, which are sentences, every number in brackets counts as an index.
+    """
+    alike: dict[str, list[Problem | str]] = {}
     for problem in problems:
-        alike.setdefault(re.sub(r"(?<=\w)\[\d+\]", "[i]", problem), []).append(problem)
+        kind = problem.kind if isinstance(problem, Problem) else re.sub(r"(?<=\w)\[\d+\]", "[i]", problem)
+        alike.setdefault(kind, []).append(problem)
     return [
-        first + (f" (and {len(rest)} more like it, for other indices)" if rest else "")
+        str(first) + (f" (and {len(rest)} more like it, for other indices)" if rest else "")
         for first, *rest in alike.values()
     ]
 

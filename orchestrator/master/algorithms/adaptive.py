@@ -17,7 +17,8 @@ from typing import Any
 
 from ...errors import CouplingError, FmuError, LostError, RunError, StoppedError
 from ...fmi import Interface, Variable
-from ...system import System, split
+from ...names import SignalName
+from ...system import System
 from ...wiring import Wiring, is_direct
 from ..coupling import Coupling
 from .algorithm import Fit, VariableStep
@@ -91,22 +92,23 @@ class Adaptive(VariableStep):
         problems = [
             *cannot(
                 sampled,
-                "sampled at points of its own, which adaptive cannot step over; choose gauss-seidel or iterative",
+                "sampled at points of its own, which adaptive cannot step over",
+                "choose gauss-seidel or iterative",
             ),
             *cannot(
                 [name for name, interface in others.items() if not interface.can_save_state],
-                "the state that adaptive comes back to cannot be saved (canGetAndSetFMUstate is false); choose "
-                "gauss-seidel",
+                "the state that adaptive comes back to cannot be saved (canGetAndSetFMUstate is false)",
+                "choose gauss-seidel",
             ),
             *cannot(
                 [name for name, interface in others.items() if not interface.variable_step],
-                "the step cannot vary (canHandleVariableCommunicationStepSize is false); choose gauss-seidel or "
-                "iterative",
+                "the step cannot vary (canHandleVariableCommunicationStepSize is false)",
+                "choose gauss-seidel or iterative",
             ),
             *cannot(
                 sorted({link.connection.target for link in wiring.links if link.delay}),
-                "a delay counts communication points, which adaptive sets anew at every run; leave the delay out, or "
-                "choose gauss-seidel",
+                "a delay counts communication points, which adaptive sets anew at every run",
+                "leave the delay out, or choose gauss-seidel",
             ),
         ]
         return Fit(problems, list(_unwatched(system, interfaces)))
@@ -240,7 +242,7 @@ class Adaptive(VariableStep):
 def _unwatched(system: System, interfaces: Mapping[str, Interface]) -> Iterable[str]:
     """Tolerances that it has no use for."""
     for signal in system.tolerances:
-        instance, name = split(signal)
+        instance, name = SignalName.parse(signal)
         interface = interfaces.get(instance)
         scalars = interface.scalars(name) if interface is not None else None
         if interface is None or scalars is None:  # told elsewhere

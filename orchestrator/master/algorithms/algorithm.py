@@ -10,6 +10,7 @@ from enum import IntEnum
 from typing import Any, ClassVar, final
 
 from ...fmi import Interface
+from ...problems import Problem
 from ...system import System
 from ...wiring import Wiring
 from ..coupling import Coupling
@@ -23,12 +24,12 @@ class Fit:
     """How an algorithm fits a system.
 
     Attributes:
-        problems: why it cannot be had with these FMUs, one sentence each, with the way out.
+        problems: why it cannot be had with these FMUs, each with the way out.
         notes: what a user should know of it though it is no error.
         steps: how instances would step, a line each, where that is not one after the other.
     """
 
-    problems: Sequence[str] = ()
+    problems: Sequence[Problem] = ()
     notes: Sequence[str] = ()
     steps: Sequence[str] = ()
 

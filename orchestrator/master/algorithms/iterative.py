@@ -98,7 +98,7 @@ class Iterative(FixedStep):
         blocks = find_blocks(interfaces, wiring.links)
         lost = cannot(
             [name for name in interfaces if name in blocks.cyclic and not interfaces[name].can_save_state],
-            "in a cycle, and the state that iterative comes back to cannot be saved (canGetAndSetFMUstate is false); "
+            "in a cycle, and the state that iterative comes back to cannot be saved (canGetAndSetFMUstate is false)",
             "choose gauss-seidel or jacobi, or break the cycle by a delay",
         )
         notes = []

@@ -4,13 +4,15 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 
+from ...problems import Problem
+
 _SHOWN = 6
 
 
-def cannot(names: Sequence[str], what: str) -> Iterable[str]:
+def cannot(names: Sequence[str], what: str, remedy: str) -> Iterable[Problem]:
     """One refusal that names them all, if there are any."""
     if names:
-        yield f"{listed(names)}: {what}"
+        yield Problem(listed(names), what, remedy)
 
 
 def listed(names: Sequence[str]) -> str:

@@ -374,8 +374,8 @@ def test_check_tells_every_problem_of_the_table():
         ],
         strict=True,
     ):
-        assert problem.startswith(f"metric '{name}': ")
-        assert message in problem
+        assert problem.place.startswith(f"metric '{name}'")
+        assert message in str(problem)
     assert check_metrics({"shift": "max(at_sample(s.x))"}, names) == []
 
 
@@ -384,8 +384,10 @@ def test_a_metric_that_is_a_signal_is_found_before_the_run():
     fine = {"a": "max(s.x) - c.limit", "b": "c.limit", "c": "max(s.x - s.y)", "d": "abs(final(a[i].v))"}
     assert check_metrics(fine, names, parameters=["c.limit"]) == []
     assert check_metrics({"gap": "s.x - s.y"}, names) == []  # not told apart from parameters
-    problems = check_metrics({"gap": "s.x - s.y"}, names, parameters=["c.limit"])
-    assert problems == ["metric 'gap': 's.x - s.y' is a signal, not a number; reduce it, as in max(s.x - s.y)"]
+    (problem,) = check_metrics({"gap": "s.x - s.y"}, names, parameters=["c.limit"])
+    assert problem.place == "metric 'gap'"
+    assert problem.message == "'s.x - s.y' is a signal, not a number"
+    assert problem.remedy == "reduce it, as in max(s.x - s.y)"
 
 
 def test_compare_sets_two_runs_side_by_side():

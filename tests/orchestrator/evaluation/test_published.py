@@ -132,9 +132,10 @@ def test_right_entries_have_no_problems():
 def test_problems_name_the_entry_and_the_remedy(made, message):
     problems = check_published([entry(), made], INDICES, PRESETS)
     assert len(problems) == 1
-    assert message in problems[0]
-    assert problems[0].startswith("[[published]] entry 2 (")
+    assert message in str(problems[0])
+    assert problems[0].place.startswith("[[published]] entry 2 (")
 
 
 def test_a_scenario_without_metrics_says_so():
-    assert "unknown metric 'settling'; there are none" in check_published([entry()], {}, ())[0]
+    problem = check_published([entry()], {}, ())[0]
+    assert (problem.message, problem.remedy) == ("unknown metric 'settling'", "there are none")

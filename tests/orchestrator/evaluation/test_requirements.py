@@ -216,7 +216,7 @@ def test_refused_with_the_remedy(text, message):
     with pytest.raises(ExpressionError) as caught:
         parse_requirement("comfort", text)
     assert message in str(caught.value)
-    assert all(problem.startswith("requirement 'comfort': ") for problem in caught.value.problems)
+    assert check_requirements({"comfort": text}, ["a[1].x"]) == caught.value.at("requirement 'comfort'")
 
 
 def test_all_problems_of_one_text_are_told():
@@ -241,8 +241,8 @@ def test_all_problems_of_one_text_are_told():
 def test_check_finds_it_before_the_run(text, message):
     problems = check_requirements({"comfort": text}, list(run().names()), every_step=False)
     assert len(problems) == 1
-    assert message in problems[0]
-    assert problems[0].startswith("requirement 'comfort': ")
+    assert message in str(problems[0])
+    assert problems[0].place.startswith("requirement 'comfort'")
 
 
 def test_a_table_is_checked_and_judged_in_its_order():

@@ -66,8 +66,8 @@ def test_right_figures_have_no_problems(names):
 def test_problems_name_the_figure_and_the_remedy(figure, message, names):
     problems = check_figures([figure], names, every_step=False)
     assert len(problems) == 1, problems
-    assert message in problems[0]
-    assert problems[0].startswith("[[figures]] entry 1 (")
+    assert message in str(problems[0])
+    assert problems[0].place.startswith("[[figures]] entry 1 (")
 
 
 def test_the_figures_of_the_documentation_are_right(names):

@@ -91,7 +91,7 @@ def test_one_bad_figure_does_not_cost_the_others(tmp_path, recorded):
     with pytest.raises(ScenarioError) as caught:
         draw(figures, recorded, tmp_path)
     assert [path.name for path in tmp_path.iterdir()] == ["good.png"]
-    first, second, third, fourth = caught.value.problems
+    first, second, third, fourth = map(str, caught.value.problems)
     assert "x = 'max(train[1].speed)' is a single number; draw over a signal" in fourth
     assert "figure 'Bad' was not drawn: " in first
     assert "did you mean 'target.value'?" in first

@@ -21,7 +21,7 @@ def system(**models):
 def problems(it, workspace, kind="plain"):
     with pytest.raises(ScenarioError) as caught:
         load_models(it, workspace, kind)
-    return caught.value.problems
+    return [str(problem) for problem in caught.value.problems]
 
 
 def test_instances_of_one_component_share_its_model(workspace):

@@ -289,7 +289,7 @@ def try_text(watched, tmp_path):
         except ScenarioError as error:
             said = error.problems
         assert said
-        assert all(said)
+        assert all(problem.place and problem.message for problem in said)
         return None
 
     def rule(text, checked=False):

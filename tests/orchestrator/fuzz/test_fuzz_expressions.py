@@ -125,6 +125,11 @@ def refusals():
     assert said.strip()
 
 
+def told(problems):
+    """Whether each of them says what is wrong and where."""
+    return all(problem.place and problem.message for problem in problems)
+
+
 def use_everywhere(text, run, quantifier, clause):
     """All that a scenario does with an expression, before a run and after it."""
     with refusals():
@@ -143,9 +148,9 @@ def use_everywhere(text, run, quantifier, clause):
     for metric in evaluate_metrics({"m": text}, run):
         assert all(map(metric.text, metric.values))
     with refusals():
-        assert all(check_requirements({"r": f"{quantifier} {text} {clause}"}, NAMES))
+        assert told(check_requirements({"r": f"{quantifier} {text} {clause}"}, NAMES))
         judge_requirements({"r": f"{quantifier} {text} {clause}"}, run)
-    assert all(check_figures([{"title": "F", "y": [text], "x": text, "bands": [[text]]}], NAMES))
+    assert told(check_figures([{"title": "F", "y": [text], "x": text, "bands": [[text]]}], NAMES))
 
 
 @pytest.fixture
@@ -202,7 +207,7 @@ FIGURES = st.one_of(
 def test_a_figure_that_passed_its_check_is_drawn_or_refused(explore, tmp_path):
     def rule(figure, run):
         problems = check_figures([figure], NAMES)
-        assert all(problems)
+        assert told(problems)
         if not problems:
             with refusals(), warnings.catch_warnings():
                 warnings.simplefilter("ignore")  # matplotlib misses letters in its font

@@ -15,7 +15,7 @@ from railcosim.orchestrator.fmi.binding.fmi2 import FmuSlave
 from railcosim.orchestrator.master.algebraic_loops import LoopSolver, find_feeders, find_loops
 from railcosim.orchestrator.run.execution import run
 from railcosim.orchestrator.system import Connection, System
-from railcosim.orchestrator.wiring.resolution import Link
+from railcosim.orchestrator.wiring import Link
 
 EXPLICIT = pytest.mark.parametrize("algorithm", ["gauss-seidel", "jacobi"])
 

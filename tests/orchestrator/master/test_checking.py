@@ -25,7 +25,7 @@ def ring(mine):
 def problems(it, workspace):
     with pytest.raises(ScenarioError) as caught:
         check(it, workspace, "plain")
-    return caught.value.problems
+    return [str(problem) for problem in caught.value.problems]
 
 
 def notes(it, workspace):

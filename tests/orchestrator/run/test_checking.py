@@ -16,7 +16,7 @@ def problems(examine):
     def find(system):
         with pytest.raises(ScenarioError) as caught:
             examine(system)
-        return caught.value.problems
+        return [str(problem) for problem in caught.value.problems]
 
     return find
 

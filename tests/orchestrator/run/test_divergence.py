@@ -8,7 +8,7 @@ from railcosim.fmus.annotation import Annotation
 from railcosim.orchestrator.errors import CouplingError, FmuError
 from railcosim.orchestrator.run.divergence import explain_divergence, find_growth
 from railcosim.orchestrator.system import Connection, System
-from railcosim.orchestrator.wiring.resolution import Link
+from railcosim.orchestrator.wiring import Link
 
 STEP = 0.1
 

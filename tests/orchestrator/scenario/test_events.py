@@ -28,7 +28,7 @@ def events(*entries, **changes):
 def problems(*entries, **changes):
     with pytest.raises(ScenarioError) as caught:
         events(*entries, **changes)
-    return caught.value.problems
+    return [str(problem) for problem in caught.value.problems]
 
 
 @pytest.mark.parametrize(

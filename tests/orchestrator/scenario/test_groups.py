@@ -6,6 +6,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 from railcosim.orchestrator.errors import ScenarioError
+from railcosim.orchestrator.problems import Problem
 from railcosim.orchestrator.scenario.groups import (
     Entry,
     Group,
@@ -103,7 +104,7 @@ def test_no_number_of_steps(value):
 def test_what_is_not_a_number_is_shown_as_written(value, text):
     problems = []
     assert number(Entry(value, "x.toml:3", "a.b"), problems, 7.0) == 7.0
-    assert problems == [f"x.toml:3: a.b: takes a finite number, not {text}"]
+    assert problems == [Problem("x.toml:3: a.b", f"takes a finite number, not {text}")]
     assert shown(value) == text
 
 
@@ -132,7 +133,7 @@ def test_other_values(read, value, result, message):
     problems = []
     assert read(Entry(value, "x.toml:3", "a.b"), problems) == result
     assert len(problems) == (message is not None)
-    assert not problems or problems[0].startswith(f"x.toml:3: a.b: {message}")
+    assert not problems or str(problems[0]).startswith(f"x.toml:3: a.b: {message}")
 
 
 def swapped(group):

@@ -6,7 +6,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 from railcosim.orchestrator.errors import ScenarioError
-from railcosim.orchestrator.scenario.patterns import Index, Rule, Signal, connect, expand, read_endpoint, read_signal
+from railcosim.orchestrator.names import SignalName
+from railcosim.orchestrator.scenario.patterns import Index, Rule, connect, expand, members, read_endpoint, read_signal
 from railcosim.orchestrator.system import Connection
 
 COUNTS = {"train": 4, "cruise": 4, "consist": 2, "gust": None, "observer": None, "target": None}
@@ -163,7 +164,7 @@ def test_options_reach_every_connection():
 def test_conflicts(rules, message):
     problems = []
     connect([rule(*ends, line) for line, ends in enumerate(rules, 1)], COUNTS, problems)
-    assert problems == [message]
+    assert [str(problem) for problem in problems] == [message]
 
 
 # -------------------------------------------------------------------- signals
@@ -172,15 +173,15 @@ def test_conflicts(rules, message):
 @pytest.mark.parametrize(
     ("text", "signal", "names"),
     [
-        ("gust.size", Signal("gust", None, "size"), ["gust.size"]),
-        ("consist.force", Signal("consist", None, "force"), ["consist[1].force", "consist[2].force"]),
-        (" consist [ 2 ] .force[ 1 , 2 ] ", Signal("consist", 2, "force[1,2]"), ["consist[2].force[1,2]"]),
-        ("gust.der(x[1]).y", Signal("gust", None, "der(x[1]).y"), ["gust.der(x[1]).y"]),
+        ("gust.size", SignalName("gust", "size"), ["gust.size"]),
+        ("consist.force", SignalName("consist", "force"), ["consist[1].force", "consist[2].force"]),
+        (" consist [ 2 ] .force[ 1 , 2 ] ", SignalName("consist[2]", "force[1,2]"), ["consist[2].force[1,2]"]),
+        ("gust.der(x[1]).y", SignalName("gust", "der(x[1]).y"), ["gust.der(x[1]).y"]),
     ],
 )
 def test_signals_of_one_and_of_all(text, signal, names):
     assert read_signal(text, COUNTS) == signal
-    assert signal.names(COUNTS) == names
+    assert [str(name) for name in members(signal, COUNTS)] == names
 
 
 @pytest.mark.parametrize(

@@ -20,7 +20,7 @@ def edited(*replacements):
 def problems(text, **changes):
     with pytest.raises(ScenarioError) as caught:
         loads(text, "two.toml", **changes)
-    return caught.value.problems
+    return [str(problem) for problem in caught.value.problems]
 
 
 MISTAKES = [

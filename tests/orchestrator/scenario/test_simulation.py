@@ -25,7 +25,7 @@ def simulation(*lines):
 def problems(text, **changes):
     with pytest.raises(ScenarioError) as caught:
         loads(text, "x.toml", **changes)
-    return caught.value.problems
+    return [str(problem) for problem in caught.value.problems]
 
 
 def test_without_a_word_the_values_are_those_of_a_system():

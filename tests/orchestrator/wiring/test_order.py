@@ -1,14 +1,15 @@
 """The order of a Gauss-Seidel sweep follows from direct feed-through, and what it cannot serve is said."""
 
 import pytest
+from railcosim.orchestrator.names import SignalName
 from railcosim.orchestrator.system import Connection
+from railcosim.orchestrator.wiring import Link
 from railcosim.orchestrator.wiring.order import derive_order
-from railcosim.orchestrator.wiring.resolution import Link
 
 
 def link(source, target, *, direct=False, delay=0):
     """A connection ``"a.y"`` -> ``"b.u"``; direct where y depends on an input of a at one instant."""
-    a, b = tuple(source.split(".")), tuple(target.split("."))
+    a, b = SignalName.parse(source), SignalName.parse(target)
     return Link(a, b, 1.0, 0.0, delay, direct, Connection(source, target, delay))
 
 

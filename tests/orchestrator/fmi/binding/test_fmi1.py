@@ -235,7 +235,7 @@ def test_a_wrong_start_value_is_told_before_the_run(by_hand):
     system.add("it", str(by_hand(1)), u=2000.0, twice=1.0, gear=7)
     with pytest.raises(ScenarioError) as caught:
         run(system)
-    told = "\n".join(caught.value.problems)
+    told = str(caught.value)
     assert "it.u: 2000.0 is above the limit 1000 m" in told
     assert "it.twice: it is computed (causality calculatedParameter) and cannot be set" in told
     assert "it.gear: takes one of low (1), mid (2), high (3), not 7" in told

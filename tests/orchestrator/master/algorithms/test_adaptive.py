@@ -31,7 +31,7 @@ def swing(mine, **how):
 def refused(it, workspace, kind="plain"):
     with pytest.raises(ScenarioError) as caught:
         check(it, workspace, kind)
-    return "\n".join(caught.value.problems)
+    return str(caught.value)
 
 
 def test_sampled_components_are_refused(mine, workspace):

@@ -17,7 +17,7 @@ from railcosim.orchestrator.master.coupling import Coupling
 from railcosim.orchestrator.master.settings import DEFAULT
 from railcosim.orchestrator.run.execution import execute, run
 from railcosim.orchestrator.system import Connection, System
-from railcosim.orchestrator.wiring.resolution import Link
+from railcosim.orchestrator.wiring import Link
 
 # -------------------------------------------------------------------- from what was tried to what is tried next
 

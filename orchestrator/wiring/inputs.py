@@ -1,0 +1,123 @@
+"""What else can be known of a resolved system: inputs that nothing feeds, or two do, and steps that meet no sample."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Mapping, Sequence
+
+from ..fmi import Interface, Variable
+from ..names import SignalName
+from ..problems import Problem
+from ..system import System
+from .links import Link, Wiring
+
+_LISTED = 4
+"""How many inputs of an instance are named that nothing feeds."""
+
+
+def check_inputs(system: System, interfaces: Mapping[str, Interface], wiring: Wiring) -> None:
+    """Note inputs that are fed twice, ours that nothing feeds though they need it, and what others' then keep."""
+    fed = _fed(interfaces, wiring)
+    # Of an input that something is meant to feed, nothing more is said than what is wrong with its connection.
+    broken = set(_targets(system, interfaces)) if wiring.problems else set()
+    for instance, interface in interfaces.items():
+        given = wiring.starts[instance]
+        open_inputs = [
+            variable
+            for variable in interface.of("input")
+            if _slot(instance, variable) not in fed
+            and variable.name not in given
+            and variable.name not in interface.optional_inputs
+            and (instance, variable.name) not in broken
+        ]
+        if interface.annotation:
+            origin = system.instances[instance].origin
+            wiring.problems += [_unfed(SignalName(instance, variable.name)).at(origin) for variable in open_inputs]
+        else:
+            wiring.notes += _kept(instance, open_inputs)
+
+
+def _targets(system: System, interfaces: Mapping[str, Interface]) -> Iterable[SignalName]:
+    """The inputs that connections name, whether or not they can be made."""
+    for connection in system.connections:
+        instance, name = SignalName.parse(connection.target)
+        scalars = interfaces[instance].scalars(name) if instance in interfaces else None
+        yield from (SignalName(instance, scalar) for scalar in scalars or ())
+
+
+def _unfed(signal: SignalName) -> Problem:
+    what = "is a required input and nothing feeds it: connect it, or give it a start value to hold it constant"
+    return Problem("", f"{signal} {what}", names=(signal,))
+
+
+def _slot(instance: str, variable: Variable) -> tuple[str, str, int]:
+    """What a variable stands for in its FMU: those that share it are one (FMI 2.0, 2.2.7)."""
+    kind = "Integer" if variable.type == "Enumeration" else variable.type
+    return instance, variable.fmi_type or kind, variable.reference
+
+
+def _fed(interfaces: Mapping[str, Interface], wiring: Wiring) -> set[tuple[str, str, int]]:
+    """Inputs that a connection feeds."""
+    fed: dict[tuple[str, str, int], Link] = {}
+    for link in wiring.links:
+        slot = _slot(link.target[0], interfaces[link.target[0]].variables[link.target[1]])
+        first = fed.setdefault(slot, link)
+        if first is link:
+            continue
+        sources = f"by {first.connection.source!r} and by {link.connection.source!r}"
+        if first.target == link.target:
+            message = f"{link.target} is fed twice: {sources}"
+        elif first.source != link.source:
+            message = (
+                f"{link.target} is another name of {first.target}, and they are fed {sources}: connect one of them"
+            )
+        else:
+            continue
+        ends = (SignalName.parse(text) for text in (first.connection.source, link.connection.source))
+        problem = Problem("", message, names=(link.target, first.target, *ends))
+        wiring.problems.append(problem.at(link.connection.origin))
+    return set(fed)
+
+
+def _kept(instance: str, inputs: Sequence[Variable]) -> list[str]:
+    """What an FMU of another maker does with inputs that nothing feeds."""
+    if len(inputs) > _LISTED:
+        names = ", ".join(v.name for v in inputs[:_LISTED])
+        return [f"{instance}: {len(inputs)} inputs are not connected ({names}, ...); they keep their start values"]
+    return [
+        f"{instance}.{v.name} is not connected; it keeps {'its start value' if v.start is None else repr(v.start)}"
+        for v in inputs
+    ]
+
+
+def check_sampling(system: System, interfaces: Mapping[str, Interface], wiring: Wiring) -> None:
+    """Note steps that meet no sample, or are not those an FMU is made for."""
+    told = set()
+    for name, interface in interfaces.items():
+        sample = wiring.starts[name].get("sample_time")
+        if sample is None and interface.sampled and "sample_time" in interface.variables:
+            sample = interface.variables["sample_time"].start
+        if interface.annotation and sample and isinstance(sample, int | float):
+            own_step = system.instances[name].step or system.step
+            if not _is_multiple(own_step, sample):
+                what = f"the communication step {own_step:g} s is not a whole multiple of its sample_time {sample:g} s"
+                problem = Problem(name, f"{what}: set step or {name}.sample_time", names=(SignalName(name),))
+                wiring.problems.append(problem.at(system.instances[name].origin))
+        own, step = interface.default_step, system.instances[name].step or system.step
+        if own and not interface.variable_step and not interface.annotation and interface.model not in told:
+            told.add(interface.model)
+            if not _is_multiple(step, own):
+                wiring.notes.append(
+                    f"{interface.model} cannot vary its step and is made for {own:g} s; it is stepped at {step:g} s"
+                )
+        longest = interface.annotation and interface.annotation.recommended_step
+        if longest and system.step > longest * (1 + 1e-9) and interface.model not in told:
+            told.add(interface.model)
+            wiring.notes.append(
+                f"{interface.model} is advised to step at {longest:g} s or faster; this run steps at {system.step:g} s"
+            )
+
+
+def _is_multiple(length: float, part: float) -> bool:
+    count = length / part
+    return math.isfinite(count) and round(count) >= 1 and abs(round(count) * part - length) <= 1e-6 * part

@@ -1,0 +1,145 @@
+"""Start values as single scalars of the variables' types, or what is wrong with them."""
+
+from __future__ import annotations
+
+import hashlib
+import math
+from itertools import chain
+from typing import Any
+
+import numpy as np
+
+from ..errors import ScenarioError
+from ..evaluation import evaluate_constant
+from ..fmi import Interface, Variable
+from ..names import SignalName
+from ..problems import Problem
+from ..system import Instance, System
+from .links import Wiring
+
+
+def find_starts(system: System, instance: Instance, interface: Interface, wiring: Wiring) -> dict[str, Any]:
+    """The start values of one instance by scalar variable; what is wrong with them is noted in the wiring."""
+    values: dict[str, Any] = {}
+    dropped = []
+    for name, given in instance.start.items():
+        scalars = interface.scalars(name)
+        signal = SignalName(instance.name, name)
+        origin = system.origins.get(str(signal), instance.origin)
+        if scalars is None and instance.swapped:
+            dropped.append(name)
+        elif scalars is None:
+            why = interface.why_left_out(name)
+            valid = (v.name for v in interface.variables.values() if v.settable)
+            near = "" if why else wiring.near(name, chain(valid, interface.arrays))
+            problem = Problem(str(signal), f"{interface.model} has no such variable{why}", near, (signal,))
+            wiring.problems.append(problem.at(origin))
+        else:
+            try:
+                values.update(_elements(instance, interface, name, scalars, given))
+            except ScenarioError as error:
+                wiring.problems += [problem.at(origin) for problem in error.at(str(signal), signal)]
+    if dropped:
+        wiring.notes.append(f"{instance.name}: {interface.model} has no {', '.join(dropped)}; dropped with the swap")
+    _set_runtime(system, instance, interface, values)
+    return values
+
+
+def _elements(
+    instance: Instance, interface: Interface, name: str, scalars: tuple[str, ...], given: Any
+) -> dict[str, Any]:
+    """Start values by scalar; a single value is given to every element of an array.
+
+    Raises:
+        ScenarioError: what is wrong with it.
+    """
+    fixed = next((interface.variables[s] for s in scalars if not interface.variables[s].settable), None)
+    if fixed is not None and fixed.variability == "constant":
+        raise ScenarioError("it is a constant of the model and cannot be set")
+    if fixed is not None:
+        raise ScenarioError(f"it is computed (causality {fixed.causality}) and cannot be set")
+    elements = _flatten(given)
+    if isinstance(given, list | tuple | np.ndarray):
+        if name in interface.variables:
+            raise ScenarioError(f"takes a single value, not the list {given!r}")
+        if len(elements) != len(scalars):
+            raise ScenarioError(f"takes {len(scalars)} value{'s' * (len(scalars) > 1)}, {len(elements)} given")
+    return {
+        scalar: _typed(elements[k % len(elements)], interface.variables[scalar], instance)
+        for k, scalar in enumerate(scalars)
+    }
+
+
+def _flatten(given: Any) -> list[Any]:
+    if not isinstance(given, list | tuple | np.ndarray):
+        return [given]
+    return [element for part in given for element in _flatten(part)]
+
+
+def _typed(given: Any, variable: Variable, instance: Instance) -> Any:
+    """A start value as the variable's type; text is an expression of ``i`` and ``count``, but for a text variable."""
+    if variable.type == "String":
+        if not isinstance(given, str):
+            raise ScenarioError(f"takes text, not {given!r}")
+        return given
+    choices = dict(variable.choices)
+    if isinstance(given, str) and given in choices:
+        return choices[given]
+    if isinstance(given, str):
+        constants = (
+            {"count": instance.count} if instance.index is None else {"i": instance.index, "count": instance.count}
+        )
+        given = evaluate_constant(given, **constants)
+    is_truth = isinstance(given, bool | np.bool_)
+    if variable.type == "Boolean":
+        if not is_truth:
+            raise ScenarioError(f"takes true or false, not {given!r}")
+        return int(given)
+    if is_truth or not isinstance(given, float | int | np.floating | np.integer):
+        raise ScenarioError(f"takes a number, not {given!r}")
+    return bounded(given, variable)
+
+
+def bounded(given: Any, variable: Variable) -> float | int:
+    """A number that a variable can take, as its type.
+
+    Raises:
+        ScenarioError: what is wrong with it.
+    """
+    try:
+        finite = math.isfinite(given)
+    except OverflowError:  # a whole number beyond all others
+        finite = False
+    if not finite:
+        raise ScenarioError(f"takes a finite number, not {given!r}")
+    if variable.type != "Real" and given != int(given):
+        raise ScenarioError(f"takes a whole number, not {given!r}")
+    if variable.choices and given not in dict(variable.choices).values():
+        valid = ", ".join(f"{name} ({value})" for name, value in variable.choices)
+        raise ScenarioError(f"takes one of {valid}, not {given!r}")
+    whole = variable.whole_range
+    if whole is not None and not whole[0] <= given <= whole[1]:
+        raise ScenarioError(f"takes a whole number from {whole[0]} to {whole[1]}, not {given!r}")
+    low, high = variable.minimum, variable.maximum
+    if low is not None and given < low:
+        raise ScenarioError(f"{given} is below the limit {low:g} {variable.unit or ''}".rstrip())
+    if high is not None and given > high:
+        raise ScenarioError(f"{given} is above the limit {high:g} {variable.unit or ''}".rstrip())
+    return float(given) if variable.type == "Real" else int(given)
+
+
+def _set_runtime(system: System, instance: Instance, interface: Interface, values: dict[str, Any]) -> None:
+    """What the orchestrator sets by itself in our FMUs: the seed, and sample times that follow a changed step."""
+    if not interface.annotation:
+        return
+    if "seed" in interface.variables and "seed" not in values:
+        values["seed"] = instance_seed(system.seed, instance.name)
+    # A sample time that was given has been rescaled where the step was changed; this is about the FMU's own.
+    own = interface.variables.get("sample_time")
+    if own is not None and "sample_time" not in values and own.start == system.rescaled_from:
+        values["sample_time"] = system.step
+
+
+def instance_seed(seed: int, name: str) -> int:
+    """The seed of one instance: 31 bits of a hash of the scenario's seed and the instance's name."""
+    return int.from_bytes(hashlib.sha256(f"{seed}:{name}".encode()).digest()[:4], "big") >> 1

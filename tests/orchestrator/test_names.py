@@ -1,0 +1,78 @@
+"""The parts of a signal's name, of our FMUs and of other makers'."""
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from railcosim.orchestrator.names import SignalName
+
+
+@pytest.mark.parametrize(
+    ("text", "ends", "member", "part", "indices"),
+    [
+        ("gust.size", ("gust", "size"), ("gust", None), ("size", ()), ()),
+        ("train[2].force", ("train[2]", "force"), ("train", 2), ("force", ()), (2,)),
+        ("train[2].force[3]", ("train[2]", "force[3]"), ("train", 2), ("force", (3,)), (2, 3)),
+        ("train[12].a[1,2]", ("train[12]", "a[1,2]"), ("train", 12), ("a", (1, 2)), (12, 1, 2)),
+        ("box.a[1, 2]", ("box", "a[1, 2]"), ("box", None), ("a", (1, 2)), (1, 2)),
+        ("box.a.b.c[3].d", ("box", "a.b.c[3].d"), ("box", None), ("a.b.c[3].d", ()), (3,)),
+        ("box.a[3].d[4]", ("box", "a[3].d[4]"), ("box", None), ("a[3].d", (4,)), (3, 4)),
+        ("box.der(x[1])", ("box", "der(x[1])"), ("box", None), ("der(x[1])", ()), (1,)),
+        ("box.a b[x]", ("box", "a b[x]"), ("box", None), ("a b[x]", ()), ()),
+        ("box.a\n[1]", ("box", "a\n[1]"), ("box", None), ("a\n", (1,)), (1,)),
+        ("box[x].y", ("box[x]", "y"), ("box[x]", None), ("y", ()), ()),
+        ("train[2]", ("train[2]", ""), ("train", 2), ("", ()), (2,)),
+        ("", ("", ""), ("", None), ("", ()), ()),
+    ],
+)
+def test_parts(text, ends, member, part, indices):
+    name = SignalName.parse(text)
+    assert str(name) == text
+    assert (name.instance, name.variable) == ends == name
+    assert (name.group, name.number) == member
+    assert (name.array, name.element) == part
+    assert name.indices == indices
+
+
+@given(st.text("ab[]1,. \n", max_size=20))
+def test_any_name_comes_back_as_it_was_written(text):
+    name = SignalName.parse(text)
+    assert "." not in name.instance
+    assert str(name) == (text.removesuffix(".") if not name.variable else text)
+    assert SignalName.parse(str(name)) == name
+
+
+def test_thousands_of_digits_are_no_index():
+    name = SignalName.parse(f"a[{'9' * 5000}].b[{'9' * 5000}]")
+    assert (name.number, name.element, name.indices) == (None, (), ())
+
+
+@pytest.mark.parametrize(
+    ("text", "family"),
+    [
+        ("train[2].force[3]", "train[i].force[i]"),
+        ("train[2].a[1,2]", "train[i].a[i]"),
+        ("train[2]", "train[i]"),
+        ("gust.size", "gust.size"),
+        ("box.a[3].d", "box.a[3].d"),
+    ],
+)
+def test_family(text, family):
+    assert str(SignalName.parse(text).family) == family
+
+
+@pytest.mark.parametrize(
+    ("one", "other", "expected"),
+    [
+        ("train.force", "train[2].force", True),
+        ("train.force", "train[2].force[1]", True),
+        ("train[2].force", "train[2].force", True),
+        ("train[2].force", "train[2].force[1]", True),
+        ("train[2].force[1]", "train[2].force", False),
+        ("train[2].force", "train.force", False),
+        ("train[2].force", "train[1].force", False),
+        ("train.force", "train[2].forces", False),
+        ("tra.force", "train[2].force", False),
+    ],
+)
+def test_a_group_covers_its_members_and_an_array_its_elements(one, other, expected):
+    assert SignalName.parse(one).covers(SignalName.parse(other)) is expected
