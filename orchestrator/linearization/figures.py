@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ..figures import COLOURS, DASHES, bracketed, colour, legend, page
+from ..names import SignalName
 from .blocks import Array
 from .closed_loop import Linearization
 from .modes import Stability
@@ -60,7 +61,7 @@ def _stepped_inputs(model: Linearization) -> list[int]:
     """The first of each family of inputs: what a push on the first train does, and a new target."""
     first: dict[str, int] = {}
     for k, name in enumerate(model.inputs):
-        first.setdefault(re.sub(r"\[\d+\]", "[]", name), k)
+        first.setdefault(str(SignalName.parse(name).family), k)
     return list(first.values())[:_MOST_STEPS]
 
 
@@ -69,10 +70,9 @@ def _families(model: Linearization) -> dict[str, list[tuple[str, Array, str]]]:
     found: dict[str, list[tuple[str, Array, str]]] = {}
     rows = np.eye(len(model.outputs))
     for name, row in zip(model.outputs, rows, strict=True):
-        instance, _, variable = name.partition(".")
-        unit = model.units.get(name, "")
-        panel = f"{instance.partition('[')[0]} {variable.partition('[')[0]}"
-        label = name if "[" in variable else instance.replace("[", " ").replace("]", "")
+        signal, unit = SignalName.parse(name), model.units.get(name, "")
+        panel = f"{signal.group} {signal.array}"
+        label = name if "[" in signal.variable else signal.instance.replace("[", " ").replace("]", "")
         found.setdefault(panel, []).append((label, row, unit))
     for panel in [panel for panel in found if panel.endswith(" position")]:
         curves = found[panel]

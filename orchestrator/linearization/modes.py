@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import linalg
 
+from ..names import SignalName
 from .blocks import Array
 from .closed_loop import Linearization
 
@@ -87,7 +88,7 @@ class Stability:
         found: dict[str, Mode] = {}
         for mode in self.modes:
             if mode.seen and not mode.is_neutral and -np.inf < mode.pole.real < 0.0:
-                found.setdefault(mode.states[0].partition(".")[2].partition("[")[0], mode)
+                found.setdefault(SignalName.parse(mode.states[0]).array, mode)
         return found
 
 

@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import linalg, optimize
 
+from ..names import SignalName
 from .blocks import Array, held
 from .closed_loop import Linearization
 from .modes import NEUTRAL, stability
@@ -155,9 +156,11 @@ def _chains(model: Linearization, reached: Collection[int]) -> dict[str, list[tu
     """Rows that pick successive speeds and gaps out of the outputs, by quantity, with what they belong to."""
     families: dict[tuple[str, str], dict[int, Array]] = {}
     for k, name in enumerate(model.outputs):
-        match = re.fullmatch(r"(\w+)\[(\d+)\]\.(speed|position)(?:\[1\])?", name)
-        if match and k in reached:
-            families.setdefault((match[1], match[3]), {})[int(match[2])] = np.eye(len(model.outputs))[k]
+        signal = SignalName.parse(name)
+        is_first = signal.array in ("speed", "position") and signal.element in ((), (1,))
+        if is_first and signal.number is not None and k in reached:
+            row = np.eye(len(model.outputs))[k]
+            families.setdefault((signal.group, signal.array), {})[signal.number] = row
     chains: dict[str, list[tuple[str, Array]]] = {}
     for (family, variable), members in families.items():
         numbers = [i for i in sorted(members) if {i - 1, i + 1} & members.keys()]

@@ -1,6 +1,6 @@
 """Scenarios: TOML -> `System`. The format is described in `docs/scenarios.md`.
 
-`toml_source` reads the text, `scenario_reader` makes a draft of it (`simulation_reader` and `event_reader` know their
+`toml_source` reads the text, `reader` makes a draft of it (`simulation` and `events` know their
 sections), `changes` applies presets and options, and here the draft becomes a `System`. Everything that is wrong with a
 scenario is told at once, as one `ScenarioError`.
 """

@@ -285,10 +285,11 @@ def connect(rules: list[Rule], counts: Counts, problems: list[Problem]) -> list[
 
 def _overlaps(connections: list[Connection]) -> Iterator[Problem]:
     """Arrays that are driven as a whole and by element as well."""
-    targets = {SignalName.parse(connection.target): connection for connection in connections}
-    for target, connection in targets.items():
+    targets = {connection.target: connection for connection in connections}
+    for text in filter(lambda text: text.endswith("]"), targets):
+        target, connection = SignalName.parse(text), targets[text]
         array = SignalName(target.instance, target.array)
-        if target.element and array in targets:
+        if target.element and str(array) in targets:
             where = f'{connection.origin}: connections."{target}"'
-            driven = f"the whole of '{array}' is driven already ({targets[array].origin})"
+            driven = f"the whole of '{array}' is driven already ({targets[str(array)].origin})"
             yield Problem(where, driven, "connect either the array or its elements", (target, array))

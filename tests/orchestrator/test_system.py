@@ -1,7 +1,7 @@
 """`System` is the one description: instances by name, connections, start values."""
 
 import pytest
-from railcosim.orchestrator.system import Connection, Instance, System, split
+from railcosim.orchestrator.system import Connection, Instance, System
 
 
 def test_a_system_by_hand():
@@ -26,16 +26,3 @@ def test_where_something_was_written_does_not_make_it_another_thing():
     assert Instance("a", "Gust", origin="x.toml:3") == Instance("a", "Gust", origin="y.toml:9")
     assert Connection("a.y", "b.u", origin="x.toml:3") == Connection("a.y", "b.u")
     assert Connection("a.y", "b.u", delay=1) != Connection("a.y", "b.u")
-
-
-@pytest.mark.parametrize(
-    ("reference", "parts"),
-    [
-        ("train[1].force", ("train[1]", "force")),
-        ("train[1].force[2]", ("train[1]", "force[2]")),
-        ("train.body.speed", ("train", "body.speed")),  # another maker's structured name
-        ("train", ("train", "")),
-    ],
-)
-def test_split(reference, parts):
-    assert split(reference) == parts

@@ -13,6 +13,7 @@ from railcosim.orchestrator.cli import app as cli
 from railcosim.orchestrator.errors import CouplingError, FmuError
 from railcosim.orchestrator.fmi.binding.fmi2 import FmuSlave
 from railcosim.orchestrator.master.algebraic_loops import LoopSolver, find_feeders, find_loops
+from railcosim.orchestrator.names import SignalName
 from railcosim.orchestrator.run.execution import run
 from railcosim.orchestrator.system import Connection, System
 from railcosim.orchestrator.wiring import Link
@@ -33,7 +34,7 @@ def model(ours=True, **outputs):
 
 
 def link(source, target, delay=0):
-    a, b = tuple(source.split(".")), tuple(target.split("."))
+    a, b = SignalName.parse(source), SignalName.parse(target)
     return Link(a, b, 1.0, 0.0, delay, False, Connection(source, target, delay))
 
 

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from railcosim.fmus.annotation import Annotation
 from railcosim.orchestrator.errors import CouplingError, FmuError
+from railcosim.orchestrator.names import SignalName
 from railcosim.orchestrator.run.divergence import explain_divergence, find_growth
 from railcosim.orchestrator.system import Connection, System
 from railcosim.orchestrator.wiring import Link
@@ -132,8 +133,8 @@ class Recorded(dict):
 
 
 def links(*pairs):
-    ends = [(a.split("."), b.split(".")) for a, b in pairs]
-    return [Link(tuple(a), tuple(b), 1.0, 0.0, 0, False, Connection(".".join(a), ".".join(b), 0)) for a, b in ends]
+    ends = [(SignalName.parse(a), SignalName.parse(b), Connection(a, b)) for a, b in pairs]
+    return [Link(a, b, 1.0, 0.0, 0, False, connection) for a, b, connection in ends]
 
 
 def model(direct=False, **of):

@@ -15,6 +15,7 @@ from railcosim.orchestrator.master.algorithms.acceleration import ACCELERATIONS
 from railcosim.orchestrator.master.algorithms.iterative import find_blocks
 from railcosim.orchestrator.master.coupling import Coupling
 from railcosim.orchestrator.master.settings import DEFAULT
+from railcosim.orchestrator.names import SignalName
 from railcosim.orchestrator.run.execution import execute, run
 from railcosim.orchestrator.system import Connection, System
 from railcosim.orchestrator.wiring import Link
@@ -97,8 +98,8 @@ def facts(sampled=()):
 
 
 def link(source, target, delay=0):
-    a, b = f"{source}.y", f"{target}.u"
-    return Link((source, "y"), (target, "u"), 1.0, 0.0, delay, False, Connection(a, b, delay))
+    a, b = SignalName(source, "y"), SignalName(target, "u")
+    return Link(a, b, 1.0, 0.0, delay, False, Connection(str(a), str(b), delay))
 
 
 def blocks(names, *links, sampled=()):
