@@ -1,7 +1,6 @@
 """What is suggested for a misspelt name."""
 
 from railcosim.components.spelling import did_you_mean, nearest
-from railcosim.orchestrator import errors
 
 
 def test_the_nearest_name_is_suggested_or_nothing():
@@ -18,7 +17,3 @@ def test_how_near_a_name_must_be_is_the_callers():
 def test_without_a_near_name_all_are_listed_in_order():
     assert nearest("spede", ["position", "speed"]) == "'spede'; did you mean 'speed'?"
     assert nearest("zzz", iter(["speed", "position"])) == "'zzz'; it has position, speed"
-
-
-def test_the_orchestrator_has_no_helper_of_its_own():
-    assert errors.did_you_mean is did_you_mean
