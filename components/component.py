@@ -314,7 +314,9 @@ def _build_argument(cls: type, declaration: Size | Data, given: Any) -> Any:
         return given
     try:
         return declaration.convert(given)
-    except (ValueError, TypeError, AttributeError, LookupError) as error:
+    except ValueError as error:
+        raise ComponentError(f"{where} is unusable: {error}") from error
+    except (TypeError, AttributeError, LookupError, OverflowError) as error:
         raise ComponentError(f"{where} is unusable: {type(error).__name__}: {error}") from error
 
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from ..component import Component, Values
 from ..declarations import Data, Input, Output, Parameter, Size
-from ..trains.vehicles import SUBWAY, distribute, pattern, read_vehicles
+from ..trains.vehicles import REPEATED, SUBWAY, VEHICLES, distribute, pattern
 
 
 class ForceDistribution(Component):
@@ -21,12 +21,7 @@ class ForceDistribution(Component):
     )
 
     vehicles = Size(6, description="number of vehicles")
-    consist = Data(
-        SUBWAY,
-        convert=read_vehicles,
-        description="vehicles from the front, each with 'mass' (kg), 'weight' mu of its force and 'motored'; a table "
-        "shorter than the train is repeated",
-    )
+    consist = Data(SUBWAY, convert=VEHICLES.read, description=f"{VEHICLES.description}; {REPEATED}")
 
     force = Input("N", description="total traction (+) or braking (-) force")
 

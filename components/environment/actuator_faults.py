@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
 from ..component import Component, ComponentError, Values
 from ..declarations import Data, Memory, Output, Parameter, Size
 from ..maths import logical_and, maximum, minimum, sin, where
-from .profile import number
+from ..tables import Column, Table
 
 _ROUNDING = 1e-9
 """s: a switching instant that is a communication point belongs to what follows, whatever the rounding of k * step."""
@@ -19,7 +18,6 @@ _EXAMPLE = (
     {"carriage": 1, "constant": 16e3, "from": 100.0, "until": 320.0},
     {"carriage": 1, "amplitude": 10e3, "phase": 0.0, "from": 220.0, "until": 460.0},
 )
-_KEYS = {"carriage", "constant", "amplitude", "phase", "from", "until"}
 
 
 @dataclass(frozen=True)
@@ -34,27 +32,17 @@ class Fault:
     end: float
 
 
-def read_schedule(rows: Any) -> tuple[Fault, ...]:
-    """Faults from their table.
-
-    Raises:
-        ValueError: unusable rows; the message says which.
-    """
-    if isinstance(rows, str) or not isinstance(rows, Sequence):
-        raise ValueError("a fault schedule is a list of tables")
-    faults = []
-    for index, row in enumerate(rows, 1):
-        if not isinstance(row, Mapping) or row.keys() - _KEYS:
-            raise ValueError(f"fault {index} must be a table of {', '.join(sorted(_KEYS))}; it is {row!r}")
-        carriage = row.get("carriage")
-        if isinstance(carriage, bool) or not isinstance(carriage, int) or carriage < 1:
-            raise ValueError(f"fault {index}: 'carriage' is a whole number from 1, not {carriage!r}")
-        begin, end = number(row, "from"), number(row, "until")
-        if not begin < end:
-            raise ValueError(f"fault {index} ends at {end:g} s, not after it begins at {begin:g} s")
-        force = {name: number({name: 0.0} | dict(row), name) for name in ("constant", "amplitude", "phase")}
-        faults.append(Fault(carriage, force["constant"], force["amplitude"], force["phase"], begin, end))
-    return tuple(faults)
+FAULTS = Table(
+    "fault",
+    [
+        Column("carriage", type=int, sign="positive", note="from 1"),
+        *(Column(name, unit, default=0.0) for name, unit in (("constant", "N"), ("amplitude", "N"), ("phase", "rad"))),
+        Column("from", "s"),
+        Column("until", "s", after="from"),
+    ],
+    make=Fault,
+    may_be_empty=True,
+)
 
 
 class ActuatorFaults(Component):
@@ -76,12 +64,7 @@ class ActuatorFaults(Component):
     note = "Reconstructed: the fault model is re-derived from the source's words, and the schedule is ours."
 
     carriages = Size(3, description="number of carriages")
-    schedule = Data(
-        _EXAMPLE,
-        convert=read_schedule,
-        description="faults, each with 'carriage' (from 1), 'constant' (N), 'amplitude' (N), 'phase' (rad), 'from' and "
-        "'until' (s); a force or phase that is left out is 0",
-    )
+    schedule = Data(_EXAMPLE, convert=FAULTS.read, description=f"{FAULTS.description}; what is left out is 0")
 
     omega = Parameter("rad/s", 0.5, minimum=1e-3, description="angular frequency of the periodic faults")
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable
 from dataclasses import dataclass
 from typing import Any, NamedTuple
 
@@ -107,15 +107,3 @@ def speed_change(begin: float, change: float, acceleration: float, jerk: float) 
         Phase(begin + ramp, constant, 0.0),
         Phase(begin + ramp + constant, ramp, -signed),
     ]
-
-
-def number(row: Mapping[str, Any], name: str) -> float:
-    """A required number of a data row.
-
-    Raises:
-        ValueError: it is missing, or no number.
-    """
-    value = row.get(name)
-    if isinstance(value, bool) or not isinstance(value, int | float):
-        raise ValueError(f"{name!r} must be a number, not {value!r}")
-    return float(value)

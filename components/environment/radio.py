@@ -8,6 +8,7 @@ from typing import Any
 from ..component import Component, Values
 from ..declarations import Data, Input, Memory, Noise, Output, Parameter, Size
 from ..maths import floor, logical_and, logical_not, logical_or, where
+from ..tables import Column, Table
 
 _ROUNDING = 1e-6
 """Of a refresh period, and s: what is due at a communication point belongs to it, whatever the rounding."""
@@ -15,29 +16,7 @@ _NEVER = 1e300
 """s: when a lost message arrives."""
 
 
-def read_outages(data: Any) -> list[tuple[float, float]]:
-    """Outage windows from their data, a list of ``[begin, end]`` in s.
-
-    Raises:
-        ValueError: no such list, or a window that ends before it begins.
-    """
-    if not isinstance(data, Sequence) or isinstance(data, str):
-        raise ValueError(f"outages are a list of [begin, end] in s, not {data!r}")
-    windows = []
-    for row in data:
-        if not isinstance(row, Sequence) or isinstance(row, str) or len(row) != 2:
-            raise ValueError(f"an outage is [begin, end] in s, not {row!r}")
-        begin, end = (_time(value) for value in row)
-        if not begin < end:
-            raise ValueError(f"the outage {list(row)} ends before it begins")
-        windows.append((begin, end))
-    return windows
-
-
-def _time(value: Any) -> float:
-    if isinstance(value, bool) or not isinstance(value, int | float):
-        raise ValueError(f"a time of an outage is a number in s, not {value!r}")
-    return float(value)
+OUTAGES = Table("outage", [Column("begin", "s"), Column("end", "s", after="begin")], by_place=True, may_be_empty=True)
 
 
 class RadioLink(Component):
@@ -63,7 +42,7 @@ class RadioLink(Component):
     )
 
     messages = Size(16, description="how many messages can be under way")
-    outages = Data([], convert=read_outages, description="windows [begin, end] in s in which every message is lost")
+    outages = Data([], convert=OUTAGES.read, description=f"{OUTAGES.description}: then every message is lost")
 
     sent_position = Input("m", description="position the sender reports")
     sent_speed = Input("m/s", description="speed the sender reports")

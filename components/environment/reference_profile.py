@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from typing import Any
+from collections.abc import Sequence
 
 from ..component import Component, Values
 from ..declarations import Data, Output, Parameter
-from .profile import Profile, number, speed_change
+from ..tables import Column, Table
+from .profile import Profile, speed_change
 
 _DEFAULT = {
     "speed": 50.0,
@@ -23,24 +23,20 @@ _DEFAULT = {
 """Speeds 50, 68, 80, 62, 74, 64 m/s."""
 
 
-def read_profile(data: Any) -> Profile:
-    """A profile from its data: initial speed, jerk, and a table of speed changes.
+def _profile(speed: float, jerk: float, changes: Sequence[tuple[float, float, float]]) -> Profile:
+    return Profile(speed, [phase for change in changes for phase in speed_change(*change, jerk)])
 
-    Raises:
-        ValueError: unusable data.
-    """
-    if not isinstance(data, Mapping) or not isinstance(data.get("changes", []), Sequence):
-        raise ValueError("a profile is a table of 'speed', 'jerk' and 'changes', a list of tables")
-    unknown = sorted(data.keys() - {"speed", "jerk", "changes"})
-    if unknown:
-        raise ValueError(f"a profile has no {unknown[0]!r}; it has 'speed', 'jerk' and 'changes'")
-    jerk = number(data, "jerk")
-    phases = [
-        phase
-        for row in data.get("changes", [])
-        for phase in speed_change(number(row, "time"), number(row, "change"), number(row, "acceleration"), jerk)
-    ]
-    return Profile(number(data, "speed"), phases)
+
+CHANGES = Table(
+    "change",
+    [Column("time", "s"), Column("change", "m/s"), Column("acceleration", "m/s2", sign="positive")],
+    may_be_empty=True,
+)
+PROFILE = Table(
+    "profile",
+    [Column("speed", "m/s"), Column("jerk", "m/s3"), Column("changes", type=CHANGES, default=())],
+    make=_profile,
+)
 
 
 class ReferenceProfile(Component):
@@ -61,7 +57,7 @@ class ReferenceProfile(Component):
 
     profile = Data(
         _DEFAULT,
-        convert=read_profile,
+        convert=PROFILE.record,
         description="initial 'speed' (m/s), 'jerk' (m/s3) and 'changes', each with 'time' (s), 'change' (m/s) and "
         "'acceleration' (m/s2)",
     )

@@ -9,7 +9,7 @@ from ..declarations import Data, Input, Memory, Output, Parameter
 from ..maths import logical_and, logical_not, logical_or, maximum, where
 from ..trains.multiple_unit import WAITING
 from .braking import STANDSTILL, brake, hold
-from .speed_limit import LIMITS, LIMITS_BY_PLACE, read_limits
+from .speed_limit import LIMITS, LIMITS_BY_PLACE, STEPS
 
 
 class Protection(Component):
@@ -35,9 +35,9 @@ class Protection(Component):
         r" the deceleration $a_\mathrm{b}$ of the stronger brake that acts and $k = 4$ per second, which eases it off.",
     )
 
-    limits = Data(LIMITS, convert=read_limits, description="speed limit over trip time, pairs of begin (s) and m/s")
+    limits = Data(LIMITS, convert=STEPS.read, description="speed limit over trip time, pairs of begin (s) and m/s")
     limits_by_place = Data(
-        LIMITS_BY_PLACE, convert=read_limits, description="speed limit over position, pairs of begin (m) and m/s"
+        LIMITS_BY_PLACE, convert=STEPS.read, description="speed limit over position, pairs of begin (m) and m/s"
     )
 
     trip_time = Input("s", 0.0, description="time since departure; negative while waiting")

@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any
 
-from ..environment.profile import Phase, Profile, moved, number, speed_change
+from ..environment.profile import Phase, Profile, moved, speed_change
+from ..tables import Column, Table
 
 PLAN = {
     "duration": 190.0,
@@ -23,7 +23,6 @@ PLAN = {
 }
 """3512 m in 190 s with five cruises and three brakings (Liu & Hou 2020); phase speeds and accelerations are ours."""
 
-_KEYS = {"begin", "end", "speed", "speed_km_h", "acceleration"}
 _HALVINGS = 60
 
 
@@ -46,22 +45,21 @@ class _Change:
     acceleration: float
 
 
-def read_plan(data: Any) -> Plan:
-    """A plan from its data: ``duration`` (s), ``distance`` (m), ``jerk`` (m/s3) and ``phases``.
+def _change(
+    begin: float | None, end: float | None, speed: float | str | None, speed_km_h: float | None, acceleration: float
+) -> _Change:
+    if (begin is None) == (end is None) or (speed is None) == (speed_km_h is None):
+        raise ValueError("has either 'begin' or 'end', and either 'speed' or 'speed_km_h'")
+    target = speed_km_h / 3.6 if speed_km_h is not None else None if isinstance(speed, str) else speed
+    return _Change(begin, end, target, acceleration)
 
-    Each phase changes the speed to ``speed`` (m/s) or ``speed_km_h`` with at most ``acceleration`` (m/s2), from
-    ``begin`` or until ``end`` (s). One speed may be ``"solve"``: it is found such that the train arrives exactly.
+
+def _plan(duration: float, distance: float, jerk: float, changes: Sequence[_Change]) -> Plan:
+    """The plan of these changes.
 
     Raises:
-        ValueError: unusable data, or an arrival at another place than the distance says.
+        ValueError: it cannot be, or arrives at another place than the distance says.
     """
-    if not isinstance(data, Mapping) or data.keys() != {"duration", "distance", "jerk", "phases"}:
-        raise ValueError("a plan is a table of 'duration', 'distance', 'jerk' and 'phases'")
-    duration, distance, jerk = (number(data, name) for name in ("duration", "distance", "jerk"))
-    rows = data["phases"]
-    if isinstance(rows, str) or not isinstance(rows, Sequence) or not rows:
-        raise ValueError("'phases' is a list of tables, at least one")
-    changes = [_read_change(row, index) for index, row in enumerate(rows, 1)]
     unknown = sum(change.speed is None for change in changes)
     if unknown > 1:
         raise ValueError("only one phase may have the speed 'solve'")
@@ -74,23 +72,31 @@ def read_plan(data: Any) -> Plan:
     if abs(reached.position - distance) > 1e-6 or abs(reached.speed) > 1e-9:
         raise ValueError(
             f"after {duration:g} s the plan is at {reached.position:.6f} m with {reached.speed:.6f} m/s, not at "
-            f"rest at "
-            f"{distance:g} m; give one phase the speed 'solve' and end with the speed 0"
+            f"rest at {distance:g} m; give one phase the speed 'solve' and end with the speed 0"
         )
     return Plan(profile, duration, distance)
 
 
-def _read_change(row: Any, index: int) -> _Change:
-    if not isinstance(row, Mapping) or row.keys() - _KEYS:
-        raise ValueError(f"phase {index} must be a table of {', '.join(sorted(_KEYS))}: {row!r}")
-    if ("begin" in row) == ("end" in row) or ("speed" in row) == ("speed_km_h" in row):
-        raise ValueError(f"phase {index} has either 'begin' or 'end', and either 'speed' or 'speed_km_h': {row!r}")
-    if row.get("speed") == "solve":
-        speed = None
-    else:
-        speed = number(row, "speed") if "speed" in row else number(row, "speed_km_h") / 3.6
-    begin, end = (number(row, name) if name in row else None for name in ("begin", "end"))
-    return _Change(begin, end, speed, number(row, "acceleration"))
+PHASES = Table(
+    "phase",
+    [
+        Column("begin", "s", default=None),
+        Column("end", "s", default=None),
+        Column("speed", "m/s", default=None, word="solve"),
+        Column("speed_km_h", "km/h", default=None),
+        Column("acceleration", "m/s2", sign="positive"),
+    ],
+    make=_change,
+)
+PLANS = Table(
+    "plan",
+    [Column("duration", "s"), Column("distance", "m"), Column("jerk", "m/s3"), Column("phases", type=PHASES)],
+    make=_plan,
+)
+"""A trip's plan. Each phase changes the speed with at most ``acceleration``, from ``begin`` or until ``end``.
+
+One speed may be ``"solve"``: it is found such that the train arrives exactly.
+"""
 
 
 def _profile(changes: Sequence[_Change], jerk: float, solved: float) -> Profile:

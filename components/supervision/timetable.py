@@ -8,8 +8,8 @@ from ..component import Component, Values
 from ..declarations import Data, Memory, Output, Parameter
 from ..environment.profile import Motion
 from ..maths import floor, maximum, minimum, where
-from .running_plan import PLAN, read_plan
-from .speed_limit import LIMITS, read_limits
+from .running_plan import PLAN, PLANS
+from .speed_limit import LIMITS, STEPS
 
 
 class Timetable(Component):
@@ -34,11 +34,11 @@ class Timetable(Component):
 
     plan = Data(
         PLAN,
-        convert=read_plan,
+        convert=PLANS.record,
         description="'duration' (s), 'distance' (m), 'jerk' (m/s3) and 'phases', each a change to 'speed' (m/s) or "
         "'speed_km_h' with 'acceleration' (m/s2), from 'begin' or until 'end' (s); one speed may be 'solve'",
     )
-    limits = Data(LIMITS, convert=read_limits, description="speed limit over trip time, pairs of begin (s) and m/s")
+    limits = Data(LIMITS, convert=STEPS.read, description="speed limit over trip time, pairs of begin (s) and m/s")
 
     sample_time = Parameter("s", 0.01, minimum=1e-6, description="sample period, the controller's")
     wait = Parameter("s", 10.0, minimum=0.0, description="wait before each departure; at least two samples are taken")

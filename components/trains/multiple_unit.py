@@ -7,11 +7,11 @@ from typing import Any, NamedTuple
 
 from ..component import Values
 from ..declarations import Data, Input, Memory, Noise, Output, Parameter, Size, State
-from ..environment.line import read_line
+from ..environment.line import SECTIONS
 from ..maths import clip, maximum, minimum, piecewise_constant, sin, where
 from .metro_line import MILD
 from .port import Train
-from .vehicles import SUBWAY, distribute, pattern, read_vehicles
+from .vehicles import REPEATED, SUBWAY, VEHICLES, distribute, pattern
 
 WAITING = -1e-6
 """s: a train waits while its trip time is below; a departure at zero may be told with a rounding error."""
@@ -58,18 +58,8 @@ class MultipleUnit(TripTrain, ABC):
     """
 
     vehicles = Size(6, minimum=2, description="number of vehicles")
-    consist = Data(
-        SUBWAY,
-        convert=read_vehicles,
-        description="vehicles from the front, each with 'mass' (kg), 'weight' mu of its force and 'motored'; a table "
-        "shorter than the train is repeated",
-    )
-    line = Data(
-        MILD,
-        convert=read_line,
-        description="sections, each with 'position' (m, its begin) and any of 'gradient' (rise over run), "
-        "'radius' (m), 'tunnel' (m, its length) and 'resistance' (N/kg, further resistance)",
-    )
+    consist = Data(SUBWAY, convert=VEHICLES.read, description=f"{VEHICLES.description}; {REPEATED}")
+    line = Data(MILD, convert=SECTIONS.read, description=SECTIONS.description)
 
     max_step = Parameter("s", 0.01, minimum=0.0, description="longest integration step inside a communication step")
     load_factor = Parameter("1", 1.0, minimum=0.01, description="masses over those of the vehicles' table")

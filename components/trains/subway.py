@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
 from typing import Any, NamedTuple
 
 from ..component import Values
 from ..declarations import Data, Parameter, State
 from ..maths import cos, sin, where
+from ..tables import Column, Table
 from .multiple_unit import MultipleUnit
-from .vehicles import added, pattern
+from .vehicles import REPEATED, added, pattern
 
 _COUPLERS = (
     {"sine": 0.1e-3},
@@ -27,23 +27,7 @@ class Coupler(NamedTuple):
     cosine: float
 
 
-def read_couplers(rows: Any) -> tuple[Coupler, ...]:
-    """Prescribed deformations from their table.
-
-    Raises:
-        ValueError: unusable rows; the message says which.
-    """
-    if isinstance(rows, str) or not isinstance(rows, Sequence) or not rows:
-        raise ValueError("couplers are a list of tables, at least one")
-    found = []
-    for index, row in enumerate(rows, 1):
-        if not isinstance(row, Mapping) or row.keys() - {"sine", "cosine"}:
-            raise ValueError(f"coupler {index} must be a table of 'sine' and 'cosine' (m), not {row!r}")
-        values = [row.get(name, 0.0) for name in ("sine", "cosine")]
-        if any(isinstance(value, bool) or not isinstance(value, int | float) for value in values):
-            raise ValueError(f"coupler {index}: 'sine' and 'cosine' are numbers, not {row!r}")
-        found.append(Coupler(float(values[0]), float(values[1])))
-    return tuple(found)
+COUPLERS = Table("coupler", [Column("sine", "m", default=0.0), Column("cosine", "m", default=0.0)], make=Coupler)
 
 
 class Motion(NamedTuple):
@@ -78,11 +62,7 @@ class SubwayTrain(MultipleUnit):
     )
     recommended_step = 0.01
 
-    couplers = Data(
-        _COUPLERS,
-        convert=read_couplers,
-        description="deformation of each coupler, 'sine' and 'cosine' (m); a table shorter than the train is repeated",
-    )
+    couplers = Data(_COUPLERS, convert=COUPLERS.read, description=f"{COUPLERS.description}; {REPEATED}")
 
     coupler_frequency = Parameter(
         "rad/s", 1.0, minimum=0.0, description="angular frequency of the couplers' deformation"

@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from typing import Any
 
 from ..maths import where
+from ..tables import Column, Table
 
 
 @dataclass(frozen=True)
@@ -33,25 +34,18 @@ SUBWAY = (
 """The train of Liu & Hou 2020, section VI: 194 295 kg."""
 
 
-def read_vehicles(rows: Any) -> tuple[Vehicle, ...]:
-    """Vehicles from their table.
+VEHICLES = Table(
+    "vehicle",
+    [
+        Column("mass", "kg", sign="positive"),
+        Column("weight", sign="positive", note="mu of its force"),
+        Column("motored", type=bool),
+    ],
+    make=Vehicle,
+)
 
-    Raises:
-        ValueError: unusable rows; the message says which.
-    """
-    if isinstance(rows, str) or not isinstance(rows, Sequence) or not rows:
-        raise ValueError("vehicles are a list of tables, at least one")
-    found = []
-    for index, row in enumerate(rows, 1):
-        if not isinstance(row, Mapping) or row.keys() != {"mass", "weight", "motored"}:
-            raise ValueError(f"vehicle {index} must be a table of 'mass', 'weight' and 'motored', not {row!r}")
-        mass, weight, motored = row["mass"], row["weight"], row["motored"]
-        if not _positive(mass) or not _positive(weight) or not isinstance(motored, bool):
-            raise ValueError(
-                f"vehicle {index}: 'mass' (kg) and 'weight' are positive, 'motored' is true or false: {row!r}"
-            )
-        found.append(Vehicle(float(mass), float(weight), motored))
-    return tuple(found)
+REPEATED = "a list shorter than the train is repeated"
+"""For descriptions: what `pattern` does."""
 
 
 def pattern(rows: Sequence[Any], count: int) -> list[Any]:
@@ -89,7 +83,3 @@ def distribute(force: Any, weights: Sequence[Any], allowed: Sequence[Any], cost:
         where(force > 0.0, where(may, rate * mu / q, 0.0), rate * mu / q)
         for mu, may, q in zip(weights, allowed, cost, strict=True)
     ]
-
-
-def _positive(value: Any) -> bool:
-    return isinstance(value, int | float) and not isinstance(value, bool) and value > 0.0

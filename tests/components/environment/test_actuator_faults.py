@@ -73,10 +73,10 @@ def test_without_a_sample_time_the_sample_is_as_long_as_the_last():
 @pytest.mark.parametrize(
     ("schedule", "said"),
     [
-        ("faults.json", "list of tables"),
-        ([{"carriage": 1, "constant": 1.0, "from": 3.0, "until": 2.0}], "fault 1 ends at 2 s"),
-        ([{"carriage": 0, "from": 1.0, "until": 2.0}], "whole number from 1"),
-        ([{"carriage": 1, "constant": 1.0, "from": 1.0, "to": 2.0}], "fault 1 must be a table of"),
+        ("faults.json", "faults are a list, each a table of carriage"),
+        ([{"carriage": 1, "constant": 1.0, "from": 3.0, "until": 2.0}], "fault 1: 'until' must exceed 'from', 3"),
+        ([{"carriage": 0, "from": 1.0, "until": 2.0}], "'carriage' must be a positive whole number, not 0"),
+        ([{"carriage": 1, "constant": 1.0, "from": 1.0, "to": 2.0}], "fault 1: a fault has no 'to'"),
         ([{"carriage": 1, "constant": 1.0, "until": 2.0}], "'from' must be a number"),
         ([{"carriage": 1, "constant": "big", "from": 1.0, "until": 2.0}], "'constant' must be a number"),
     ],

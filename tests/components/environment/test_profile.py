@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from railcosim.components.environment.profile import Phase, Profile, number, speed_change
+from railcosim.components.environment.profile import Phase, Profile, speed_change
 from scipy.integrate import quad
 
 changes = st.floats(-30.0, 30.0).filter(lambda dv: abs(dv) > 1e-3)
@@ -50,7 +50,3 @@ def test_mistakes_are_told():
         Profile(0.0, [Phase(0.0, 5.0, 0.1), Phase(4.0, 1.0, -0.1)])
     with pytest.raises(ValueError, match="must be positive"):
         speed_change(0.0, 1.0, 0.0, 0.1)
-    with pytest.raises(ValueError, match="'time' must be a number"):
-        number({"time": "soon"}, "time")
-    with pytest.raises(ValueError, match="'time' must be a number"):
-        number({}, "time")

@@ -40,10 +40,13 @@ def test_the_virtual_carriage_runs_ahead():
 @pytest.mark.parametrize(
     ("data", "said"),
     [
-        ([], "a profile is a table"),
+        ([], "a profile is a table of speed"),
         ({"speed": 1.0, "jerk": 0.1, "change": []}, "no 'change'"),
-        ({"speed": 1.0, "jerk": 0.1, "changes": [{"time": 1.0, "change": 2.0}]}, "'acceleration' must be a number"),
-        ({"speed": 1.0, "jerk": 0.0, "changes": [{"time": 1.0, "change": 2.0, "acceleration": 1.0}]}, "positive"),
+        ({"speed": 1.0, "jerk": 0.1, "changes": [{"time": 1.0, "change": 2.0}]}, "'acceleration' must be a"),
+        (
+            {"speed": 1.0, "jerk": 0.0, "changes": [{"time": 1.0, "change": 2.0, "acceleration": 1.0}]},
+            "jerk of a speed change must be positive",
+        ),
     ],
 )
 def test_unusable_data_are_refused(data, said):

@@ -3,7 +3,7 @@
 import copy
 
 import pytest
-from railcosim.components.supervision.running_plan import PLAN, read_plan
+from railcosim.components.supervision.running_plan import PLAN, PLANS
 
 PHASES = [  # t0, t1, x0, x1, v0, v1
     (0, 22.8049, 0, 221.715, 0, 19.44444),
@@ -23,7 +23,7 @@ POINTS = [
 
 @pytest.fixture(scope="module")
 def plan():
-    return read_plan(PLAN)
+    return PLANS.record(PLAN)
 
 
 def test_phases(plan):
@@ -55,17 +55,17 @@ def test_jerk_and_acceleration_stay_within_their_bounds(plan):
 def test_speeds_may_be_given_in_either_unit():
     data = copy.deepcopy(PLAN)
     data["phases"][1] = {"begin": 26.0, "speed": 80.0 / 3.6, "acceleration": 0.4}
-    assert read_plan(data).profile.at(60.0) == read_plan(PLAN).profile.at(60.0)
+    assert PLANS.record(data).profile.at(60.0) == PLANS.record(PLAN).profile.at(60.0)
 
 
 @pytest.mark.parametrize(
     ("change", "message"),
     [
-        (lambda d: d.pop("jerk"), "a plan is"),
+        (lambda d: d.pop("jerk"), "'jerk' must be a number in m/s3, not None"),
         (lambda d: d.update(phases=[]), "at least one"),
         (lambda d: d.update(phases=[{"begin": 0.0, "end": 1.0, "speed": 1.0, "acceleration": 1.0}]), "either 'begin'"),
         (lambda d: d["phases"][0].update(v=1.0), "phase 1"),
-        (lambda d: d["phases"][0].update(acceleration="fast"), "must be a number"),
+        (lambda d: d["phases"][0].update(acceleration="fast"), "must be a positive number"),
         (lambda d: d["phases"][1].update(begin=10.0), "ends at"),
         (lambda d: d["phases"][4].update(speed=19.0), "not at rest at 3512"),
         (lambda d: d["phases"].append({"begin": 0.0, "speed": "solve", "acceleration": 1.0}), "only one"),
@@ -77,4 +77,4 @@ def test_plans_that_cannot_be(change, message):
     data = copy.deepcopy(PLAN)
     change(data)
     with pytest.raises(ValueError, match=message):
-        read_plan(data)
+        PLANS.record(data)

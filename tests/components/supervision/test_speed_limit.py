@@ -1,7 +1,7 @@
 """Speed limits in steps."""
 
 import pytest
-from railcosim.components.supervision.speed_limit import LIMITS, read_limits
+from railcosim.components.supervision.speed_limit import LIMITS, STEPS
 
 
 @pytest.mark.parametrize(
@@ -13,7 +13,7 @@ from railcosim.components.supervision.speed_limit import LIMITS, read_limits
 )  # fmt: skip
 def test_limit_of_the_source(time, limit):
     """Eq. 64: each interval is closed at its end, whatever the rounding of the time."""
-    limits = read_limits(LIMITS)
+    limits = STEPS.read(LIMITS)
     assert limits.at(time) == limit
     assert limits.at(time + 4e-15) == limit
 
@@ -23,4 +23,4 @@ def test_limit_of_the_source(time, limit):
 )
 def test_unusable_limits_are_refused(rows):
     with pytest.raises(ValueError, match="speed limit"):
-        read_limits(rows)
+        STEPS.read(rows)

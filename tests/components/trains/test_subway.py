@@ -173,10 +173,10 @@ def test_another_number_of_vehicles_repeats_the_table():
 @pytest.mark.parametrize(
     ("build", "message"),
     [
-        ({"couplers": [{"sin": 1.0}]}, "coupler 1 must be"),
+        ({"couplers": [{"sin": 1.0}]}, "coupler 1: a coupler has no 'sin'; did you mean 'sine'"),
         ({"couplers": []}, "couplers are"),
-        ({"couplers": [{"sine": "x"}]}, "are numbers"),
-        ({"line": []}, "a line is"),
+        ({"couplers": [{"sine": "x"}]}, "coupler 1: 'sine' must be a number in m"),
+        ({"line": []}, "sections are a list of at least one"),
         ({"vehicles": 1}, "at least 2"),
     ],
 )

@@ -2,9 +2,10 @@
 
 import numpy as np
 import pytest
-from railcosim.components.trains.vehicles import SUBWAY, added, distribute, pattern, read_vehicles
+from railcosim.components.trains.vehicles import SUBWAY, added, distribute, pattern
+from railcosim.components.trains.vehicles import VEHICLES as TABLE
 
-VEHICLES = read_vehicles(SUBWAY)
+VEHICLES = TABLE.read(SUBWAY)
 WEIGHTS = [v.weight for v in VEHICLES]
 MOTORED = [v.motored for v in VEHICLES]
 
@@ -76,4 +77,4 @@ def test_a_short_table_is_repeated_and_a_long_one_cut():
 )
 def test_unusable_vehicles_are_refused(rows):
     with pytest.raises(ValueError, match="vehicle"):
-        read_vehicles(rows)
+        TABLE.read(rows)
