@@ -186,7 +186,7 @@ def _what(slot: Slot) -> tuple[str, str, str]:
 
 
 def _start(component: Component, slot: Slot) -> str:
-    value = component.__dict__[slot.name]
+    value = getattr(component, slot.name)
     if isinstance(value, np.ndarray):
         cells = value.ravel().tolist()
         value = cells[0] if len(set(cells)) == 1 else cells
