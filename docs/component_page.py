@@ -9,6 +9,7 @@ from __future__ import annotations
 import functools
 import inspect
 import io
+import re
 import tomllib
 from collections.abc import Callable, Iterable, Mapping
 from pathlib import Path
@@ -74,7 +75,7 @@ def _is_port(base: type[Component]) -> bool:
 
 
 def _swaps(cls: type[Component], catalogue: Mapping[str, type[Component]]) -> str:
-    used = [scenario for scenario, models in scenarios().items() if cls.__name__ in models.values()]
+    used = [name for name, scenario in scenarios().items() if cls.__name__ in _places(scenario).values()]
     names = ", ".join(f"`{name}`" for name in used)
     where = f"Scenarios that have it: {names}.\n\n" if used else "No shipped scenario has it.\n\n"
     face = port(cls)
@@ -90,21 +91,36 @@ def _swaps(cls: type[Component], catalogue: Mapping[str, type[Component]]) -> st
 
 def _command(cls: type[Component], others: list[type[Component]]) -> str:
     """The command that puts the component into a scenario in the place of one of the others, if there is one."""
-    places = [(scenario, place, model) for scenario, models in scenarios().items() for place, model in models.items()]
-    for scenario, place, model in places:
-        if model in {other.__name__ for other in others}:
-            return f"\n\n```text\norchestrate run {scenario} --swap {place}={cls.__name__}\n```"
+    names = {other.__name__ for other in others}
+    for name, scenario in scenarios().items():
+        for place, model in _places(scenario).items():
+            if model in names and _fits(cls(), scenario, place):
+                return f"\n\n```text\norchestrate run {name} --swap {place}={cls.__name__}\n```"
     return ""
 
 
+def _fits(component: Component, scenario: Mapping[str, Any], place: str) -> bool:
+    """Whether the scenario feeds what the component must be fed in a place, and takes only what it has."""
+    connections = scenario.get("connections", {})
+    sources = [source["from"] if isinstance(source, dict) else source for source in connections.values()]
+    name = re.compile(rf"{place}(?:\[[^\]]*\])?\.(\w+)")
+    fed, taken = ({m[1] for m in map(name.match, ends) if m} for ends in (connections, sources))
+    needed = {slot.name for slot in component.of(Input) if not slot.declaration.optional}
+    built = scenario["instances"][place].get("build", {}).keys() <= component.build_arguments.keys()
+    return built and needed <= fed and taken <= {slot.name for slot in component.output_slots}
+
+
+def _places(scenario: Mapping[str, Any]) -> dict[str, str]:
+    entries = scenario["instances"].items()
+    return {name: entry["component"] for name, entry in entries if "component" in entry}
+
+
 @functools.cache
-def scenarios() -> dict[str, dict[str, str]]:
-    """Every shipped scenario: its instances, without index, and their components."""
-    found = {}
-    for path in sorted(Path(models.__file__ or "").parent.glob("*.toml")):
-        instances = tomllib.loads(path.read_text(encoding="utf-8")).get("instances", {})
-        found[path.stem] = {name: entry["component"] for name, entry in instances.items() if "component" in entry}
-    return found
+def scenarios() -> dict[str, dict[str, Any]]:
+    """Every shipped scenario as it is written."""
+    paths = sorted(Path(models.__file__ or "").parent.glob("*.toml"))
+    found = {path.stem: tomllib.loads(path.read_text(encoding="utf-8")) for path in paths}
+    return {name: scenario for name, scenario in found.items() if "instances" in scenario}
 
 
 # ---------------------------------------------------------------- tables
@@ -170,7 +186,7 @@ def _what(slot: Slot) -> tuple[str, str, str]:
 
 
 def _start(component: Component, slot: Slot) -> str:
-    value = component.__dict__[slot.name]
+    value = getattr(component, slot.name)
     if isinstance(value, np.ndarray):
         cells = value.ravel().tolist()
         value = cells[0] if len(set(cells)) == 1 else cells
