@@ -13,6 +13,7 @@ import pytest
 from railcosim.orchestrator.errors import FmuError, StoppedError
 from railcosim.orchestrator.fmi.interface import Interface
 from railcosim.orchestrator.fmi.models import load_fmu
+from railcosim.orchestrator.isolation import launch
 from railcosim.orchestrator.isolation import messages as doorbell
 from railcosim.orchestrator.isolation import process as host_process
 from railcosim.orchestrator.isolation import proxy as isolated
@@ -254,7 +255,7 @@ def test_unknown_variables(apart):
 
 def test_a_pipe_that_is_not_inherited(apart, monkeypatch):
     """As on Windows, where the process connects to a port and shows a password."""
-    monkeypatch.setattr(host_process, "INHERITS", False)
+    monkeypatch.setattr(launch, "INHERITS", False)
     it = apart(begun=True)
     it.channel("Real", ["u"]).set([1.0])
     it.step(0.0, 1.0)
@@ -438,7 +439,7 @@ def members_of(group):
 
 
 def test_a_process_that_does_not_start(apart, monkeypatch):
-    monkeypatch.setattr(host_process, "_BOOT", "raise SystemExit('no way')")
+    monkeypatch.setattr(launch, "_BOOT", "raise SystemExit('no way')")
     with pytest.raises(FmuError, match=r"^it: its process could not be started \(exit code 1\)\n    no way$"):
         apart(begun=True)
 
@@ -469,9 +470,9 @@ def test_a_process_that_does_not_listen(apart):
 
 @pytest.mark.parametrize("inherits", [True, False])
 def test_a_process_that_takes_too_long_to_start(apart, monkeypatch, inherits):
-    monkeypatch.setattr(host_process, "INHERITS", inherits)
+    monkeypatch.setattr(launch, "INHERITS", inherits)
     monkeypatch.setattr(host_process, "PATIENCE", 0.5)
-    monkeypatch.setattr(host_process, "_BOOT", "import time; time.sleep(60)")
+    monkeypatch.setattr(launch, "_BOOT", "import time; time.sleep(60)")
     with pytest.raises(FmuError, match=r"^it: its process did not start within 0.5 s$"):
         apart(step_timeout=0.5, begun=True)
 
