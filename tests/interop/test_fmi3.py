@@ -13,7 +13,8 @@ from fmpy.container_fmu.config import Component
 from fmpy.model_description import CoSimulation, ModelDescription, ModelVariable, Unknown
 from railcosim.fmus.build import build, native_problem, resolve
 from railcosim.orchestrator import System, run
-from railcosim.orchestrator.validation.report import PROBES, validate
+from railcosim.orchestrator.validation import validate
+from railcosim.orchestrator.validation.probing import PROBES
 
 PROBLEM = native_problem(resolve("PointMassTrain"))
 pytestmark = [
