@@ -15,8 +15,9 @@ from lxml import etree
 
 from ..interface import Type
 from ..slave import Channel
+from .instance import DISCARD, LOGGER, OK, WARNING
 from .libraries import Signatures
-from .loaded import DISCARD, LOGGER, OK, WARNING, LoadedSlave
+from .loaded import LoadedSlave
 
 _LAST_SUCCESSFUL_TIME = 2
 """What fmiGetRealStatus is asked for."""

@@ -12,11 +12,9 @@ from typing import Any
 from fmpy import fmi2
 from fmpy.logging import addLoggerProxy
 
-from .channel import FmuChannel
+from .instance import DISCARD, LOGGER, OK, WARNING
 from .libraries import Signatures
-from .loaded import DISCARD, LOGGER, OK, WARNING, LoadedSlave
-
-__all__ = ["FmuChannel", "FmuSlave"]
+from .loaded import LoadedSlave
 
 _LAST_SUCCESSFUL_TIME, _TERMINATED = 2, 3
 """What fmi2GetRealStatus and fmi2GetBooleanStatus are asked for."""

@@ -12,8 +12,9 @@ from typing import Any
 
 from fmpy import fmi3
 
+from .instance import DISCARD, OK, WARNING, keep_message
 from .libraries import Signatures
-from .loaded import DISCARD, OK, WARNING, LoadedSlave, keep_message
+from .loaded import LoadedSlave
 
 _NUMBERS = {
     "Float32": ctypes.c_float,
