@@ -20,6 +20,8 @@ from collections.abc import Callable, Iterable, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+import psutil
+
 from . import messages
 from .messages import NOTE_CALL, NOTE_MEMORY, Cells, Door, note
 
@@ -306,49 +308,28 @@ def _stay_with_parent(of_main_thread: bool) -> None:
         Path("/proc/self/oom_score_adj").write_text("1000")
 
 
-def _limit_memory(before: int, mebibytes: float | None) -> int | None:
+def _limit_memory(before: int, mebibytes: float) -> int | None:
     """Limit what may be allocated beyond ``before`` KiB; the limit in KiB, or None where the platform has none."""
-    if mebibytes is None or not before:
+    if not sys.platform.startswith("linux"):
         return None
-    import resource  # noqa: PLC0415 (not on Windows)
-
     limit = int(mebibytes * 1024)
-    resource.setrlimit(resource.RLIMIT_DATA, ((before + limit) * 1024,) * 2)
+    psutil.Process().rlimit(psutil.RLIMIT_DATA, ((before + limit) * 1024,) * 2)
     return limit
 
 
 def _memory_in_use() -> int:
-    """What this process has allocated, in KiB; 0 where nobody tells."""
-    try:
-        with open("/proc/self/statm", encoding="ascii") as stream:
-            return int(stream.read().split()[5]) * mmap.PAGESIZE // 1024
-    except OSError:
-        return 0
+    """What this process has allocated, in KiB, as Linux counts it for its limit; 0 elsewhere."""
+    return int(getattr(psutil.Process().memory_info(), "data", 0)) // 1024
 
 
 def _take_care(parent: int, notes: memoryview, before: int) -> None:
     """End the process with its master, even inside a long step; watch its memory and the size of its output."""
-    while not _is_gone(parent, _LOOK_SECONDS):
-        notes[NOTE_MEMORY] = max(notes[NOTE_MEMORY], _memory_in_use() - before)
-        with contextlib.suppress(OSError):
-            if os.fstat(1).st_size > _MOST_OUTPUT:
-                os.ftruncate(1, 0)
+    with contextlib.suppress(psutil.NoSuchProcess):
+        master = psutil.Process(parent)
+        while master.is_running() and not (os.name == "posix" and os.getppid() != parent):  # adopted by another
+            notes[NOTE_MEMORY] = max(notes[NOTE_MEMORY], _memory_in_use() - before)
+            with contextlib.suppress(OSError):
+                if os.fstat(1).st_size > _MOST_OUTPUT:
+                    os.ftruncate(1, 0)
+            time.sleep(_LOOK_SECONDS)
     os._exit(1)
-
-
-def _is_gone(parent: int, seconds: float) -> bool:
-    """Whether the master ends within some time."""
-    if sys.platform == "win32":
-        import _winapi  # noqa: PLC0415
-
-        synchronize, milliseconds = 0x100000, int(1000 * seconds)
-        try:
-            handle = _winapi.OpenProcess(synchronize, False, parent)
-        except OSError:
-            return True
-        try:
-            return bool(_winapi.WaitForSingleObject(handle, milliseconds) == 0)
-        finally:
-            _winapi.CloseHandle(handle)
-    time.sleep(seconds)
-    return os.getppid() != parent

@@ -6,49 +6,24 @@ import contextlib
 import mmap
 import os
 import pickle
-import secrets
-import signal
-import socket
 import subprocess
 import sys
 import tempfile
 import threading
-import time
 from collections.abc import Callable
 from pathlib import Path
-from typing import IO
 
 from ..fmi import Interface
 from . import messages
+from .launch import accept, end_process, signal_name, start_process, starting
 from .messages import NOTE_CALL, NOTE_MEMORY, Door
 
-_BOOT = """
-import os, sys, types
-from importlib import import_module
-name, folder, module = sys.argv[1:4]
-rooms = [room for room in os.listdir(folder) if os.path.isfile(os.path.join(folder, room, "__init__.py"))]
-for package, path in [(name, folder), *((name + "." + room, os.path.join(folder, room)) for room in rooms)]:
-    sys.modules[package] = types.ModuleType(package)
-    sys.modules[package].__path__ = [path]
-import_module(name + "." + module).main(*sys.argv[4:])
-"""
-"""Starts a module without the ``__init__`` of any room, which imports what all of it needs: 0.1 s instead of 0.4 s."""
-
-INHERITS = os.name == "posix"
-"""Whether a process can be given an open socket; it connects to one where it cannot."""
 PATIENCE = 60.0
 """Default wall time in s for one call, and the least for Python to start on a busy machine."""
 _GRACE = 10.0
 """Wall time in s for a process to be gone once it has left: writing a large core file takes a while."""
 _LINES, _LINE = 20, 500
 """How much of what it wrote is shown after a crash."""
-
-
-def starting(module: str) -> list[str]:
-    """The command, but for its arguments, that runs the ``main`` of a module of ours (``"isolation.host"``) alone."""
-    orchestrator = Path(__file__).parents[1]
-    package = (__package__ or "").rpartition(".")[0]
-    return [sys.executable, "-u", "-P", "-c", _BOOT, package, str(orchestrator), module]
 
 
 class HostLostError(Exception):
@@ -104,7 +79,8 @@ class HostProcess:
             self.memory = mmap.mmap(stream.fileno(), 0)
         self._notes: memoryview | None = memoryview(self.memory)[: messages.HEAD].cast("q")
         with (self._folder / "output").open("ab") as output:
-            self._process, self._end, self._password = _start(str(self._folder), output)
+            command = [*starting("isolation.host"), str(self._folder)]
+            self._process, self._end, self._password = start_process(command, output)
         self._door: Door | None = None
 
     @property
@@ -121,7 +97,9 @@ class HostProcess:
             HostLostError: it does not start.
         """
         try:
-            self._door = Door(_accept(self._end, self._process, self._password) if self._password else self._end)
+            self._door = Door(
+                accept(self._end, self._process, self._password, PATIENCE) if self._password else self._end
+            )
         except TimeoutError as error:
             raise self._hangs() from error
         self._door.wait_at_most(max(self.patience, PATIENCE))
@@ -176,14 +154,14 @@ class HostProcess:
     def kill(self) -> None:
         """End it, and what it has started, at once."""
         if self._process.returncode is None:
-            _kill(self._process)
+            end_process(self._process)
             self._reap(_GRACE)
         self._close()
 
     def wait(self) -> None:
         """Wait for the end that it was asked for."""
         if not self._reap(self.patience):
-            _kill(self._process)
+            end_process(self._process)
             self._reap(_GRACE)
         self._close()
 
@@ -202,7 +180,7 @@ class HostProcess:
     def _hangs(self) -> HostLostError:
         if self._process.poll() is not None:  # what it has started holds the line open
             return self._is_lost()
-        _kill(self._process)
+        end_process(self._process)
         self._reap(_GRACE)
         if not self.is_ready:
             return self._lost(f"its process did not start within {max(self.patience, PATIENCE):g} s")
@@ -215,7 +193,7 @@ class HostProcess:
     def _is_lost(self) -> HostLostError:
         """How it went: a signal, or an exit code."""
         forced = not self._reap(_GRACE)
-        _kill(self._process)  # what it has started, too
+        end_process(self._process)  # what it has started, too
         self._reap(_GRACE)
         code = self._process.returncode or 0
         if not self.is_ready:
@@ -228,7 +206,7 @@ class HostProcess:
                 f"its process was killed {where} (SIGKILL), most likely by the system, for lack of memory"
             )
         if code < 0:
-            return self._lost(f"its process crashed {where} ({_signal_name(-code)}){self._hint()}")
+            return self._lost(f"its process crashed {where} ({signal_name(-code)}){self._hint()}")
         if code > 0xFFFF:  # as Windows tells of a crash
             return self._lost(f"its process crashed {where} (exit code {code:#x}){self._hint()}")
         return self._lost(f"its process ended {where} (exit code {code})")
@@ -260,82 +238,8 @@ _KILL = 9
 """SIGKILL, which Windows has no name for."""
 
 
-def _signal_name(number: int) -> str:
-    try:
-        return signal.Signals(number).name
-    except ValueError:
-        return f"signal {number}"
+def _default_limit() -> float:
+    """Half of the memory that the machine has, in MiB."""
+    import psutil  # noqa: PLC0415 (which only those need who isolate an FMU)
 
-
-def _start(folder: str, output: IO[bytes]) -> tuple[subprocess.Popen[bytes], socket.socket, bytes]:
-    """A process; and a socket to it, or one at which it will show a password."""
-    command = [*starting("isolation.host"), folder]
-    if INHERITS:
-        near, far = socket.socketpair()
-        with far:
-            # In a session of its own: a Ctrl-C in the terminal is for the master, which ends the run properly.
-            process = subprocess.Popen(
-                [*command, str(far.fileno())],
-                stdin=subprocess.DEVNULL,
-                stdout=output,
-                stderr=output,
-                pass_fds=[far.fileno()],
-                start_new_session=True,
-            )
-        return process, near, b""
-    server = socket.create_server(("127.0.0.1", 0))
-    address, port = server.getsockname()
-    process = subprocess.Popen(
-        [*command, f"{address}:{port}"],
-        stdin=subprocess.PIPE,
-        stdout=output,
-        stderr=output,
-        creationflags=_new_group(),
-        start_new_session=sys.platform != "win32",
-    )
-    password = secrets.token_hex(16).encode()
-    assert process.stdin is not None
-    with contextlib.suppress(OSError), process.stdin as pipe:
-        pipe.write(password + b"\n")
-    return process, server, password
-
-
-def _new_group() -> int:
-    """What keeps a Ctrl-C from a process on Windows."""
-    if sys.platform == "win32":
-        return subprocess.CREATE_NEW_PROCESS_GROUP
-    return 0
-
-
-def _accept(server: socket.socket, process: subprocess.Popen[bytes], password: bytes) -> socket.socket:
-    """The connection of a process that knows the password."""
-    until = time.monotonic() + PATIENCE
-    server.settimeout(0.1)
-    while process.poll() is None and time.monotonic() < until:
-        with contextlib.suppress(OSError):
-            end, _ = server.accept()
-            end.settimeout(PATIENCE)
-            if secrets.compare_digest(end.recv(len(password), socket.MSG_WAITALL), password):
-                return end
-            end.close()
-    if process.poll() is None:
-        raise TimeoutError
-    return socket.socket()  # not connected: its first use tells that the process is lost
-
-
-def _kill(process: subprocess.Popen[bytes]) -> None:
-    """End a process, and what it has started: they are a group of their own."""
-    if sys.platform == "win32":
-        with contextlib.suppress(OSError):
-            process.kill()
-        return
-    with contextlib.suppress(OSError):
-        os.killpg(process.pid, signal.SIGKILL)
-
-
-def _default_limit() -> float | None:
-    """Half of the memory that the machine has, in MiB; None where nobody tells."""
-    try:
-        return os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_PHYS_PAGES") / 2**21
-    except (AttributeError, ValueError, OSError):
-        return None
+    return float(psutil.virtual_memory().total) / 2**21

@@ -1,6 +1,8 @@
 """Whether anybody's FMU keeps the standard: read, compared with our own rules where it is ours, and tried."""
 
-from .report import TIMEOUT, Finding, Report, validate
+from .checking import validate
+from .findings import Finding, Report
+from .probing import TIMEOUT
 
 __all__ = [
     "TIMEOUT",

@@ -1,4 +1,4 @@
-"""One probe of one FMU, run by `validate` in a process of its own, which the FMU may take down.
+"""One probe of one FMU, run by `probing` in a process of its own, which the FMU may take down.
 
 What it needs to know stands in the file named as its only argument; it writes its verdict to the file named in there.
 """

@@ -14,7 +14,8 @@ from fmpy.model_description import CoSimulation, ModelDescription, ModelVariable
 from railcosim.fmus.build import build, native_problem
 from railcosim.fmus.references import resolve
 from railcosim.orchestrator import System, run
-from railcosim.orchestrator.validation.report import PROBES, validate
+from railcosim.orchestrator.validation import validate
+from railcosim.orchestrator.validation.probing import PROBES
 
 PROBLEM = native_problem(resolve("PointMassTrain"))
 pytestmark = [

@@ -198,7 +198,7 @@ def members_of(group):
 
 
 def test_a_process_that_does_not_start(apart, monkeypatch):
-    monkeypatch.setattr(host_process, "_BOOT", "raise SystemExit('no way')")
+    monkeypatch.setattr(launch, "_BOOT", "raise SystemExit('no way')")
     with pytest.raises(FmuError, match=r"^it: its process could not be started \(exit code 1\)\n    no way$"):
         apart(begun=True)
 
@@ -229,9 +229,9 @@ def test_a_process_that_does_not_listen(apart):
 
 @pytest.mark.parametrize("inherits", [True, False])
 def test_a_process_that_takes_too_long_to_start(apart, monkeypatch, inherits):
-    monkeypatch.setattr(host_process, "INHERITS", inherits)
+    monkeypatch.setattr(launch, "INHERITS", inherits)
     monkeypatch.setattr(host_process, "PATIENCE", 0.5)
-    monkeypatch.setattr(host_process, "_BOOT", "import time; time.sleep(60)")
+    monkeypatch.setattr(launch, "_BOOT", "import time; time.sleep(60)")
     with pytest.raises(FmuError, match=r"^it: its process did not start within 0.5 s$"):
         apart(step_timeout=0.5, begun=True)
 

@@ -6,7 +6,6 @@ import sys
 
 import pytest
 from railcosim.orchestrator.errors import FmuError
-from railcosim.orchestrator.isolation import process as host_process
 from railcosim.orchestrator.isolation import proxy as isolated
 
 pytestmark = [
@@ -206,7 +205,7 @@ def test_unknown_variables(apart):
 
 def test_a_pipe_that_is_not_inherited(apart, monkeypatch):
     """As on Windows, where the process connects to a port and shows a password."""
-    monkeypatch.setattr(host_process, "INHERITS", False)
+    monkeypatch.setattr(launch, "INHERITS", False)
     it = apart(begun=True)
     it.channel("Real", ["u"]).set([1.0])
     it.step(0.0, 1.0)

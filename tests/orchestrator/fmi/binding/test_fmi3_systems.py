@@ -11,7 +11,8 @@ from railcosim.orchestrator.errors import FmuError, ScenarioError
 from railcosim.orchestrator.fmi.models import load_fmu
 from railcosim.orchestrator.linearization.closed_loop import linearize
 from railcosim.orchestrator.run.checking import check
-from railcosim.orchestrator.validation.report import PROBES, validate
+from railcosim.orchestrator.validation import validate
+from railcosim.orchestrator.validation.probing import PROBES
 
 FOREIGN = Path(__file__).parents[2] / "foreign"
 PART = 1.0 - math.exp(-0.25)

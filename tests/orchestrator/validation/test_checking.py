@@ -12,7 +12,8 @@ from railcosim.fmus.build import build, native_problem
 from railcosim.fmus.references import resolve
 from railcosim.orchestrator import FmuFileError
 from railcosim.orchestrator.cli.app import call
-from railcosim.orchestrator.validation.report import PROBES, validate
+from railcosim.orchestrator.validation import validate
+from railcosim.orchestrator.validation.probing import PROBES
 
 needs_native = pytest.mark.skipif(
     bool(native_problem(resolve("PointMassTrain"))), reason="native FMUs cannot be made here"

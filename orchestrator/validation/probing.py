@@ -1,0 +1,112 @@
+"""The probes of an FMU, each in a process of its own, which the FMU may take down."""
+
+from __future__ import annotations
+
+import json
+import os
+import pickle
+import subprocess
+import tempfile
+from concurrent.futures import ThreadPoolExecutor
+from pathlib import Path
+
+from ..errors import FmuFileError
+from ..fmi import Interface
+from ..fmi.binding import library, names_of_platform
+from ..isolation import end_process, signal_name, starting
+from . import probes_fmi2
+from .findings import Finding, Verdict, listed
+from .probes import Task
+
+PROBES = {
+    "instantiate": "loads, instantiates, frees",
+    "simulate": "simulates",
+    "starts": "start values",
+    "reset": "resets",
+    "instances": "several instances",
+    "state": "saves its state",
+    "order": "wrong calls",
+}
+"""The probes of `probe_process`, as a user reads them."""
+TIMEOUT = 60.0
+"""How long one probe may take by default, in s."""
+_DEFAULT_STEP = 0.1
+
+
+def try_out(interface: Interface, folder: Path, path: Path, timeout: float) -> list[Finding]:
+    """Whether there is a library for this machine, and what every probe of it finds.
+
+    Args:
+        interface: the FMU's.
+        folder: where it was unpacked; the probes write beside it.
+        path: the archive, for messages.
+        timeout: how long one probe may take, in s.
+    """
+    binaries = folder / "binaries"
+    platforms = sorted(p.name for p in binaries.iterdir() if p.is_dir()) if binaries.is_dir() else []
+    here = names_of_platform(interface.version)
+    if not set(here) & set(platforms):
+        brings = f"it brings {', '.join(platforms)}" if platforms else "it brings none"
+        return [Finding("binary", "skipped" if platforms else "fail", f"none for {here[0]}; {brings}")]
+    try:
+        found = library(folder, interface, str(path))
+    except FmuFileError as error:
+        return [Finding("binary", "fail", str(error))]
+    problems = []
+    if found.stem != interface.identifier:
+        problems.append(f"{found.name} is not named after the model identifier {interface.identifier!r}")
+    if found.parent.name != here[0]:
+        problems.append(f"{found.name} stands in binaries/{found.parent.name}, not in binaries/{here[0]}")
+    problems = [f"{problem}: most importers need that" for problem in problems]
+    findings = [listed("binary", problems, f"for {', '.join(platforms)}")]
+    with ThreadPoolExecutor(os.cpu_count() or 1) as pool:
+        answers = pool.map(lambda probe: _probe(probe, interface, folder, timeout), PROBES)
+        findings += [_judged(title, answer, interface) for title, answer in zip(PROBES.values(), answers, strict=True)]
+    return findings
+
+
+def _probe(probe: str, interface: Interface, folder: Path, timeout: float) -> tuple[Verdict, str]:
+    if probe in probes_fmi2.PROBES and interface.version != "2.0":
+        return "skipped", "tried with FMI 2.0 only"
+    place = Path(tempfile.mkdtemp(prefix=f"{probe}_", dir=folder.parent))
+    step = interface.default_step or interface.recommended_step or _DEFAULT_STEP
+    task = Task(probe, interface, folder, step, answer=place / "answer.json", trying=place / "trying.txt")
+    (place / "task").write_bytes(pickle.dumps(task))
+    command = [*starting("validation.probe_process"), str(place / "task")]
+    with (place / "output.txt").open("wb") as output:
+        process = subprocess.Popen(
+            command, cwd=place, stdin=subprocess.DEVNULL, stdout=output, stderr=output, start_new_session=True
+        )
+        try:
+            code = process.wait(timeout)
+        except subprocess.TimeoutExpired:
+            end_process(process)
+            process.wait()
+            return "fail", f"not finished after {timeout:g} s: it was ended"
+        except BaseException:
+            end_process(process)
+            process.wait()
+            raise
+    if task.answer.is_file():
+        told = json.loads(task.answer.read_text(encoding="utf-8"))
+        return told["verdict"], told["detail"]
+    at = f" at {task.trying.read_text(encoding='utf-8')}" if task.trying.is_file() else ""
+    return "fail", f"it took its process down{at} ({_cause(code)}){_last_words(place / 'output.txt')}"
+
+
+def _cause(code: int) -> str:
+    if code < 0:
+        return signal_name(-code)
+    return f"exit code {code}" if code < 2**31 else f"exit code {code:#x}"
+
+
+def _last_words(path: Path) -> str:
+    lines = [line.strip() for line in path.read_bytes()[-2000:].decode(errors="replace").splitlines() if line.strip()]
+    return f"; last words: {lines[-1]}" if lines else ""
+
+
+def _judged(title: str, answer: tuple[Verdict, str], interface: Interface) -> Finding:
+    verdict, detail = answer
+    # What is doubtful in the FMU of another maker is a defect in ours; a Python FMU's outer shell is pythonfmu's.
+    ours = interface.own_kind == "native"
+    return Finding(title, "fail" if verdict == "warning" and ours else verdict, detail)

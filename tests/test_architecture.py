@@ -1,0 +1,151 @@
+"""The house as the design has it: imports point down, go through what a room offers, and make no circles."""
+
+import ast
+from collections import defaultdict
+from functools import cache
+from pathlib import Path
+from typing import NamedTuple
+
+import networkx as nx
+
+ROOT = Path(__file__).parents[1]
+PACKAGES = ("components", "fmus", "orchestrator")
+"""Each imports itself and those before it."""
+ORDER = (
+    ("",),  # orchestrator/__init__.py
+    ("cli",),
+    ("driving", "report", "study"),
+    ("linearization", "comparison", "packing"),
+    ("run",),
+    ("validation",),
+    ("master",),
+    ("isolation",),
+    ("scenario", "ssp"),
+    ("wiring",),
+    ("figures",),
+    ("evaluation",),
+    ("fmi",),
+    ("system",),
+    ("names",),
+    ("problems",),
+    ("errors",),
+)
+"""The rooms and root files of the orchestrator; each imports itself and what stands in lines below."""
+RANKS = {room: rank for rank, rooms in enumerate(ORDER) for room in rooms}
+MOST_FILES, MOST_LINES, MOST_TEST_LINES = 15, 400, 500
+
+
+class Import(NamedTuple):
+    """What a module takes from a target, a module or a package: a name in it, or the whole (``""``)."""
+
+    place: str
+    module: str
+    target: str
+    name: str
+
+
+def code(folder):
+    """Every file of code below a folder; what stands in ``resources`` is data, whatever it is."""
+    files = sorted(path for suffix in ("py", "c", "h") for path in (ROOT / folder).rglob(f"*.{suffix}"))
+    return [path for path in files if not {"dist", "resources"} & set(path.relative_to(ROOT).parts)]
+
+
+MODULES = {
+    ".".join(path.relative_to(ROOT).with_suffix("").parts).removesuffix(".__init__"): path
+    for package in PACKAGES
+    for path in code(package)
+    if path.suffix == ".py"
+}
+FOLDERS = {name for name, path in MODULES.items() if path.name == "__init__.py"}
+
+
+@cache
+def offered(package):
+    """What the ``__all__`` of a package lists."""
+    body = ast.parse(MODULES[package].read_text(encoding="utf-8")).body if package in FOLDERS else []
+    listed = [x.value for x in body if isinstance(x, ast.Assign) and ast.unparse(x.targets[0]) == "__all__"]
+    return {name for names in listed for name in ast.literal_eval(names)}
+
+
+def taken(node, here):
+    """Target and name of each part of an import statement in a package; without ``railcosim.``."""
+    if isinstance(node, ast.Import):
+        return [(alias.name.removeprefix("railcosim."), "") for alias in node.names]
+    folders = here.split(".")
+    above = folders[: len(folders) + 1 - node.level] if node.level else []
+    base = ".".join([*above, node.module or ""]).removeprefix("railcosim").strip(".")
+    parts = [(f"{base}.{alias.name}".strip("."), alias.name) for alias in node.names]
+    return [(x, "") if x in MODULES and name not in offered(base) else (base, name) for x, name in parts]
+
+
+@cache
+def imports():
+    """What modules of ours take from one another, in functions and for types alone too."""
+    return [
+        Import(f"{path.relative_to(ROOT)}:{node.lineno}", module, target, name)
+        for module, path in MODULES.items()
+        for node in ast.walk(ast.parse(path.read_text(encoding="utf-8")))
+        if isinstance(node, ast.Import | ast.ImportFrom)
+        for target, name in taken(node, module if module in FOLDERS else module.rpartition(".")[0])
+        if target in MODULES
+    ]
+
+
+def room(module):
+    """The folder of a module of the orchestrator, such as ``fmi.binding``; of a root file its name."""
+    folder = module if module in FOLDERS else module.rpartition(".")[0]
+    return (module if folder == "orchestrator" else folder).partition(".")[2]
+
+
+def in_orchestrator():
+    """Imports within the orchestrator from one room to another, with the two rooms."""
+    inside = [x for x in imports() if {x.module.partition(".")[0], x.target.partition(".")[0]} == {"orchestrator"}]
+    pairs = [(x, room(x.module), room(x.target)) for x in inside]
+    return [(x, own, other) for x, own, other in pairs if own != other]
+
+
+def test_packages_import_those_below_them_alone():
+    rank = PACKAGES.index
+    wrong = [x for x in imports() if rank(x.target.partition(".")[0]) > rank(x.module.partition(".")[0])]
+    assert not wrong, "\n".join(f"{x.place}: {x.module} must not import {x.target}" for x in wrong)
+
+
+def test_rooms_import_those_below_them_alone():
+    tops = [(each.place, own.partition(".")[0], other.partition(".")[0]) for each, own, other in in_orchestrator()]
+    unknown = {top for _, *pair in tops for top in pair} - RANKS.keys()
+    assert not unknown, f"give {', '.join(sorted(unknown))} a place in ORDER, and in the design"
+    wrong = [f"{place}: {a} must not import {b}" for place, a, b in tops if a != b and RANKS[a] >= RANKS[b]]
+    assert not wrong, "\n".join(wrong)
+
+
+def test_rooms_are_entered_by_the_door():
+    """A room and its sub-room know each other's modules; any other takes what `__all__` lists."""
+    wrong = []
+    for each, own, other in in_orchestrator():
+        if own.startswith(f"{other}.") or other.startswith(f"{own}."):
+            continue
+        if each.target in FOLDERS and each.name not in offered(each.target):
+            wrong.append(f"{each.place}: {other} does not offer {each.name!r} in its __all__")
+        elif each.target not in FOLDERS and each.target.count(".") > 1:  # a file at the root has no door
+            wrong.append(f"{each.place}: import from {other}, not from {each.target}")
+    assert not wrong, "\n".join(wrong)
+
+
+def test_no_circles():
+    graph = nx.DiGraph([(x.module, x.target) for x in imports() if x.module != x.target])
+    circles = [sorted(found) for found in nx.strongly_connected_components(graph) if len(found) > 1]
+    assert not circles, "\n".join("these import each other: " + ", ".join(circle) for circle in circles)
+
+
+def test_files_are_short_and_folders_small():
+    wrong = []
+    folders = defaultdict(int)
+    for folder, most in [*((name, MOST_LINES) for name in (*PACKAGES, "benchmarks")), ("tests", MOST_TEST_LINES)]:
+        for path in code(folder):
+            lines = len(path.read_text(encoding="utf-8").splitlines())
+            wrong += [f"{path.relative_to(ROOT)} has {lines} lines, over {most}"] if lines > most else []
+            folders[path.parent.relative_to(ROOT)] += path.parts[len(ROOT.parts)] in PACKAGES
+    wrong += [
+        f"{folder} has {count} files, over {MOST_FILES}" for folder, count in folders.items() if count > MOST_FILES
+    ]
+    assert not wrong, "\n".join(wrong)
