@@ -14,7 +14,7 @@ import sys
 import tempfile
 import threading
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import IO
 
@@ -267,12 +267,21 @@ def _signal_name(number: int) -> str:
         return f"signal {number}"
 
 
+@contextlib.contextmanager
+def _closed_on_failure(end: socket.socket) -> Iterator[None]:
+    try:
+        yield
+    except BaseException:
+        end.close()
+        raise
+
+
 def _start(folder: str, output: IO[bytes]) -> tuple[subprocess.Popen[bytes], socket.socket, bytes]:
     """A process; and a socket to it, or one at which it will show a password."""
     command = [*starting("isolation.host"), folder]
     if INHERITS:
         near, far = socket.socketpair()
-        with far:
+        with far, _closed_on_failure(near):
             # In a session of its own: a Ctrl-C in the terminal is for the master, which ends the run properly.
             process = subprocess.Popen(
                 [*command, str(far.fileno())],
@@ -285,14 +294,15 @@ def _start(folder: str, output: IO[bytes]) -> tuple[subprocess.Popen[bytes], soc
         return process, near, b""
     server = socket.create_server(("127.0.0.1", 0))
     address, port = server.getsockname()
-    process = subprocess.Popen(
-        [*command, f"{address}:{port}"],
-        stdin=subprocess.PIPE,
-        stdout=output,
-        stderr=output,
-        creationflags=_new_group(),
-        start_new_session=sys.platform != "win32",
-    )
+    with _closed_on_failure(server):
+        process = subprocess.Popen(
+            [*command, f"{address}:{port}"],
+            stdin=subprocess.PIPE,
+            stdout=output,
+            stderr=output,
+            creationflags=_new_group(),
+            start_new_session=sys.platform != "win32",
+        )
     password = secrets.token_hex(16).encode()
     assert process.stdin is not None
     with contextlib.suppress(OSError), process.stdin as pipe:
