@@ -44,7 +44,7 @@ def ten_trips() -> System:
     for name in system.instances.keys() - KEPT:
         del system.instances[name]
     system.connections = [c for c in system.connections if c.target.split(".")[0] in KEPT]
-    system.requirements, system.metrics, system.published, system.figures = {}, {}, [], []
+    system.judged.requirements, system.judged.metrics, system.judged.published, system.judged.figures = {}, {}, [], []
     system.add("line", "Line")
     system.connect("train.position", "line.position")
     system.connect("line.line_resistance", "train.line_resistance")
@@ -54,18 +54,20 @@ def ten_trips() -> System:
 def stepped(system: System, checked: Checked) -> tuple[float, float, int]:
     """Wall and CPU seconds of all steps, recorded to memory as the scenario asks, and how many they are."""
     slaves = {name: model.instantiate(name) for name, model in checked.models.items()}
-    master = Master(slaves, checked.order.sequence, checked.wiring.links, checked.wiring.starts, system.algorithm)
-    master.initialize(0.0, system.stop_time)
+    master = Master(
+        slaves, checked.order.sequence, checked.wiring.links, checked.wiring.starts, system.stepping.algorithm
+    )
+    master.initialize(0.0, system.stepping.stop_time)
     recorder = Recorder(master.signals, master.kinds, None)
 
     def observe(_: int, rows: Rows) -> bool:
         recorder.extend(rows)
         return True
 
-    every = 1 if system.record is None else round(system.record / system.step)
-    count = round(system.stop_time / system.step)
+    every = 1 if system.stepping.record is None else round(system.stepping.record / system.stepping.step)
+    count = round(system.stepping.stop_time / system.stepping.step)
     wall, cpu = time.perf_counter(), time.process_time()
-    master.run(0.0, system.step, count, every, observe)
+    master.run(0.0, system.stepping.step, count, every, observe)
     wall, cpu = time.perf_counter() - wall, time.process_time() - cpu
     for slave in slaves.values():
         slave.free()
@@ -75,13 +77,14 @@ def stepped(system: System, checked: Checked) -> tuple[float, float, int]:
 def measured(name: str, repetitions: int) -> str:
     """One row of the table."""
     system = ten_trips() if name == "ten trips" else load(name)
+    stepping = system.stepping
     with Workspace() as workspace:
         checked = check(system, workspace, "native")
         walls, cpus, counts = zip(*(stepped(checked.system, checked) for _ in range(repetitions)), strict=True)
         forget_paths(workspace.folder)
     count, wall, goal = len(checked.models), statistics.median(walls), GOALS[name]
     cells = [
-        name, count, f"{system.stop_time:g} s at {system.step:g} s", f"{system.record or system.step:g} s",
+        name, count, f"{stepping.stop_time:g} s at {stepping.step:g} s", f"{stepping.record or stepping.step:g} s",
         f"{wall:.2f}", f"{min(walls):.2f} to {max(walls):.2f}", f"{statistics.median(cpus):.2f}",
         "" if goal is None else f"{goal:g}", f"{statistics.median(cpus) / counts[0] / count * 1e6:.2f}",
     ]  # fmt: skip

@@ -62,7 +62,7 @@ def main() -> int:
     stepping = []
     for _ in range(options.repetitions):
         begin = time.process_time()
-        run(system, kind="native", stop_time=system.step)
+        run(system, kind="native", stop_time=system.stepping.step)
         between = time.process_time()
         result = run(system, kind="native")
         stepping.append((time.process_time() - between) - (between - begin))

@@ -140,11 +140,11 @@ def system_of(
             _connect(system, drawn, i + 1, i, perfect)
     distance = "train[i-1].position - train[i].position"
     speeds = "train[i].speed, train[i-1].speed"
-    system.metrics["margin"] = f"braking_margin({distance}, {speeds}, {BRAKING}, {HARDEST}, 0, {STANDSTILL})"
-    system.metrics["gap"] = f"min({distance})"
+    system.judged.metrics["margin"] = f"braking_margin({distance}, {speeds}, {BRAKING}, {HARDEST}, 0, {STANDSTILL})"
+    system.judged.metrics["gap"] = f"min({distance})"
     if not perfect:
-        system.metrics["age"] = "max(radio_ahead[i].age)"
-        system.requirements["nothing_forgotten"] = "always not radio_ahead[i].overrun"
+        system.judged.metrics["age"] = "max(radio_ahead[i].age)"
+        system.judged.requirements["nothing_forgotten"] = "always not radio_ahead[i].overrun"
     return system
 
 

@@ -69,7 +69,7 @@ class Ours:
         checked = check(system, self.workspace)
         slaves = {name: model.instantiate(name) for name, model in checked.models.items()}
         wiring = checked.wiring
-        self.master = Master(slaves, checked.order.sequence, wiring.links, wiring.starts, system.algorithm)
+        self.master = Master(slaves, checked.order.sequence, wiring.links, wiring.starts, system.stepping.algorithm)
         self.master.initialize(0.0, STOP)
         self.done = 0
 

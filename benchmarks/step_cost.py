@@ -38,8 +38,10 @@ Measured = tuple[float, list[float]]
 def ours(system: System, checked: Checked, steps: int, *, record: bool) -> Measured:
     """The step loop of this package, with every output recorded at every step or with none."""
     slaves = {name: model.instantiate(name) for name, model in checked.models.items()}
-    master = Master(slaves, checked.order.sequence, checked.wiring.links, checked.wiring.starts, system.algorithm)
-    master.initialize(0.0, system.stop_time)
+    master = Master(
+        slaves, checked.order.sequence, checked.wiring.links, checked.wiring.starts, system.stepping.algorithm
+    )
+    master.initialize(0.0, system.stepping.stop_time)
     recorder = Recorder(master.signals, master.kinds, None)
 
     def observe(_: int, rows: Rows) -> bool:
@@ -47,7 +49,7 @@ def ours(system: System, checked: Checked, steps: int, *, record: bool) -> Measu
         return True
 
     begin = time.process_time()
-    master.run(0.0, system.step, steps, 1 if record else steps, observe)
+    master.run(0.0, system.stepping.step, steps, 1 if record else steps, observe)
     seconds = time.process_time() - begin
     ends = [v for n, v in zip(master.signals, master.values, strict=True) if n.startswith("train") and "position" in n]
     for slave in slaves.values():
@@ -65,7 +67,7 @@ def plain(system: System, checked: Checked, steps: int) -> Measured:
             guid=face.guid, unzipDirectory=str(model.folder), modelIdentifier=face.identifier, instanceName=name
         )
         fmu.instantiate()
-        fmu.setupExperiment(startTime=0.0, stopTime=system.stop_time)
+        fmu.setupExperiment(startTime=0.0, stopTime=system.stepping.stop_time)
         for variable, value in checked.wiring.starts[name].items():
             setter = fmu.setReal if face.variables[variable].type == "Real" else fmu.setBoolean
             setter([face.variables[variable].reference], [value])
@@ -96,10 +98,10 @@ def plain(system: System, checked: Checked, steps: int) -> Measured:
         fmu.exitInitializationMode()
     begin = time.process_time()
     for k in range(steps):
-        now = k * system.step
+        now = k * system.stepping.step
         for name in order:
             put(name)
-            fmus[name].doStep(currentCommunicationPoint=now, communicationStepSize=system.step)
+            fmus[name].doStep(currentCommunicationPoint=now, communicationStepSize=system.stepping.step)
             get(name)
     seconds = time.process_time() - begin
     ends = [

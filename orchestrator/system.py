@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
-from typing import Any, Literal
+from dataclasses import dataclass, field, fields, replace
+from typing import Any, Literal, TypeVar
+
+from ..components.spelling import did_you_mean
 
 Loops = Literal["delay", "solve"]
 LOOPS: tuple[Loops, ...] = ("delay", "solve")
@@ -91,13 +93,15 @@ class Event:
 
 
 @dataclass
-class System:
-    """What is simulated and how.
+class Stepping:
+    """How a system is stepped.
 
     Attributes:
         stop_time: end in s.
         step: communication step in s.
+        start_time: begin in s.
         record: distance of recorded points in s; None records every step.
+        algorithm: the master's, by name.
         order: instance names in the order they step; empty derives it from direct feed-through.
         extrapolation: order of the polynomial by which inputs are continued over a step (0: held), for FMUs that can
             interpolate their inputs.
@@ -105,28 +109,13 @@ class System:
         tolerance: relative; of ``iterative`` for what is exchanged, of ``adaptive`` for the error of a step; None for
             the algorithm's default. tolerances: ``[relative, absolute]`` of single signals, by name.
         max_iterations, relaxation, acceleration: of ``iterative``. min_step: of ``adaptive``, s.
-        events: what happens on the way.
-        requirements, metrics: texts by name. published, figures: tables as the scenario has them.
-        preset: the preset in force (``default_preset`` for the file as it stands); None where that has no name.
-        presets: every name a preset may be asked for by. default_preset: the one that means the file as it stands.
-        modified: whether anything was changed beyond file and preset, so that published values are not judged.
-        rescaled_from: the step in s before `--step` changed it: every sample time equal to it follows the step.
-        name, path: of the scenario file. text: the scenario as read, for the record of the run.
-        origins: where things were written, for messages: by ``"train[1]"``, ``"train[1].speed"`` (a start value),
-            ``"instances.train[1].step"`` (an option of an instance), ``"simulation.step"``,
-            ``"simulation.tolerances.train[1].speed"``, ``"events[1]"``, ``"require.comfort"``, ``"metrics.settling"``,
-            ``"published[1]"``, ``"figures[1]"``.
     """
 
-    title: str = ""
-    source: str = ""
-    description: str = ""
     stop_time: float = 1.0
     step: float = 0.1
     start_time: float = 0.0
     record: float | None = None
     algorithm: str = "gauss-seidel"
-    seed: int = 0
     order: list[str] = field(default_factory=list)
     extrapolation: int = 0
     algebraic_loops: Loops = "delay"
@@ -136,13 +125,38 @@ class System:
     relaxation: float = 1.0
     acceleration: Acceleration = "anderson"
     min_step: float | None = None
-    events: list[Event] = field(default_factory=list)
-    instances: dict[str, Instance] = field(default_factory=dict)
-    connections: list[Connection] = field(default_factory=list)
+
+
+@dataclass
+class Judged:
+    """What is made of what is recorded: requirements and metrics by name, published values and figures as tables."""
+
     requirements: dict[str, str] = field(default_factory=dict)
     metrics: dict[str, str] = field(default_factory=dict)
     published: list[dict[str, Any]] = field(default_factory=list)
     figures: list[dict[str, Any]] = field(default_factory=list)
+
+
+@dataclass
+class Provenance:
+    """Where a system came from.
+
+    Attributes:
+        name, path: of the scenario file. text: the scenario as read, for the record of the run.
+        title, source, description: what it says of itself.
+        preset: the preset in force (``default_preset`` for the file as it stands); None where that has no name.
+        presets: every name a preset may be asked for by. default_preset: the one that means the file as it stands.
+        modified: whether anything was changed beyond file and preset, so that published values are not judged.
+        rescaled_from: the step in s before `--step` changed it: every sample time equal to it follows the step.
+        origins: where things were written, for messages: by ``"train[1]"``, ``"train[1].speed"`` (a start value),
+            ``"instances.train[1].step"`` (an option of an instance), ``"simulation.step"``,
+            ``"simulation.tolerances.train[1].speed"``, ``"events[1]"``, ``"require.comfort"``, ``"metrics.settling"``,
+            ``"published[1]"``, ``"figures[1]"``.
+    """
+
+    title: str = ""
+    source: str = ""
+    description: str = ""
     preset: str | None = None
     presets: tuple[str, ...] = field(default=(), compare=False)
     default_preset: str | None = field(default=None, compare=False)
@@ -152,6 +166,61 @@ class System:
     path: str = field(default="", compare=False)
     text: str = field(default="", compare=False, repr=False)
     origins: dict[str, str] = field(default_factory=dict, compare=False, repr=False)
+
+
+@dataclass(init=False)
+class System:
+    """What is simulated and how.
+
+    Attributes:
+        instances: by name. connections: between them. events: what happens on the way.
+        seed: of all noise.
+        stepping: how it is stepped. judged: what is made of the results. provenance: where it came from.
+
+    Args:
+        instances, connections, events, seed, stepping, judged, provenance: as above.
+        **values: fields of `Stepping`, `Judged` and `Provenance` by their names, in place of those given:
+            ``System(step=0.1, stop_time=60.0, metrics={"peak": "max(train.speed)"})``.
+
+    Raises:
+        TypeError: there is no such field.
+    """
+
+    instances: dict[str, Instance]
+    connections: list[Connection]
+    events: list[Event]
+    seed: int
+    stepping: Stepping
+    judged: Judged
+    provenance: Provenance
+
+    def __init__(
+        self,
+        *,
+        instances: dict[str, Instance] | None = None,
+        connections: list[Connection] | None = None,
+        events: list[Event] | None = None,
+        seed: int = 0,
+        stepping: Stepping | None = None,
+        judged: Judged | None = None,
+        provenance: Provenance | None = None,
+        **values: Any,
+    ) -> None:
+        self.instances = {} if instances is None else instances
+        self.connections = [] if connections is None else connections
+        self.events = [] if events is None else events
+        self.seed = seed
+        self.stepping = _changed(stepping or Stepping(), values)
+        self.judged = _changed(judged or Judged(), values)
+        self.provenance = _changed(provenance or Provenance(), values)
+        if values:
+            valid = [one.name for part in (Stepping, Judged, Provenance) for one in fields(part)]
+            name = next(iter(values))
+            raise TypeError(f"a system has no {name!r}{did_you_mean(name, valid)}")
+
+    def changed(self, **values: Any) -> System:
+        """A copy with other values of its fields, or of those of its parts: ``system.changed(step=0.05, seed=7)``."""
+        return System(**{one.name: getattr(self, one.name) for one in fields(self)} | values)
 
     def add(self, name: str, model: str, build: dict[str, Any] | None = None, **start: Any) -> Instance:
         """Add one instance.
@@ -173,3 +242,12 @@ class System:
     def connect(self, source: str, target: str, delay: int = 0, scale: float = 1.0, offset: float = 0.0) -> None:
         """Let an input follow an output; both are written ``"instance.variable"``."""
         self.connections.append(Connection(source, target, delay, scale, offset))
+
+
+_Part = TypeVar("_Part", Stepping, Judged, Provenance)
+
+
+def _changed(part: _Part, values: dict[str, Any]) -> _Part:
+    """A copy of the part with those of the values that are its fields, which are taken out."""
+    own = {one.name: values.pop(one.name) for one in fields(part) if one.name in values}
+    return replace(part, **own)

@@ -73,8 +73,8 @@ def compare(
         stop_time=stop,
         step=step,
     )
-    names = dict.fromkeys(system.name for system in systems.values())
-    metrics = {name: text for system in systems.values() for name, text in system.metrics.items()}
+    names = dict.fromkeys(system.provenance.name for system in systems.values())
+    metrics = {name: text for system in systems.values() for name, text in system.judged.metrics.items()}
     directory = output or Path("results") / "-".join(["compare", *names])
     comparison = compare_systems(
         systems,
@@ -138,7 +138,7 @@ def linearize(
     if duration is not None and not 0.0 < duration < float("inf"):
         raise typer.BadParameter("it must be a positive time in s.", param_hint="'--duration'")
     system = load_system(scenario, preset, settings, builds, swaps, step=step)
-    with show_progress(system.name, quiet, system.start_time) as progress:
+    with show_progress(system.provenance.name, quiet, system.stepping.start_time) as progress:
         model = linearize_system(
             system,
             at,
@@ -149,7 +149,7 @@ def linearize(
             progress=progress,
         )
     found, passings = stability(model), string_stability(model)
-    directory = output or Path("results") / "-".join(filter(None, (system.name, preset, "linear")))
+    directory = output or Path("results") / "-".join(filter(None, (system.provenance.name, preset, "linear")))
     directory.mkdir(parents=True, exist_ok=True)
     write_linear(directory, model, found, passings)
     figures = [] if no_figures else draw_linear(model, found, passings, directory, duration=duration)

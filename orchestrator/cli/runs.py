@@ -87,15 +87,17 @@ def run(
                 "--checkpoint-every, --no-figures and --quiet may stand with it"
             )
         point = read_checkpoint(resume_from)
-        with show_progress(point.system.name, quiet, point.system.start_time, point.time) as progress:
+        with show_progress(
+            point.system.provenance.name, quiet, point.system.stepping.start_time, point.time
+        ) as progress:
             outcome = go_on(resume_from, stop_time=stop, progress=progress, **how)
     else:
         if scenario is None:
             raise ScenarioError("name a scenario (see 'orchestrate list'), or a run to go on with by --resume DIR")
         system = load_system(scenario, preset, settings, builds, swaps, stop=stop, step=step, algorithm=algorithm)
         system = isolate(system, isolated or ())
-        directory = output or Path("results") / "-".join(filter(None, (system.name, preset)))
-        with show_progress(system.name, quiet, system.start_time) as progress:
+        directory = output or Path("results") / "-".join(filter(None, (system.provenance.name, preset)))
+        with show_progress(system.provenance.name, quiet, system.stepping.start_time) as progress:
             outcome = execute(system, kind=kind.value, output=directory, progress=progress, **how)
     second = _at_half_the_step(outcome, kind, quiet) if verify_step else None
     show_run(outcome, second, quiet)
@@ -110,7 +112,7 @@ def _at_half_the_step(outcome: Run, kind: KindName, quiet: bool) -> Run | None:
     if outcome.status != "completed":
         return None
     system = outcome.system
-    with show_progress(f"{system.name} at half the step", quiet, system.start_time) as progress:
+    with show_progress(f"{system.provenance.name} at half the step", quiet, system.stepping.start_time) as progress:
         return execute(at_half_the_step(system), kind=kind.value, progress=progress)
 
 
@@ -135,7 +137,7 @@ def reproduce(
     groups: dict[str, list[PublishedRow]] = {}
     for case in published_cases(paper):
         title = case.command.removeprefix("orchestrate run ")
-        with show_progress(title, quiet, case.system.start_time) as progress:
+        with show_progress(title, quiet, case.system.stepping.start_time) as progress:
             outcome = execute(case.system, kind=kind.value, progress=progress)
         if outcome.error is not None:
             raise outcome.error

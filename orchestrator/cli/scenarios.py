@@ -20,7 +20,7 @@ def list_all() -> None:
     say(out, "Scenarios (orchestrate run NAME)", "bold")
     for name, title in shipped():
         say(out, f"  {name}: {title}")
-        presets = load(name).presets
+        presets = load(name).provenance.presets
         if presets:
             say(out, f"      presets: {', '.join(presets)}", "dim")
     say(out, "Components (orchestrate describe NAME)", "bold")
@@ -45,9 +45,9 @@ def check(
     out = open_console()
     with Workspace() as workspace:
         checked = check_system(system, workspace)
-    say(out, system.title or system.name, "bold")
+    say(out, system.provenance.title or system.provenance.name, "bold")
     connections = len(checked.wiring.links)
-    facts = f"{len(system.instances)} instances, {connections} scalar connections, step {system.step:g} s"
+    facts = f"{len(system.instances)} instances, {connections} scalar connections, step {system.stepping.step:g} s"
     say(out, facts, "dim")
     for line in describe_stepping(checked):
         say(out, line)

@@ -31,11 +31,11 @@ def published_cases(paper: str | None = None) -> list[Case]:
     found = []
     for name in names:
         base = load(name)
-        if not base.published or (paper is not None and not _matches(paper, name, base.source)):
+        if not base.judged.published or (paper is not None and not _matches(paper, name, base.provenance.source)):
             continue
-        presets = dict.fromkeys(entry.get("preset", base.default_preset) for entry in base.published)
+        presets = dict.fromkeys(entry.get("preset", base.provenance.default_preset) for entry in base.judged.published)
         for preset in presets:
-            plain = preset is None or preset == base.default_preset
+            plain = preset is None or preset == base.provenance.default_preset
             command = f"orchestrate run {name}" + ("" if plain else f" --preset {preset}")
             found.append(Case(load(name, preset=preset), command))
     if not found:

@@ -153,13 +153,15 @@ def variants(
     bases = [load(scenario, **common) for scenario in scenarios]
     several = len(dict.fromkeys(scenarios)) > 1
     for scenario, base in dict(zip(scenarios, bases, strict=True)).items():
-        title = base.name if [b.name for b in bases].count(base.name) == 1 else scenario
-        start = title if several else base.default_preset or "as it stands"
+        title = (
+            base.provenance.name if [b.provenance.name for b in bases].count(base.provenance.name) == 1 else scenario
+        )
+        start = title if several else base.provenance.default_preset or "as it stands"
         found[start] = base
         for preset in presets:
-            if preset in base.presets or len(bases) == 1:
+            if preset in base.provenance.presets or len(bases) == 1:
                 owners.add(preset)
-                if preset != base.default_preset:
+                if preset != base.provenance.default_preset:
                     found[f"{title} {preset}" if several else preset] = load(scenario, preset=preset, **common)
         for swap in swaps:
             parts = [part.strip() for part in re.split(r",(?=[^,]*=)", swap)]
@@ -225,7 +227,7 @@ def compare(
 
 
 def _run(variant: Variant, kind: Kind, progress: OnProgress | None) -> None:
-    start = variant.system.start_time
+    start = variant.system.stepping.start_time
     with progress(variant.name, start) if progress else nullcontext() as told:
         try:
             variant.run = execute(variant.system, kind=kind, output=variant.directory, figures=False, progress=told)
@@ -263,7 +265,7 @@ def _rows(columns: Sequence[Variant], directions: Mapping[str, Better]) -> list[
 def _draw(comparison: Comparison, directory: Path) -> list[Path]:
     done = {v.name: v.run.results for v in comparison.variants if v.run and len(v.run.results)}
     first = next((v.run for v in comparison.variants if v.run and len(v.run.results)), None)
-    return draw_compared(first.system.figures, done, directory) if first else []
+    return draw_compared(first.system.judged.figures, done, directory) if first else []
 
 
 # -------------------------------------------------------------------- files
@@ -275,9 +277,9 @@ def write_json(comparison: Comparison, path: Path) -> None:
         "variants": [
             {
                 "name": v.name,
-                "scenario": v.system.name,
-                "preset": v.system.preset,
-                "modified": v.system.modified,
+                "scenario": v.system.provenance.name,
+                "preset": v.system.provenance.preset,
+                "modified": v.system.provenance.modified,
                 "status": v.status,
                 "error": v.error,
                 "results": v.directory.name if v.directory else None,

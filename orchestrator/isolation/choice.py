@@ -69,7 +69,7 @@ def check_isolation(system: System) -> list[Problem]:
     for instance in system.instances.values():
         for key in ("step_timeout", "memory_limit"):
             value = getattr(instance, key)
-            origin = system.origins.get(f"instances.{instance.name}.{key}", instance.origin)
+            origin = system.provenance.origins.get(f"instances.{instance.name}.{key}", instance.origin)
             if value is not None and not instance.isolate:
                 useless.setdefault((origin, key), []).append(instance.name)
             elif value is not None and not 0.0 < value < math.inf:

@@ -11,7 +11,7 @@ from __future__ import annotations
 import importlib
 import re
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Any
 
 import networkx as nx
@@ -98,21 +98,21 @@ def linearize(
         ScenarioError: the system cannot run, or a model can be linearized in no way.
         FmuError: a model failed.
     """
-    steps = (at - system.start_time) / system.step
+    steps = (at - system.stepping.start_time) / system.stepping.step
     if not 0.0 <= steps < np.inf or abs(steps - round(steps)) > 1e-6:
         raise ScenarioError(
             f"the time to linearize at, {at:g} s, is no communication point: take a whole number of steps of "
-            f"{system.step:g} s from {system.start_time:g} s on"
+            f"{system.stepping.step:g} s from {system.stepping.start_time:g} s on"
         )
     nothing: dict[str, Any] = {"metrics": {}, "requirements": {}, "published": [], "figures": []}
     # The step that is differentiated may end after the scenario's own stop time.
-    stop = max(system.stop_time, system.start_time + (round(steps) + 2) * system.step)
-    system = replace(system, **nothing, stop_time=stop, record=None)
+    stop = max(system.stepping.stop_time, system.stepping.start_time + (round(steps) + 2) * system.stepping.step)
+    system = system.changed(**nothing, stop_time=stop, record=None)
     with Workspace() as workspace:
         try:
             checked = check(system, workspace, kind)
             with assembled(checked) as master:
-                master.initialize(system.start_time, stop)
+                master.initialize(system.stepping.start_time, stop)
                 _advance(master, system, round(steps), progress)
                 return Loop(system, checked, master, inputs, outputs).linearize(sampled)
         finally:
@@ -124,11 +124,11 @@ def _advance(master: Master, system: System, count: int, progress: Progress | No
 
     def observe(k: int, _: Any) -> bool:
         if progress is not None and count:
-            progress(master.time, system.start_time + count * system.step)
+            progress(master.time, system.stepping.start_time + count * system.stepping.step)
         return True
 
     if count:
-        master.run(system.start_time, system.step, count, every, observe)
+        master.run(system.stepping.start_time, system.stepping.step, count, every, observe)
 
 
 class Loop:
@@ -282,11 +282,11 @@ class Loop:
         steps = [(op, name) for batch in algorithm.batches() for op in batch.operations for name in batch.names]
         matrices, states = Composition(self, self._step_models(steps), steps).result()
         self.master.values[:] = known
-        return self._result(matrices, states, self.system.step)
+        return self._result(matrices, states, self.system.stepping.step)
 
     def _step_models(self, steps: Sequence[tuple[Operation, str]]) -> dict[str, Stepped]:
         """Of each block that of a step at the values at which the master would take it."""
-        exchange, models, length = self.master.exchange, {}, self.system.step
+        exchange, models, length = self.master.exchange, {}, self.system.stepping.step
         for operation, name in steps:
             if operation == Operation.SET:
                 exchange.write(name, self.time)

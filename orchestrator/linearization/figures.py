@@ -45,7 +45,7 @@ def draw_linear(
     Returns:
         The files.
     """
-    title = f"{model.system.title or model.system.name}\nLinear at t = {model.time:g} s"
+    title = f"{model.system.provenance.title or model.system.provenance.name}\nLinear at t = {model.time:g} s"
     paths = [_poles(stability, title, directory / "eigenvalues.png")]
     if not model.inputs:
         return paths

@@ -27,9 +27,9 @@ def write_linear(directory: Path, model: Linearization, stability: Stability, pa
     """
     system = model.system
     content = {
-        "scenario": system.name,
-        "preset": system.preset,
-        "modified": system.modified,
+        "scenario": system.provenance.name,
+        "preset": system.provenance.preset,
+        "modified": system.provenance.modified,
         "time": model.time,
         "step": model.step,
         "states": model.states,

@@ -19,27 +19,27 @@ def check_coupling(system: System, interfaces: Mapping[str, Interface], wiring: 
     return [
         *_check_rates(system),
         *_check_tolerances(system, interfaces),
-        *ALGORITHMS[system.algorithm].fit(system, interfaces, wiring).problems,
+        *ALGORITHMS[system.stepping.algorithm].fit(system, interfaces, wiring).problems,
     ]
 
 
 def _check_rates(system: System) -> Iterable[Problem]:
-    duration = system.stop_time - system.start_time
+    duration = system.stepping.stop_time - system.stepping.start_time
     for instance in system.instances.values():
-        if instance.step is None or instance.step == system.step:
+        if instance.step is None or instance.step == system.stepping.step:
             continue
         name = SignalName(instance.name)
         limit = ""
-        if not ALGORITHMS[system.algorithm].takes_own_steps:
+        if not ALGORITHMS[system.stepping.algorithm].takes_own_steps:
             able = " and ".join(name for name, one in ALGORITHMS.items() if one.takes_own_steps)
             limit = f"which goes with {able} only"
-        elif system.algebraic_loops == "solve":
+        elif system.stepping.algebraic_loops == "solve":
             limit = "with which algebraic_loops = 'solve' does not go"
         if limit:
             yield Problem(instance.origin, f"{name} has a step of its own, {limit}", names=(name,))
         own = f"its step = {instance.step:g} s"
-        if not _is_multiple(instance.step, system.step):
-            own = f"{own} is not a whole multiple of the system's, {system.step:g} s"
+        if not _is_multiple(instance.step, system.stepping.step):
+            own = f"{own} is not a whole multiple of the system's, {system.stepping.step:g} s"
         elif not _is_multiple(duration, instance.step):
             own = f"{own} does not divide the run of {duration:g} s into whole steps"
         else:
@@ -58,21 +58,21 @@ def _check_tolerances(system: System, interfaces: Mapping[str, Interface]) -> It
         for name, interface in interfaces.items()
         for variable in (*(v.name for v in interface.of("output") if v.type == "Real"), *interface.arrays)
     }
-    for signal in system.tolerances:
+    for signal in system.stepping.tolerances:
         if signal not in known:
             wrong, near = f"{signal!r} is no Real output", suggestion(signal, known)
             problem = Problem("simulation.tolerances", wrong, near, (SignalName.parse(signal),))
-            yield problem.at(system.origins.get(f"simulation.tolerances.{signal}", ""))
-    if system.min_step is not None and not ALGORITHMS[system.algorithm].varies_step:
+            yield problem.at(system.provenance.origins.get(f"simulation.tolerances.{signal}", ""))
+    if system.stepping.min_step is not None and not ALGORITHMS[system.stepping.algorithm].varies_step:
         able = " and ".join(name for name, one in ALGORITHMS.items() if one.varies_step)
-        yield Problem("", f"simulation.min_step is for {able}", f"the algorithm is {system.algorithm}")
+        yield Problem("", f"simulation.min_step is for {able}", f"the algorithm is {system.stepping.algorithm}")
 
 
 def describe_coupling(system: System, interfaces: Mapping[str, Interface], wiring: Wiring) -> list[str]:
     """What a user should know of the coupling though it is no error: loops, and inputs that are held all the same."""
-    notes, algorithm = [], ALGORITHMS[system.algorithm]
+    notes, algorithm = [], ALGORITHMS[system.stepping.algorithm]
     for loop in find_loops(interfaces, wiring.links):
-        if system.algebraic_loops == "solve":
+        if system.stepping.algebraic_loops == "solve":
             how = "it is solved at each communication point"
         elif algorithm.solves_loops:
             how = "it is solved by the iterations"
@@ -83,7 +83,7 @@ def describe_coupling(system: System, interfaces: Mapping[str, Interface], wirin
             )
         notes.append(f"algebraic loop through {listed(loop)}: {how}")
     notes += algorithm.fit(system, interfaces, wiring).notes
-    if system.extrapolation:
+    if system.stepping.extrapolation:
         held = [n for n, x in interfaces.items() if any(link.target[0] == n for link in wiring.links)]
         held = [n for n in held if not interfaces[n].interpolates_inputs]
         if held:

@@ -51,7 +51,7 @@ class Coupling:
         if is_of_end:
             parted |= {name for name, interface in self.interfaces.items() if interface.sampled}
         self.exchange = Exchange(slaves, links, sweeping=is_sweeping, parted=parted)
-        order = settings.extrapolation
+        order = settings.stepping.extrapolation
         self.extrapolator = Extrapolator(self.exchange, links, order, ended=is_of_end) if order else None
         self.loops: LoopSolver | None = None
         self.steps = 0
@@ -89,12 +89,12 @@ class Coupling:
 
     def tolerances(self, default: float) -> list[tuple[float, float]]:
         """Relative and absolute tolerance of each value; `default` is relative, for a system that gives none."""
-        given = self.settings.tolerance
+        given = self.settings.stepping.tolerance
         tolerance = default if given is None else given
         found = []
         for (instance, name), signal in zip(self.exchange.places, self.exchange.signals, strict=True):
             nominal = self.interfaces[instance].variables[name].nominal
-            ways = self.settings.tolerances
+            ways = self.settings.stepping.tolerances
             array = f"{instance}.{name.rpartition('[')[0]}"
             own = ways.get(signal) or ways.get(array) or (tolerance, tolerance * abs(nominal or 1.0))
             found.append((float(own[0]), float(own[1])))

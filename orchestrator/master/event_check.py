@@ -102,7 +102,7 @@ def _typed(value: Any, variable: Variable) -> None:
 def _step(system: System, instance: str, variable: Variable) -> float:
     """Distance in s of the points at which a change of a variable is felt."""
     own = system.instances[instance].step if variable.causality == "input" else None
-    return 0.0 if ALGORITHMS[system.algorithm].varies_step else own or system.step
+    return 0.0 if ALGORITHMS[system.stepping.algorithm].varies_step else own or system.stepping.step
 
 
 def _wrong_times(event: Event, step: float) -> Iterator[Problem]:

@@ -117,7 +117,7 @@ class Master:
         for slave in self.slaves.values():
             self.exchange.read_finite(slave, start_time)
         coupling, settings = self.coupling, self.coupling.settings
-        if settings.algebraic_loops == "solve":
+        if settings.stepping.algebraic_loops == "solve":
             coupling.loops = self._make_loop_solver(unsettled)
         if settings.events:
             self._schedule = Schedule(settings.events, self.exchange, start_time, settings.rates)

@@ -1,30 +1,25 @@
-"""How a master couples, out of what a system says of it."""
+"""What a master is told of a system beside its instances and connections."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 
-from ..system import Acceleration, Event, Loops, System
+from ..system import Event, Stepping, System
 
 
 @dataclass(frozen=True)
 class Settings:
-    """How a master couples, as `System` describes it.
+    """How a master couples.
 
     Attributes:
+        stepping: as the system says it.
         rates: how many communication steps an instance takes at once, by name, where that is not one.
-        threads: how many threads step instances in parallel (``jacobi`` in the compiled loop).
+        events: what happens on the way.
+        threads: how many threads step instances in parallel, where the algorithm and the compiled loop can.
     """
 
-    extrapolation: int = 0
-    algebraic_loops: Loops = "delay"
-    tolerance: float | None = None
-    tolerances: Mapping[str, Sequence[float]] = field(default_factory=dict)
-    max_iterations: int = 50
-    relaxation: float = 1.0
-    acceleration: Acceleration = "anderson"
-    min_step: float | None = None
+    stepping: Stepping = field(default_factory=Stepping)
     rates: Mapping[str, int] = field(default_factory=dict)
     events: Sequence[Event] = ()
     threads: int = 1
@@ -32,20 +27,10 @@ class Settings:
     @classmethod
     def of(cls, system: System, threads: int = 1) -> Settings:
         """Those of a system."""
-        own = {name: round(x.step / system.step) for name, x in system.instances.items() if x.step is not None}
-        return cls(
-            extrapolation=system.extrapolation,
-            algebraic_loops=system.algebraic_loops,
-            tolerance=system.tolerance,
-            tolerances=system.tolerances,
-            max_iterations=system.max_iterations,
-            relaxation=system.relaxation,
-            acceleration=system.acceleration,
-            min_step=system.min_step,
-            rates={name: rate for name, rate in own.items() if rate > 1},
-            events=system.events,
-            threads=threads,
-        )
+        step = system.stepping.step
+        own = {name: round(x.step / step) for name, x in system.instances.items() if x.step is not None}
+        rates = {name: rate for name, rate in own.items() if rate > 1}
+        return cls(system.stepping, rates, system.events, threads)
 
 
 DEFAULT = Settings()

@@ -107,11 +107,14 @@ def _chosen(platforms: Sequence[str]) -> tuple[str, ...]:
 def _refused(system: System, checked: Checked, platforms: Sequence[str]) -> list[Problem]:
     problems = [problem for link in checked.wiring.links for problem in _refused_link(link)]
     lost = {
-        f"algorithm = {system.algorithm}": not issubclass(ALGORITHMS[system.algorithm], Explicit),
-        f"extrapolation = {system.extrapolation}": bool(system.extrapolation),
-        "algebraic_loops = solve": system.algebraic_loops == "solve",
+        f"algorithm = {system.stepping.algorithm}": not issubclass(ALGORITHMS[system.stepping.algorithm], Explicit),
+        f"extrapolation = {system.stepping.extrapolation}": bool(system.stepping.extrapolation),
+        "algebraic_loops = solve": system.stepping.algebraic_loops == "solve",
         "[[events]]": bool(system.events),
-        **{f"{name}: a step of its own": x.step not in (None, system.step) for name, x in system.instances.items()},
+        **{
+            f"{name}: a step of its own": x.step not in (None, system.stepping.step)
+            for name, x in system.instances.items()
+        },
     }
     why = "cannot be packed: a container has one step, and holds values"
     problems += [Problem("", f"{what} {why}") for what in lost if lost[what]]
@@ -184,7 +187,7 @@ def _container(
         raise RailcosimError(
             "packing needs fmu-manipulation-toolbox: pip install fmu-manipulation-toolbox (extra 'railcosim[pack]')"
         ) from error
-    sequential = ALGORITHMS[system.algorithm].in_order
+    sequential = ALGORITHMS[system.stepping.algorithm].in_order
     try:
         with _silent():
             container = FMUContainer(_LIBRARY, folder)
@@ -201,9 +204,11 @@ def _container(
                     container.add_output(shown.instance, shown.variable.name, _alias(k))
                 else:
                     container.add_input(_alias(k), shown.instance, shown.variable.name)
-            container.make_fmu(f"{_LIBRARY}.fmu", step_size=system.step, sequential=sequential)
+            container.make_fmu(f"{_LIBRARY}.fmu", step_size=system.stepping.step, sequential=sequential)
     except FMUContainerError as error:
-        raise RailcosimError(f"fmu-manipulation-toolbox cannot pack {system.name}: {error.reason}") from error
+        raise RailcosimError(
+            f"fmu-manipulation-toolbox cannot pack {system.provenance.name}: {error.reason}"
+        ) from error
     with zipfile.ZipFile(folder / f"{_LIBRARY}.fmu") as made:
         archive = {entry: made.read(entry) for entry in made.namelist() if not entry.endswith("/")}
     return archive, _references(archive.pop("modelDescription.xml"), len(exposed))
@@ -245,7 +250,9 @@ def _identifier(path: Path) -> str:
 
 
 def _digest(archive: Mapping[str, bytes], exposed: Sequence[Exposed], system: System) -> str:
-    hashed = hashlib.sha256(f"{system.name} {system.preset} {[shown.name for shown in exposed]}".encode())
+    hashed = hashlib.sha256(
+        f"{system.provenance.name} {system.provenance.preset} {[shown.name for shown in exposed]}".encode()
+    )
     for name in sorted(archive):
         hashed.update(f"\n{name} {hashlib.sha256(archive[name]).hexdigest()}".encode())
     return hashed.hexdigest()
@@ -253,8 +260,8 @@ def _digest(archive: Mapping[str, bytes], exposed: Sequence[Exposed], system: Sy
 
 def _notes(system: System, checked: Checked) -> Iterator[str]:
     yield from checked.notes
-    if not ALGORITHMS[system.algorithm].is_sweeping:
+    if not ALGORITHMS[system.stepping.algorithm].is_sweeping:
         late = {f"{link.source[0]}.{link.source[1]}" for link in checked.wiring.links if link.direct}
         if late:
             names = ", ".join(sorted(late))
-            yield f"{system.algorithm}: {names} pass directly through their models and act one step late"
+            yield f"{system.stepping.algorithm}: {names} pass directly through their models and act one step late"

@@ -34,7 +34,7 @@ def describe(system: System, checked: Checked, exposed: Mapping[Exposed, int], n
         fmiVersion="2.0",
         modelName=name,
         guid="{" + digest[:32] + "}",
-        description=system.title or system.name,
+        description=system.provenance.title or system.provenance.name,
         version=digest[:12],
         generationTool=(
             f"railcosim {importlib.metadata.version('railcosim')}, "
@@ -58,13 +58,18 @@ def describe(system: System, checked: Checked, exposed: Mapping[Exposed, int], n
     etree.SubElement(
         root,
         "DefaultExperiment",
-        startTime=repr(float(system.start_time)),
-        stopTime=repr(float(system.stop_time)),
-        stepSize=repr(float(system.step)),
+        startTime=repr(float(system.stepping.start_time)),
+        stopTime=repr(float(system.stepping.stop_time)),
+        stepSize=repr(float(system.stepping.step)),
     )
     tool = etree.SubElement(etree.SubElement(root, "VendorAnnotations"), "Tool", name="railcosim")
     etree.SubElement(
-        tool, "pack", scenario=system.name, preset=system.preset or "", algorithm=system.algorithm, digest=digest
+        tool,
+        "pack",
+        scenario=system.provenance.name,
+        preset=system.provenance.preset or "",
+        algorithm=system.stepping.algorithm,
+        digest=digest,
     )
     _variables(root, checked, exposed, units)
     return bytes(etree.tostring(root, xml_declaration=True, encoding="UTF-8", pretty_print=True))
@@ -149,14 +154,15 @@ def page(system: System, checked: Checked, exposed: Sequence[Exposed]) -> str:
     )
     how = (
         f"in the order {', '.join(checked.order.sequence)}, each with what the others gave last"
-        if ALGORITHMS[system.algorithm].in_order
+        if ALGORITHMS[system.stepping.algorithm].in_order
         else "all at once; what passes directly through a model acts one step late"
     )
+    came, step = system.provenance, system.stepping.step
     return (
-        f'<!DOCTYPE html><html lang="en"><head><meta charset="utf-8"><title>{html.escape(system.name)}</title></head>'
-        f"<body><h1>{html.escape(system.title or system.name)}</h1><p>{html.escape(system.description)}</p>"
-        f"<p>Preset: {html.escape(system.preset or 'none')}{', modified' if system.modified else ''}. "
-        f"{html.escape(system.algorithm)}: the models step every {system.step:g} s, {html.escape(how)}. "
+        f'<!DOCTYPE html><html lang="en"><head><meta charset="utf-8"><title>{html.escape(came.name)}</title></head>'
+        f"<body><h1>{html.escape(came.title or came.name)}</h1><p>{html.escape(came.description)}</p>"
+        f"<p>Preset: {html.escape(came.preset or 'none')}{', modified' if came.modified else ''}. "
+        f"{html.escape(system.stepping.algorithm)}: the models step every {step:g} s, {html.escape(how)}. "
         f"The importing tool's step is a whole multiple of that.</p>"
         f"<h2>Models</h2><table><tr><th>instance</th><th>model</th><th>digest</th></tr>{instances}</table>"
         f"<h2>Variables</h2><table><tr><th>name</th><th>causality</th><th>unit</th><th>description</th></tr>{shown}"

@@ -32,7 +32,7 @@ def assembled(checked: Checked, *, threads: int = 1) -> Iterator[Master]:
             checked.order.sequence,
             wiring.links,
             wiring.starts,
-            system.algorithm,
+            system.stepping.algorithm,
             settings=Settings.of(system, threads),
         )
     finally:

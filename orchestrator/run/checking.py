@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections import Counter
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 from ..errors import ScenarioError
 from ..evaluation import check_metrics, check_published, check_requirements, metric_indices, split_metric
@@ -46,7 +46,7 @@ def check(system: System, workspace: Workspace, kind: Kind = "auto") -> Checked:
         ScenarioError: with every problem found, each naming its place and the remedy.
     """
     problems = _check_simulation(system)
-    if system.algorithm not in ALGORITHMS:  # nothing more can be said of it
+    if system.stepping.algorithm not in ALGORITHMS:  # nothing more can be said of it
         raise ScenarioError(problems)
     try:
         models = load_models(system, workspace, kind)
@@ -57,20 +57,25 @@ def check(system: System, workspace: Workspace, kind: Kind = "auto") -> Checked:
     problems += wiring.problems
     problems += check_isolation(system) + check_once_per_process(system, interfaces)
     names = signal_names(interfaces, wiring)
-    every_step = system.record is None or abs(system.record - system.step) < 1e-9 * system.step
-    every_step &= not ALGORITHMS[system.algorithm].varies_step
+    every_step = (
+        system.stepping.record is None
+        or abs(system.stepping.record - system.stepping.step) < 1e-9 * system.stepping.step
+    )
+    every_step &= not ALGORITHMS[system.stepping.algorithm].varies_step
     system, left_out = _without_the_missing(system, interfaces, names, every_step)
     problems += check_events(system, interfaces, wiring)
     problems += check_coupling(system, interfaces, wiring)
-    problems += check_requirements(system.requirements, names, every_step)
-    found = check_metrics(system.metrics, names, every_step)
+    problems += check_requirements(system.judged.requirements, names, every_step)
+    found = check_metrics(system.judged.metrics, names, every_step)
     problems += found
     if not found:
-        problems += check_published(system.published, metric_indices(system.metrics, names), system.presets)
-    problems += check_figures(system.figures, names, every_step)
+        problems += check_published(
+            system.judged.published, metric_indices(system.judged.metrics, names), system.provenance.presets
+        )
+    problems += check_figures(system.judged.figures, names, every_step)
     if problems:
         raise ScenarioError(problems)
-    order = derive_order(list(system.instances), wiring.links, system.order)
+    order = derive_order(list(system.instances), wiring.links, system.stepping.order)
     return Checked(system, models, wiring, order, (*left_out, *_notes(system, models, wiring, order)))
 
 
@@ -83,25 +88,26 @@ def _without_the_missing(
     """
     if not any(instance.swapped for instance in system.instances.values()):
         return system, []
-    requirements = {k: v for k, v in system.requirements.items() if not check_requirements({k: v}, names, every_step)}
-    metrics = {k: v for k, v in system.metrics.items() if not check_metrics({k: v}, names, every_step)}
-    figures = [figure for figure in system.figures if not check_figures([figure], names, every_step)]
-    published = [entry for entry in system.published if split_metric(str(entry.get("metric")))[0] in metrics]
-    lost = {event.signal for event in system.events} | set(system.tolerances)
+    requirements = {
+        k: v for k, v in system.judged.requirements.items() if not check_requirements({k: v}, names, every_step)
+    }
+    metrics = {k: v for k, v in system.judged.metrics.items() if not check_metrics({k: v}, names, every_step)}
+    figures = [figure for figure in system.judged.figures if not check_figures([figure], names, every_step)]
+    published = [entry for entry in system.judged.published if split_metric(str(entry.get("metric")))[0] in metrics]
+    lost = {event.signal for event in system.events} | set(system.stepping.tolerances)
     lost -= {signal for signal in lost if _is_there(signal, interfaces)}
-    gone = [f"requirement {name!r}" for name in system.requirements if name not in requirements]
-    gone += [f"metric {name!r}" for name in system.metrics if name not in metrics]
-    gone += [f"figure {figure.get('title')!r}" for figure in system.figures if figure not in figures]
+    gone = [f"requirement {name!r}" for name in system.judged.requirements if name not in requirements]
+    gone += [f"metric {name!r}" for name in system.judged.metrics if name not in metrics]
+    gone += [f"figure {figure.get('title')!r}" for figure in system.judged.figures if figure not in figures]
     gone += [f"event or tolerance of {signal!r}" for signal in sorted(lost)]
     notes = [f"left out, because the swapped model lacks what they speak of: {', '.join(gone)}"] if gone else []
-    kept = replace(
-        system,
+    kept = system.changed(
         requirements=requirements,
         metrics=metrics,
         figures=figures,
         published=published,
         events=[event for event in system.events if event.signal not in lost],
-        tolerances={signal: value for signal, value in system.tolerances.items() if signal not in lost},
+        tolerances={signal: value for signal, value in system.stepping.tolerances.items() if signal not in lost},
     )
     return kept, notes
 
@@ -126,14 +132,14 @@ def _check_simulation(system: System) -> list[Problem]:
     problems = []
     if not system.instances:
         problems.append(Problem("", "the system has no instances"))
-    if system.algorithm not in ALGORITHMS:
-        near = suggestion(system.algorithm, ALGORITHMS)
-        problems.append(Problem("", f"algorithm {system.algorithm!r} is unknown", near))
+    if system.stepping.algorithm not in ALGORITHMS:
+        near = suggestion(system.stepping.algorithm, ALGORITHMS)
+        problems.append(Problem("", f"algorithm {system.stepping.algorithm!r} is unknown", near))
     problems += [Problem("", message) for message in _check_times(system)]
-    if system.order:
-        missing = [name for name in system.instances if name not in system.order]
-        unknown = [name for name in system.order if name not in system.instances]
-        twice = [name for name, times in Counter(system.order).items() if times > 1]
+    if system.stepping.order:
+        missing = [name for name in system.instances if name not in system.stepping.order]
+        unknown = [name for name in system.stepping.order if name not in system.instances]
+        twice = [name for name, times in Counter(system.stepping.order).items() if times > 1]
         for name in unknown:
             near = suggestion(name, system.instances)
             problems.append(Problem("order", f"there is no instance {name!r}", near, (SignalName(name),)))
@@ -144,24 +150,26 @@ def _check_simulation(system: System) -> list[Problem]:
 
 def _check_times(system: System) -> list[str]:
     """What is wrong with step, end and rows, a sentence each."""
-    if not 0.0 < system.step < math.inf:
-        return [f"step must be a positive number, not {system.step!r} s"]
-    if not 0.0 < system.stop_time - system.start_time < math.inf:
-        return [f"stop_time {system.stop_time!r} s must lie after start_time {system.start_time!r} s"]
+    if not 0.0 < system.stepping.step < math.inf:
+        return [f"step must be a positive number, not {system.stepping.step!r} s"]
+    if not 0.0 < system.stepping.stop_time - system.stepping.start_time < math.inf:
+        return [f"stop_time {system.stepping.stop_time!r} s must lie after start_time {system.stepping.start_time!r} s"]
     if (
-        system.algorithm in ALGORITHMS and ALGORITHMS[system.algorithm].varies_step
+        system.stepping.algorithm in ALGORITHMS and ALGORITHMS[system.stepping.algorithm].varies_step
     ):  # which lands wherever it is told to
-        wrong = system.record is not None and not 0.0 < system.record < math.inf
-        return [f"record must be a positive number, not {system.record!r} s"] if wrong else []
-    record = system.step if system.record is None else system.record
-    duration = "stop_time - start_time" if system.start_time else "stop_time"
+        wrong = system.stepping.record is not None and not 0.0 < system.stepping.record < math.inf
+        return [f"record must be a positive number, not {system.stepping.record!r} s"] if wrong else []
+    record = system.stepping.step if system.stepping.record is None else system.stepping.record
+    duration = "stop_time - start_time" if system.stepping.start_time else "stop_time"
     problems = []
-    for name, length in ((duration, system.stop_time - system.start_time), ("record", record)):
-        count = length / system.step
+    for name, length in ((duration, system.stepping.stop_time - system.stepping.start_time), ("record", record)):
+        count = length / system.stepping.step
         if count >= _MOST_STEPS:
-            problems.append(f"{name} = {length:g} s is {count:.3g} steps of {system.step:g} s: too many to count")
+            problems.append(
+                f"{name} = {length:g} s is {count:.3g} steps of {system.stepping.step:g} s: too many to count"
+            )
         elif not count > 0.5 or abs(count - round(count)) > 1e-6:
-            problems.append(f"{name} = {length:g} s is not a whole multiple of step = {system.step:g} s")
+            problems.append(f"{name} = {length:g} s is not a whole multiple of step = {system.stepping.step:g} s")
     return problems
 
 
@@ -169,7 +177,7 @@ def describe_stepping(checked: Checked) -> list[str]:
     """How a run would step, a line each."""
     system = checked.system
     interfaces = {name: model.interface for name, model in checked.models.items()}
-    algorithm = ALGORITHMS[system.algorithm]
+    algorithm = ALGORITHMS[system.stepping.algorithm]
     steps = [f"steps in the order: {', '.join(checked.order.sequence)}"] if algorithm.in_order else []
     lines = [f"{algorithm.name} {line}" for line in (*steps, *algorithm.fit(system, interfaces, checked.wiring).steps)]
     for instance in system.instances.values():
@@ -194,6 +202,6 @@ def _notes(system: System, models: Mapping[str, Model], wiring: Wiring, order: O
             notes[f"{model} says that it needs the tool it was made with ({interface.generator or 'unnamed'})"] = None
     notes.update(dict.fromkeys(isolation_notes(system, models)))
     notes.update(dict.fromkeys(describe_coupling(system, interfaces, wiring)))
-    if ALGORITHMS[system.algorithm].in_order:
+    if ALGORITHMS[system.stepping.algorithm].in_order:
         notes.update(dict.fromkeys(order.late))
     return list(notes)

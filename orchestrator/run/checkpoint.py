@@ -21,7 +21,7 @@ import numpy as np
 from ..errors import RailcosimError, ScenarioError
 from ..fmi import Kind, Model
 from ..master import Master
-from ..system import Connection, Event, Instance, System
+from ..system import Connection, Event, Instance, Judged, Provenance, Stepping, System
 
 CHECKPOINT_FILE = "checkpoint.zip"
 _FORMAT = 1
@@ -211,4 +211,6 @@ def _system(data: dict[str, Any]) -> System:
     connections = [Connection(**entry) for entry in data.pop("connections")]
     events = [Event(**entry) for entry in data.pop("events")]
     data["presets"] = tuple(data["presets"])
-    return System(**data, instances=instances, connections=connections, events=events)
+    parts = {"stepping": Stepping, "judged": Judged, "provenance": Provenance}
+    made = {name: part(**data.pop(name)) for name, part in parts.items()}
+    return System(**data, **made, instances=instances, connections=connections, events=events)

@@ -62,7 +62,9 @@ def explain_divergence(
         results: what was recorded.
         error: what the run failed of, if it did.
     """
-    if ALGORITHMS[system.algorithm].varies_step:  # it holds the error or fails, and its rows are of uneven length
+    if ALGORITHMS[
+        system.stepping.algorithm
+    ].varies_step:  # it holds the error or fails, and its rows are of uneven length
         return ""
     failed = isinstance(error, FmuError)
     for group in _cycles(links):
@@ -166,9 +168,9 @@ def _advice(system: System, interfaces: Mapping[str, Interface], links: Sequence
     members = interfaces.values()
     moving = any(interface.interpolates_inputs for interface in members)
     ways = ["take a smaller step"]
-    if ALGORITHMS[system.algorithm].solves_loops:
-        ways += ["let inputs move over it by extrapolation = 1"] if moving and not system.extrapolation else []
-    elif system.algebraic_loops == "delay" and find_loops(interfaces, links, doubtful=True):
+    if ALGORITHMS[system.stepping.algorithm].solves_loops:
+        ways += ["let inputs move over it by extrapolation = 1"] if moving and not system.stepping.extrapolation else []
+    elif system.stepping.algebraic_loops == "delay" and find_loops(interfaces, links, doubtful=True):
         ways = ['let its algebraic loop be solved at each communication point by algebraic_loops = "solve"']
     elif all(interface.can_save_state or interface.sampled for interface in members):
         ways += ['algorithm = "iterative"' + (" with extrapolation = 1" if moving else "")]

@@ -144,10 +144,10 @@ def go_on(
     _check_distance(checkpoint_every)
     point = checkpoint.read_checkpoint(directory)
     system = _override(point.system, stop_time, None, None)
-    if not system.stop_time > point.time:
+    if not system.stepping.stop_time > point.time:
         raise ScenarioError(
             f"{directory}: its checkpoint is at t = {point.time:g} s; it cannot go on to an earlier stop time, "
-            f"{system.stop_time:g} s"
+            f"{system.stepping.stop_time:g} s"
         )
     every = checkpoint_every if checkpoint_every is not None else point.every
     return _execute(system, Job(point.kind, directory, threads, every, point, progress), figures)
@@ -180,7 +180,7 @@ def _execute(system: System, job: Job, figures: bool) -> Run:
     evaluate(outcome)
     if directory is not None:
         if figures and len(outcome.results):
-            outcome.figures = draw(checked.system.figures, outcome.results, directory)
+            outcome.figures = draw(checked.system.judged.figures, outcome.results, directory)
         record_file.finish(directory, outcome, job.kind)
     return outcome
 
@@ -201,35 +201,37 @@ def evaluate(outcome: Run) -> None:
     system, results = outcome.system, outcome.results
     if not len(results):
         return
-    outcome.metrics = evaluate_metrics(system.metrics, results)
-    outcome.requirements = judge_requirements(system.requirements, results)
+    outcome.metrics = evaluate_metrics(system.judged.metrics, results)
+    outcome.requirements = judge_requirements(system.judged.requirements, results)
     outcome.published = judge_published(
-        system.published,
+        system.judged.published,
         outcome.metrics,
-        system.preset,
-        system.modified,
-        default_preset=system.default_preset,
+        system.provenance.preset,
+        system.provenance.modified,
+        default_preset=system.provenance.default_preset,
         completed=outcome.status == "completed",
     )
 
 
 def at_half_the_step(system: System) -> System:
     """The same at half the step, recorded at the same points; longer steps of instances' own stay."""
-    return _override(replace(system, record=system.record or system.step), None, 0.5 * system.step, None)
+    return _override(
+        system.changed(record=system.stepping.record or system.stepping.step), None, 0.5 * system.stepping.step, None
+    )
 
 
 def _override(system: System, stop_time: float | None, step: float | None, algorithm: str | None) -> System:
     changes: dict[str, Any] = {}
-    if stop_time is not None and stop_time != system.stop_time:
+    if stop_time is not None and stop_time != system.stepping.stop_time:
         changes["stop_time"] = stop_time
-    if step is not None and step != system.step:
-        changes.update(step=step, rescaled_from=system.rescaled_from or system.step)
-        changes["instances"] = {name: _rescaled(x, system.step, step) for name, x in system.instances.items()}
-        if system.record is not None and system.record < step:
+    if step is not None and step != system.stepping.step:
+        changes.update(step=step, rescaled_from=system.provenance.rescaled_from or system.stepping.step)
+        changes["instances"] = {name: _rescaled(x, system.stepping.step, step) for name, x in system.instances.items()}
+        if system.stepping.record is not None and system.stepping.record < step:
             changes["record"] = None
-    if algorithm is not None and algorithm != system.algorithm:
+    if algorithm is not None and algorithm != system.stepping.algorithm:
         changes["algorithm"] = algorithm
-    return replace(system, **changes, modified=True) if changes else system
+    return system.changed(**changes, modified=True) if changes else system
 
 
 def _rescaled(instance: Instance, before: float, step: float) -> Instance:

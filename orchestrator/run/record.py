@@ -58,9 +58,9 @@ def finish(directory: Path, outcome: Run, kind: str) -> None:
     _dump(
         directory / "metrics.json",
         {
-            "scenario": outcome.system.name,
-            "preset": outcome.system.preset,
-            "modified": outcome.system.modified,
+            "scenario": outcome.system.provenance.name,
+            "preset": outcome.system.provenance.preset,
+            "modified": outcome.system.provenance.modified,
             "status": outcome.status,
             "metrics": {
                 m.name: {
@@ -78,23 +78,23 @@ def finish(directory: Path, outcome: Run, kind: str) -> None:
 
 
 def _describe(system: System, checked: Checked, kind: str) -> dict[str, Any]:
-    starts, in_order = checked.wiring.starts, ALGORITHMS[system.algorithm].in_order
+    starts, in_order = checked.wiring.starts, ALGORITHMS[system.stepping.algorithm].in_order
     return {
-        "scenario": system.name,
-        "path": system.path,
-        "title": system.title,
-        "preset": system.preset,
-        "modified": system.modified,
-        "start_time": system.start_time,
-        "stop_time": system.stop_time,
-        "step": system.step,
-        "record": system.record or system.step,
+        "scenario": system.provenance.name,
+        "path": system.provenance.path,
+        "title": system.provenance.title,
+        "preset": system.provenance.preset,
+        "modified": system.provenance.modified,
+        "start_time": system.stepping.start_time,
+        "stop_time": system.stepping.stop_time,
+        "step": system.stepping.step,
+        "record": system.stepping.record or system.stepping.step,
         "seed": system.seed,
-        "algorithm": system.algorithm,
+        "algorithm": system.stepping.algorithm,
         "order": list(checked.order.sequence) if in_order else None,
         "late": list(checked.order.late) if in_order else None,
-        "extrapolation": system.extrapolation,
-        "algebraic_loops": system.algebraic_loops,
+        "extrapolation": system.stepping.extrapolation,
+        "algebraic_loops": system.stepping.algebraic_loops,
         "steps": {name: instance.step for name, instance in system.instances.items() if instance.step is not None},
         "events": [dataclasses.asdict(event) for event in system.events],
         "delays": {c.target: c.delay for c in system.connections if c.delay},
@@ -124,11 +124,11 @@ def _describe(system: System, checked: Checked, kind: str) -> dict[str, Any]:
             for name, model in checked.models.items()
             for v in model.interface.of("parameter")
         },
-        "requirements": system.requirements,
-        "metrics": system.metrics,
-        "published": system.published,
-        "figures_wanted": system.figures,
-        "scenario_text": system.text,
+        "requirements": system.judged.requirements,
+        "metrics": system.judged.metrics,
+        "published": system.judged.published,
+        "figures_wanted": system.judged.figures,
+        "scenario_text": system.provenance.text,
     }
 
 

@@ -115,10 +115,12 @@ class Session:
     def _begin(self, master: Master) -> None:
         """Bring instances to their initial state, or that of the checkpoint, and the rows up to there."""
         system = self.system
-        master.initialize(system.start_time, system.stop_time, may_go_on=self.job.checkpoint_every is not None)
+        master.initialize(
+            system.stepping.start_time, system.stepping.stop_time, may_go_on=self.job.checkpoint_every is not None
+        )
         if self.job.begin is None or self._past is None:
             self._recorder = Recorder(master.signals, master.kinds, self.job.directory)
-            self._recorder.extend([[system.start_time, *master.values]])
+            self._recorder.extend([[system.stepping.start_time, *master.values]])
         else:
             self.job.begin.restore(master)
             past, there = self._past[: self.job.begin.rows], len(self._past)
@@ -127,21 +129,23 @@ class Session:
     def _step(self, master: Master) -> bool:
         """The communication steps, with checkpoints between them; True unless they were interrupted."""
         system, every = self.system, self.job.checkpoint_every
-        count = round((system.stop_time - system.start_time) / system.step)
-        varies = ALGORITHMS[system.algorithm].varies_step
+        count = round((system.stepping.stop_time - system.stepping.start_time) / system.stepping.step)
+        varies = ALGORITHMS[system.stepping.algorithm].varies_step
         row_every: float = 0 if varies else 1
-        if system.record is not None:
-            row_every = system.record / system.step
+        if system.stepping.record is not None:
+            row_every = system.stepping.record / system.stepping.step
             row_every = row_every if varies else round(row_every)
-        stride = count if every is None else max(1, round(every / system.step))
+        stride = count if every is None else max(1, round(every / system.stepping.step))
         observe = self._observer(master)
         begin, before = clock.perf_counter(), master.steps
         try:
             while True:
-                passed = math.floor((master.time - system.start_time) / system.step + 1e-6)
+                passed = math.floor((master.time - system.stepping.start_time) / system.stepping.step + 1e-6)
                 until = min(count, (passed // stride + 1) * stride)
                 points = {"first": master.steps, "until": until}
-                if not master.run(system.start_time, system.step, count, row_every, observe, **points):
+                if not master.run(
+                    system.stepping.start_time, system.stepping.step, count, row_every, observe, **points
+                ):
                     return False
                 if until == count:
                     return True
@@ -152,18 +156,18 @@ class Session:
     def _observer(self, master: Master) -> Callable[[int, Rows], bool]:
         assert self._recorder is not None
         system, recorder, stopped, progress = self.system, self._recorder, self._stopped, self.job.progress
-        last = system.stop_time - 0.5 * system.step
-        percent = 0.01 * (system.stop_time - system.start_time)
+        last = system.stepping.stop_time - 0.5 * system.stepping.step
+        percent = 0.01 * (system.stepping.stop_time - system.stepping.start_time)
         shown, told = clock.monotonic(), 0
 
         def observe(_: int, rows: Rows) -> bool:
             nonlocal shown, told
             recorder.extend(rows)
             time = master.time
-            reached = int((time - system.start_time) / percent + 1e-9)
+            reached = int((time - system.stepping.start_time) / percent + 1e-9)
             if progress is not None and (reached > told or clock.monotonic() - shown > 0.1 or time >= last):
                 shown, told = clock.monotonic(), reached
-                progress(time, system.stop_time)
+                progress(time, system.stepping.stop_time)
             if not stopped.is_set():
                 return True
             if time < last and not (len(rows) and rows[-1][0] == time):
@@ -201,10 +205,10 @@ class Session:
             time,
             units=units,
             parameters=parameters,
-            step=self.system.step,
-            stop_time=self.system.stop_time,
+            step=self.system.stepping.step,
+            stop_time=self.system.stepping.stop_time,
             completed=self.status == "completed",
-            figures=self.system.figures,
+            figures=self.system.judged.figures,
         )
 
 

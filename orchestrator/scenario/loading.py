@@ -80,7 +80,7 @@ def find(name_or_path: str | os.PathLike[str]) -> Path:
 
 def preset_names(scenario: str | os.PathLike[str]) -> tuple[str, ...]:
     """Every preset a scenario can be run with, the default one first."""
-    return load(scenario).presets
+    return load(scenario).provenance.presets
 
 
 def load(
@@ -159,8 +159,7 @@ def _system(source: Source, path: Path, changes: _Changes) -> System:
         old_step = changes.apply(draft, scenario.problems)
         system = scenario.finish(draft)
         if changes != _Changes(changes.preset):
-            system.modified = system != scenario.finish(base)
-            system.rescaled_from = old_step
+            return system.changed(modified=system != scenario.finish(base), rescaled_from=old_step)
         return system
     except RecursionError:
         raise ScenarioError(Problem(source.label, "nested too deeply", "no scenario needs that")) from None

@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from ..system import Connection, Instance, System
+from ..system import Connection, Instance, Stepping, System
 from .events import EVENT_KEYS
 from .groups import OPTION_KEYS
 from .simulation import SIMULATION_KEYS
@@ -28,31 +28,34 @@ def dump(system: System) -> str:
 
 
 def _lines(system: System) -> Iterator[str]:
-    yield from _assignments({key: getattr(system, key) or None for key in ("title", "source", "description")})
-    yield from _assignments({"default_preset": system.preset})
+    came, stepping = system.provenance, system.stepping
+    yield from _assignments({key: getattr(came, key) or None for key in ("title", "source", "description")})
+    yield from _assignments({"default_preset": system.provenance.preset})
     yield from ("", "[simulation]")
-    keys = ("start_time", "stop_time", "step", "algorithm", "record", "seed")
-    yield from _assignments({key: getattr(system, key) for key in keys})
-    yield from _assignments({"order": system.order or None})
-    others = [key for key in SIMULATION_KEYS if key not in (*keys, "order", "tolerances")]
-    yield from _assignments({key: value for key in others if (value := getattr(system, key)) != getattr(System, key)})
-    if system.tolerances:
-        yield from ("", "[simulation.tolerances]", *_assignments(system.tolerances))
+    keys = ("start_time", "stop_time", "step", "algorithm", "record")
+    yield from _assignments({key: getattr(stepping, key) for key in keys} | {"seed": system.seed})
+    yield from _assignments({"order": system.stepping.order or None})
+    others = [key for key in SIMULATION_KEYS if key not in (*keys, "seed", "order", "tolerances")]
+    yield from _assignments(
+        {key: value for key in others if (value := getattr(stepping, key)) != getattr(Stepping, key)}
+    )
+    if system.stepping.tolerances:
+        yield from ("", "[simulation.tolerances]", *_assignments(system.stepping.tolerances))
     yield from () if system.instances else ("", "[instances]")
     for instance in system.instances.values():
         yield from _instance(instance)
     connections = {connection.target: _options(connection) for connection in system.connections}
     for section, table in (
         ("connections", connections),
-        ("require", system.requirements),
-        ("metrics", system.metrics),
+        ("require", system.judged.requirements),
+        ("metrics", system.judged.metrics),
     ):
         if table:
             yield from ("", f"[{section}]", *_assignments(table))
     for event in system.events:
         yield from ("", "[[events]]", *_assignments({key: getattr(event, key) for key in EVENT_KEYS}))
-    owed = [] if system.modified else [entry for entry in system.published if _applies(entry, system)]
-    for section, tables in (("published", owed), ("figures", system.figures)):
+    owed = [] if system.provenance.modified else [entry for entry in system.judged.published if _applies(entry, system)]
+    for section, tables in (("published", owed), ("figures", system.judged.figures)):
         for entry in tables:
             yield from ("", f"[[{section}]]", *_assignments(entry))
 
@@ -62,7 +65,7 @@ def _assignments(table: Mapping[str, Any]) -> Iterator[str]:
 
 
 def _applies(entry: Mapping[str, Any], system: System) -> bool:
-    return bool(entry.get("preset", system.default_preset) == system.preset)
+    return bool(entry.get("preset", system.provenance.default_preset) == system.provenance.preset)
 
 
 def _instance(instance: Instance) -> Iterator[str]:

@@ -98,12 +98,12 @@ def check_sampling(system: System, interfaces: Mapping[str, Interface], wiring: 
         if sample is None and interface.sampled and "sample_time" in interface.variables:
             sample = interface.variables["sample_time"].start
         if interface.annotation and sample and isinstance(sample, int | float):
-            own_step = system.instances[name].step or system.step
+            own_step = system.instances[name].step or system.stepping.step
             if not _is_multiple(own_step, sample):
                 what = f"the communication step {own_step:g} s is not a whole multiple of its sample_time {sample:g} s"
                 problem = Problem(name, f"{what}: set step or {name}.sample_time", names=(SignalName(name),))
                 wiring.problems.append(problem.at(system.instances[name].origin))
-        own, step = interface.default_step, system.instances[name].step or system.step
+        own, step = interface.default_step, system.instances[name].step or system.stepping.step
         if own and not interface.variable_step and not interface.annotation and interface.model not in told:
             told.add(interface.model)
             if not _is_multiple(step, own):
@@ -111,10 +111,11 @@ def check_sampling(system: System, interfaces: Mapping[str, Interface], wiring: 
                     f"{interface.model} cannot vary its step and is made for {own:g} s; it is stepped at {step:g} s"
                 )
         longest = interface.annotation and interface.annotation.recommended_step
-        if longest and system.step > longest * (1 + 1e-9) and interface.model not in told:
+        if longest and system.stepping.step > longest * (1 + 1e-9) and interface.model not in told:
             told.add(interface.model)
             wiring.notes.append(
-                f"{interface.model} is advised to step at {longest:g} s or faster; this run steps at {system.step:g} s"
+                f"{interface.model} is advised to step at {longest:g} s or faster; this run steps at "
+                f"{system.stepping.step:g} s"
             )
 
 

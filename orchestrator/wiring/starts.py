@@ -25,7 +25,7 @@ def find_starts(system: System, instance: Instance, interface: Interface, wiring
     for name, given in instance.start.items():
         scalars = interface.scalars(name)
         signal = SignalName(instance.name, name)
-        origin = system.origins.get(str(signal), instance.origin)
+        origin = system.provenance.origins.get(str(signal), instance.origin)
         if scalars is None and instance.swapped:
             dropped.append(name)
         elif scalars is None:
@@ -136,8 +136,8 @@ def _set_runtime(system: System, instance: Instance, interface: Interface, value
         values["seed"] = instance_seed(system.seed, instance.name)
     # A sample time that was given has been rescaled where the step was changed; this is about the FMU's own.
     own = interface.variables.get("sample_time")
-    if own is not None and "sample_time" not in values and own.start == system.rescaled_from:
-        values["sample_time"] = system.step
+    if own is not None and "sample_time" not in values and own.start == system.provenance.rescaled_from:
+        values["sample_time"] = system.stepping.step
 
 
 def instance_seed(seed: int, name: str) -> int:

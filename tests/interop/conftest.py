@@ -158,7 +158,7 @@ def make_scene(system, algorithms):
         for link in checked.wiring.links
     )
     results = {algorithm: {name: result[name] for name in result.names()} for algorithm, result in ours.items()}
-    return Scene(parts, links, checked.order.sequence, system.step, system.stop_time, results)
+    return Scene(parts, links, checked.order.sequence, system.stepping.step, system.stepping.stop_time, results)
 
 
 @pytest.fixture(scope="session", name="make_scene")

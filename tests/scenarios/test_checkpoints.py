@@ -20,7 +20,7 @@ def test_a_resumed_run_has_the_same_results(name, tmp_path):
     system = load(name)
     stop = TRIPS if "timetable" in system.instances else SHORT
     train = next(each for each in system.instances if each.startswith("train"))
-    system.stop_time, middle = stop, 0.6 * stop
+    system.stepping.stop_time, middle = stop, 0.6 * stop
     system.events.append(Event(f"{train}.speed", "bias", middle - 2.0, 0.05, duration=5.0))
     whole, parts = tmp_path / "whole", tmp_path / "parts"
     one = run(system, output=whole, figures=False)
@@ -30,7 +30,7 @@ def test_a_resumed_run_has_the_same_results(name, tmp_path):
     assert point.time == pytest.approx(middle)
     again = go_on(parts, figures=False)
     assert again.status == "completed"
-    assert again.seconds["steps"] == pytest.approx((stop - middle) / system.step)
+    assert again.seconds["steps"] == pytest.approx((stop - middle) / system.stepping.step)
     assert (parts / "results.csv").read_bytes() == (whole / "results.csv").read_bytes()
     metrics = [json.loads((folder / "metrics.json").read_text()) for folder in (whole, parts)]
     assert metrics[0] == metrics[1]

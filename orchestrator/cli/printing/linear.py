@@ -17,7 +17,7 @@ _MOST_MODES = 40
 
 def show_linear(out: Console, model: Linearization, stability: Stability, passings: list[Passing]) -> None:
     """What a user asked for: is it stable, how fast, and does a disturbance grow from train to train."""
-    say(out, model.system.title or model.system.name, "bold")
+    say(out, model.system.provenance.title or model.system.provenance.name, "bold")
     kind = "continuous" if model.step is None else f"one step of {model.step:g} s"
     facts = f"linear at t = {model.time:g} s; {kind}; {len(model.states)} states"
     say(out, f"{facts}; inputs: {_short(model.inputs)}; outputs: {_short(model.outputs)}", "dim")

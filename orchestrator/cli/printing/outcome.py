@@ -30,9 +30,9 @@ def show_run(outcome: Run, second: Run | None, quiet: bool) -> None:
     for note in outcome.notes:
         say(out, f"note: {note}", "bold red")
     if outcome.status != "completed":
-        reached = float(outcome.time[-1]) if len(outcome.time) else system.start_time
+        reached = float(outcome.time[-1]) if len(outcome.time) else system.stepping.start_time
         why = f": {outcome.error}" if outcome.status == "terminated" else ""
-        say(out, f"{outcome.status} at t = {reached:g} s of {system.stop_time:g} s{why}", "bold red")
+        say(out, f"{outcome.status} at t = {reached:g} s of {system.stepping.stop_time:g} s{why}", "bold red")
         if outcome.directory is not None and (outcome.directory / CHECKPOINT_FILE).is_file():
             say(out, f"to go on from the last checkpoint: orchestrate run --resume {outcome.directory}", whole=True)
     else:
@@ -60,13 +60,13 @@ def _coupling(how: Mapping[str, Any]) -> Iterator[str]:
 def _show_head(out: Console, outcome: Run) -> None:
     """What ran, how, and what a user should know of it before reading numbers."""
     system, seconds = outcome.system, outcome.seconds
-    say(out, system.title or system.name, "bold")
+    say(out, system.provenance.title or system.provenance.name, "bold")
     facts = [
-        (system.preset or "as it stands") + (", modified" if system.modified else ""),
+        (system.provenance.preset or "as it stands") + (", modified" if system.provenance.modified else ""),
         f"{len(system.instances)} instances",
         _kinds(outcome),
-        system.algorithm,
-        f"step {system.step:g} s",
+        system.stepping.algorithm,
+        f"step {system.stepping.step:g} s",
     ]
     if outcome.status == "completed":
         facts.append(
@@ -75,8 +75,8 @@ def _show_head(out: Console, outcome: Run) -> None:
     say(out, "; ".join(facts), "dim")
     for line in _coupling(outcome.coupling):
         say(out, line, "dim")
-    if system.description:
-        say(out, system.description, "yellow" if "WARNING" in system.description else "")
+    if system.provenance.description:
+        say(out, system.provenance.description, "yellow" if "WARNING" in system.provenance.description else "")
     show_notes(out, outcome.checked.notes)
 
 

@@ -74,8 +74,8 @@ class Adaptive(VariableStep):
         settings, exchange = coupling.settings, coupling.exchange
         self.exchange, self.tally = exchange, Tally()
         self.tolerances = coupling.tolerances(_TOLERANCE)
-        self.shortest = settings.min_step
-        self.order = 1 + settings.extrapolation
+        self.shortest = settings.stepping.min_step
+        self.order = 1 + settings.stepping.extrapolation
         """Of the coupling's error over the whole run."""
         self.watched = [
             place
@@ -241,7 +241,7 @@ class Adaptive(VariableStep):
 
 def _unwatched(system: System, interfaces: Mapping[str, Interface]) -> Iterable[str]:
     """Tolerances that it has no use for."""
-    for signal in system.tolerances:
+    for signal in system.stepping.tolerances:
         instance, name = SignalName.parse(signal)
         interface = interfaces.get(instance)
         scalars = interface.scalars(name) if interface is not None else None

@@ -84,8 +84,8 @@ class Iterative(FixedStep):
         self.exchange, self.tally = exchange, Tally()
         self.blocks = find_blocks(coupling.interfaces, exchange.links)
         self.tolerances = coupling.tolerances(_TOLERANCE)
-        self.max_iterations = settings.max_iterations
-        self.relaxation, self.acceleration = settings.relaxation, settings.acceleration
+        self.max_iterations = settings.stepping.max_iterations
+        self.relaxation, self.acceleration = settings.stepping.relaxation, settings.stepping.acceleration
         self._exchanged = {
             group: self._find_exchanged(group)
             for group in self.blocks.continuous
@@ -103,7 +103,7 @@ class Iterative(FixedStep):
         )
         notes = []
         able = sorted(name for name in blocks.cyclic if interfaces[name].interpolates_inputs)
-        if able and not system.extrapolation:
+        if able and not system.stepping.extrapolation:
             notes.append(f"{listed(able)} can interpolate inputs: extrapolation = 1 makes iterative second order there")
         steps = []
         if blocks.sampled:

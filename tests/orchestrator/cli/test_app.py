@@ -188,7 +188,7 @@ def test_the_second_run_is_recorded_at_the_same_points(small: Path) -> None:
     first = execute(load(small / "small.toml"), kind="plain")
     second = runs._at_half_the_step(first, KindName.plain, quiet=True)
     assert second is not None
-    assert second.system.step == 0.05
+    assert second.system.stepping.step == 0.05
     assert second.seconds["steps"] == 40
     np.testing.assert_array_equal(second.time, first.time)
 

@@ -61,7 +61,7 @@ def shelf(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
 def test_a_case_is_a_scenario_with_a_preset_that_has_published_values(shelf: Path) -> None:
     (shelf / "plain.toml").write_text(SCENARIO.partition("[[published]]")[0].format(fast=0))
     assert [case.command for case in published_cases()] == ["orchestrate run one", "orchestrate run one --preset fast"]
-    assert [case.system.preset for case in published_cases()] == ["calm", "fast"]
+    assert [case.system.provenance.preset for case in published_cases()] == ["calm", "fast"]
 
 
 @pytest.mark.parametrize(("paper", "found"), [("one", True), ("on", True), ("miller", True), ("Wang", False)])
@@ -75,7 +75,7 @@ def test_a_paper_is_found_by_the_scenario_or_a_word_of_its_source(paper: str, fo
 
 def test_the_command_of_every_shipped_case_loads_the_same_system() -> None:
     shipped = published_cases()
-    assert {case.system.name for case in shipped} >= {"comfort_cruise", "comfort_cruise_bottom_layer"}
+    assert {case.system.provenance.name for case in shipped} >= {"comfort_cruise", "comfort_cruise_bottom_layer"}
     for case in shipped:
         program, run, name, *preset = shlex.split(case.command)
         assert (program, run) == ("orchestrate", "run")

@@ -77,7 +77,7 @@ def test_of_several_scenarios_each_has_the_presets_it_knows():
         "comfort_cruise_bottom_layer",
         "comfort_cruise_bottom_layer as-stated",
     ]
-    assert {system.stop_time for system in found.values()} == {10.0}
+    assert {system.stepping.stop_time for system in found.values()} == {10.0}
 
 
 def test_settings_hold_for_all_variants(small):

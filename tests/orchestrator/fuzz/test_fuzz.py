@@ -298,7 +298,7 @@ def try_text(watched, tmp_path):
         if system is None:
             return
         again = loads(dump(system), path)
-        again.published = system.published  # those of other presets are left out
+        again.published = system.judged.published  # those of other presets are left out
         assert comparable(again) == comparable(system)
         if checked:
             with Workspace() as place, contextlib.suppress(RailcosimError), watched(place.folder):

@@ -188,8 +188,8 @@ def test_any_description_is_used_or_refused_by_name(explore, bases, watched, con
         for source, target in zip(it.of("output"), it.of("input"), strict=False):
             system.connect(f"a.{source.name}", f"b.{target.name}")
         if len(uses) % 2:
-            system.metrics = {"m": "max(a.x[i])", "n": "max(a.x[:])"}
-            system.requirements = {"r": "always a.y < count"}
+            system.judged.metrics = {"m": "max(a.x[i])", "n": "max(a.x[:])"}
+            system.judged.requirements = {"r": "always a.y < count"}
         try:
             check(system, place)
         except RailcosimError as error:

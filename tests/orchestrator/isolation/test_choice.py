@@ -181,7 +181,10 @@ def test_timeouts_and_limits_need_isolation(hostile, workspace):
     system.instances["odd[1]"].step_timeout = -1.0
     system.instances["odd[2]"].memory_limit = 100.0
     system.instances["odd[3]"].memory_limit = 100.0
-    system.origins |= {"instances.odd[2].memory_limit": "x.toml:7", "instances.odd[3].memory_limit": "x.toml:7"}
+    system.provenance.origins |= {
+        "instances.odd[2].memory_limit": "x.toml:7",
+        "instances.odd[3].memory_limit": "x.toml:7",
+    }
     with pytest.raises(ScenarioError) as caught:
         check(system, workspace)
     assert str(caught.value).splitlines() == [

@@ -434,9 +434,9 @@ def test_an_unstable_loop_ends_with_1(orchestrate, tmp_path):
 def test_whole_numbers_reach_their_inputs_after_compiled_steps():
     """CAILC takes the trip's number: what the kernel leaves as doubles must be whole again for calls from Python."""
     system = load("cailc")
-    model = linearize(system, 20 * system.step, kind="native")
+    model = linearize(system, 20 * system.stepping.step, kind="native")
     assert np.isfinite(model.a).all()
-    assert model.values["train.position"] == run(system, stop_time=20 * system.step)["train.position"][-1]
+    assert model.values["train.position"] == run(system, stop_time=20 * system.stepping.step)["train.position"][-1]
 
 
 @needs_native

@@ -88,8 +88,10 @@ def instantiated(workspace):
     def make(system):
         checked = check(system, workspace)
         slaves = {name: model.instantiate(name) for name, model in checked.models.items()}
-        master = Master(slaves, checked.order.sequence, checked.wiring.links, checked.wiring.starts, system.algorithm)
-        master.initialize(system.start_time, 1e9)
+        master = Master(
+            slaves, checked.order.sequence, checked.wiring.links, checked.wiring.starts, system.stepping.algorithm
+        )
+        master.initialize(system.stepping.start_time, 1e9)
         return master
 
     return make

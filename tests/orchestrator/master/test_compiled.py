@@ -114,7 +114,7 @@ def test_native_and_python_models_together(both, mine, odd):
 @pytest.mark.parametrize("start", [0.0, -3.7, 1e6])
 def test_time(both, odd, start, ring):
     system = ring(odd, 2)
-    system.start_time, system.stop_time = start, start + 10.0
+    system.stepping.start_time, system.stepping.stop_time = start, start + 10.0
     result = both(system)
     assert np.array_equal(result.time, start + np.arange(41) * 0.25)
 

@@ -33,7 +33,7 @@ def both(monkeypatch):
         for name in fast.names():
             assert fast[name].tobytes() == slow[name].tobytes(), name
         assert fast.coupling == slow.coupling
-        for name in fast.names() if system.algorithm == "jacobi" else ():
+        for name in fast.names() if system.stepping.algorithm == "jacobi" else ():
             threads = threads or execute(system, threads=2)
             assert fast[name].tobytes() == threads[name].tobytes(), name
         return fast
@@ -87,7 +87,7 @@ def some_system(draw, model):
 def some_event(draw, system, names, fed):
     name = draw.choice(names)
     variable, kind = draw.choice([*INPUTS.items(), *OUTPUTS.items()])
-    at = system.start_time + draw.choice([draw.uniform(-2.0, 10.0), STEP * draw.randrange(36)])
+    at = system.stepping.start_time + draw.choice([draw.uniform(-2.0, 10.0), STEP * draw.randrange(36)])
     if variable in INPUTS and (name, variable) not in fed:
         return Event(f"{name}.{variable}", "set", at, some_value(draw, kind), every=draw.choice([None, 2.0]))
     action = draw.choice(["override", "freeze"] + ["bias", "ramp"] * (kind == "Real"))
@@ -121,7 +121,7 @@ def test_the_random_systems_are_of_many_kinds(odd):
     assert len(happened) > 500
     slow = {x.name for x in systems[0].instances.values() if x.step}
     assert slow
-    assert {system.algorithm for system in systems} == {"gauss-seidel", "jacobi"}
+    assert {system.stepping.algorithm for system in systems} == {"gauss-seidel", "jacobi"}
 
 
 @pytest.mark.parametrize("algorithm", ["gauss-seidel", "jacobi"])

@@ -281,7 +281,7 @@ def test_a_step_of_its_own_stays_unless_it_is_the_system_s(text, way):
         assert steps(system) == ([0.5, 2.0, 0.5], [0.5, 2.0, 0.5])
         system = run(system, step=0.25, kind="plain").system
     assert steps(system) == ([0.25, 2.0, 0.25], [0.25, 2.0, 0.25])
-    assert (system.step, system.rescaled_from) == (0.25, 0.5)
+    assert (system.stepping.step, system.provenance.rescaled_from) == (0.25, 0.5)
 
 
 def test_half_the_step_halves_the_base(text, tmp_path, capsys):

@@ -65,11 +65,11 @@ def train(**start):
 
 
 def simulate(path, system, **more):
-    step = more.pop("step", system.step)
+    step = more.pop("step", system.stepping.step)
     return fmpy.simulate_fmu(
         str(path),
-        start_time=system.start_time,
-        stop_time=system.stop_time,
+        start_time=system.stepping.start_time,
+        stop_time=system.stepping.stop_time,
         step_size=step,
         output_interval=step,
         **more,

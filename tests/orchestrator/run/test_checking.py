@@ -90,9 +90,9 @@ def test_all_kinds_of_problems_together(problems):
     system = train(step=0.3)
     system.instances["train"].start["mas"] = 1.0
     system.connect("train.speed", "train.frce")
-    system.requirements["slow"] = "always train.sped < 3"
-    system.metrics["top"] = "max(train.spede)"
-    system.figures.append({"title": "Speed", "y": ["train.sepeed"]})
+    system.judged.requirements["slow"] = "always train.sped < 3"
+    system.judged.metrics["top"] = "max(train.spede)"
+    system.judged.figures.append({"title": "Speed", "y": ["train.sepeed"]})
     found = problems(system)
     named = ["stop_time", "train.mas", "frce", "train.sped", "train.spede", "train.sepeed"]
     assert len(found) == len(named)
@@ -143,7 +143,7 @@ def test_what_the_order_cannot_serve_is_noted_where_there_is_an_order(examine):
     system.connect("gust.acceleration", "train.disturbance")
     late = "train.disturbance receives gust.acceleration of the end of the step instead of its begin"
     assert examine(system).notes[0].startswith(late)
-    system.algorithm = "jacobi"
+    system.stepping.algorithm = "jacobi"
     assert examine(system).notes == ()
 
 

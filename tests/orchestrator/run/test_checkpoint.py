@@ -44,7 +44,7 @@ def same(tmp_path):
 def loop(mine, **how):
     """Two lags that follow each other, one of them delayed, with a metric."""
     system = System(**{"stop_time": 3.0, "step": 0.1} | how)
-    system.metrics = {"end": "final(a.x)", "mean": "mean(b.x)"}
+    system.judged.metrics = {"end": "final(a.x)", "mean": "mean(b.x)"}
     system.add("a", mine("LagWithSlope"), x=2.0)
     system.add("b", mine("LagWithSlope"), rate=0.5)
     system.add("wave", mine("Wave"))
@@ -101,7 +101,7 @@ def test_events_across_every_point(mine, tmp_path, at):
     run(shorter, kind="native", output=tmp_path / "parts", checkpoint_every=at, figures=False)
     assert checkpoint.read_checkpoint(tmp_path / "parts").time == pytest.approx(at)
     result = resume(tmp_path / "parts", stop_time=3.0, figures=False)
-    assert result.system.modified
+    assert result.system.provenance.modified
     assert (tmp_path / "parts/results.csv").read_bytes() == (tmp_path / "whole/results.csv").read_bytes()
 
 

@@ -72,8 +72,17 @@ def test_overrides_do_not_touch_the_system_and_mark_the_run():
     system = braking()
     result = run(system, stop_time=2.0, step=0.5, algorithm="jacobi", kind="plain")
     assert list(result.time) == [0.0, 0.5, 1.0, 1.5, 2.0]
-    assert (result.system.algorithm, result.system.modified, result.system.rescaled_from) == ("jacobi", True, 0.1)
-    assert (system.stop_time, system.step, system.algorithm, system.modified) == (10.0, 0.1, "gauss-seidel", False)
+    assert (
+        result.system.stepping.algorithm,
+        result.system.provenance.modified,
+        result.system.provenance.rescaled_from,
+    ) == ("jacobi", True, 0.1)
+    assert (system.stepping.stop_time, system.stepping.step, system.stepping.algorithm, system.provenance.modified) == (
+        10.0,
+        0.1,
+        "gauss-seidel",
+        False,
+    )
     same = run(system, stop_time=10.0, step=0.1, algorithm="gauss-seidel", kind="plain")
     assert same.system is system
 
@@ -96,8 +105,8 @@ def test_a_system_that_cannot_run_leaves_no_directory(tmp_path):
 
 def test_metrics_and_requirements_are_evaluated():
     system = braking()
-    system.requirements = {"slow": "always train.speed <= 20", "fast": "always train.speed >= 19"}
-    system.metrics = {"end": "final(train.speed)"}
+    system.judged.requirements = {"slow": "always train.speed <= 20", "fast": "always train.speed >= 19"}
+    system.judged.metrics = {"end": "final(train.speed)"}
     result = run(system, kind="plain")
     assert [v.verdict for v in result.requirements] == ["pass", "fail"]
     assert result.failed
@@ -218,7 +227,7 @@ def test_any_exception_of_a_component_is_one_of_the_model_s(components, tmp_path
 
 def test_an_unfinished_run_passes_no_requirement(mine):
     system = failing(mine)
-    system.requirements = {"fine": "always bad.y >= -1"}
+    system.judged.requirements = {"fine": "always bad.y >= -1"}
     assert [v.verdict for v in execute(system, kind="plain").requirements] != ["pass"]
 
 
@@ -232,7 +241,7 @@ def test_after_a_failure_no_instance_is_called_but_to_be_freed(tmp_path, foreign
     bad = foreign([v("u", "input", start=0.0), v("y", "output")], body, name="bad.fmu", trace=trace)
     system.add("good", good)
     system.add("bad", bad)
-    system.order = ["good", "bad"]
+    system.stepping.order = ["good", "bad"]
     with pytest.raises(FmuError, match=r"bad, t = 3 s, status fatal: fmi2DoStep failed\n(.|\n)*float division by zero"):
         run(system, kind="python")
     calls = trace.read_text().splitlines()

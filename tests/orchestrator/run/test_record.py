@@ -22,9 +22,11 @@ def files(tmp_path):
     system.add("timetable", "Schedule", {"points": 2}, times=[0.0, 1.0], values=[3.0, 5.0])
     system.add("force", "Schedule", {"unit": "N"}, values=1e5)
     system.connect("force.value", "train.force", delay=1)
-    system.requirements["slow"] = "always train.speed <= 30"
-    system.metrics["end"] = "final(train.speed)"
-    system.published.append({"metric": "end", "value": 20.0, "tolerance": 5.0, "where": "here", "status": "stated"})
+    system.judged.requirements["slow"] = "always train.speed <= 30"
+    system.judged.metrics["end"] = "final(train.speed)"
+    system.judged.published.append(
+        {"metric": "end", "value": 20.0, "tolerance": 5.0, "where": "here", "status": "stated"}
+    )
     result = run(system, kind="python", output=tmp_path)
     return result, *(json.loads((tmp_path / f"{name}.json").read_text()) for name in ("run", "metrics", "units"))
 

@@ -34,7 +34,7 @@ def test_the_default_preset_is_the_file_as_it_stands():
 
 def test_a_preset_is_not_a_modification():
     system = loads(EXAMPLE, preset="mixed")
-    assert (system.preset, system.modified, system.step) == ("mixed", False, 0.25)
+    assert (system.provenance.preset, system.provenance.modified, system.stepping.step) == ("mixed", False, 0.25)
     assert start(system, "speed") == {"train[1]": 80.0, "train[2]": 10}
     assert start(system, "beta") == {"cruise[1]": 0.1, "cruise[2]": 0.2}
     assert start(system, "sample_time") == {"cruise[1]": 0.5, "cruise[2]": 0.5}
@@ -42,7 +42,7 @@ def test_a_preset_is_not_a_modification():
     assert system.instances["cruise[1]"].model == "OtherCruise"
     assert system.instances["cruise[1]"].start["alpha"] == 0.03
     assert (system.instances["target"].build, system.instances["target"].start) == ({"points": 1}, {"values": 3.0})
-    assert system.rescaled_from is None
+    assert system.provenance.rescaled_from is None
 
 
 @pytest.mark.parametrize(
@@ -79,7 +79,7 @@ def test_a_change_to_the_same_value_is_none(changes):
 @pytest.mark.parametrize("change", [{"step": 0.25}, {"settings": ["simulation.step=0.25"]}])
 def test_sample_times_follow_the_step(change):
     system = loads(EXAMPLE, **change)
-    assert (system.step, system.rescaled_from) == (0.25, 0.5)
+    assert (system.stepping.step, system.provenance.rescaled_from) == (0.25, 0.5)
     assert start(system, "sample_time") == {"cruise[1]": 0.25, "cruise[2]": 0.25}
     explicit = loads(EXAMPLE, step=0.25, settings=["cruise[1].sample_time=0.5"])
     assert start(explicit, "sample_time") == {"cruise[1]": 0.5, "cruise[2]": 0.25}
@@ -176,7 +176,7 @@ def test_a_finished_fmu_takes_no_build_arguments(folder):
 
 def test_a_swap_for_the_same_model_is_none():
     system = loads(EXAMPLE, swaps=["cruise=ComfortCruise"])
-    assert not system.modified
+    assert not system.provenance.modified
     assert not system.instances["cruise[1]"].swapped
 
 
@@ -220,8 +220,8 @@ def test_how_an_instance_steps_and_runs():
     assert [one.step for one in system.instances.values()] == [None, None, 1.0, 2.0, None]
     assert [one.isolate for one in system.instances.values()] == [False, True, False, False, False]
     assert (system.instances["target"].step_timeout, system.instances["target"].memory_limit) == (3.0, 100.0)
-    assert system.origins["instances.cruise[2].step"] == "--set cruise[2].step=2"
-    assert system.modified
+    assert system.provenance.origins["instances.cruise[2].step"] == "--set cruise[2].step=2"
+    assert system.provenance.modified
     text = EXAMPLE.replace('"cruise.alpha" = 0.01', '"cruise.step" = 1.0\ncruise.isolate = true')
     gentle = loads(text, "two.toml", preset="gentle").instances["cruise[1]"]
     assert (gentle.step, gentle.isolate, gentle.start.keys()) == (1.0, True, {"alpha", "has_ahead", "sample_time"})

@@ -79,8 +79,11 @@ def test_they_stand_as_written_each_with_its_place():
         ("cruise[3].x", -3.0),
     ]
     assert [event.origin for event in system.events] == ["folder/x.toml:8"] + ["folder/x.toml:13"] * 3
-    assert (system.origins["events[1]"], system.origins["events[2]"]) == ("folder/x.toml:8", "folder/x.toml:13")
-    assert system.modified is False
+    assert (system.provenance.origins["events[1]"], system.provenance.origins["events[2]"]) == (
+        "folder/x.toml:8",
+        "folder/x.toml:13",
+    )
+    assert system.provenance.modified is False
 
 
 def test_they_follow_the_number_of_instances():

@@ -28,8 +28,18 @@ def start(system, name):
 
 def test_the_whole_of_a_scenario():
     system = loads(EXAMPLE, "folder/two.toml")
-    assert (system.title, system.name, system.path) == ("Two trains", "two", "folder/two.toml")
-    assert (system.stop_time, system.step, system.record, system.algorithm, system.seed) == (
+    assert (system.provenance.title, system.provenance.name, system.provenance.path) == (
+        "Two trains",
+        "two",
+        "folder/two.toml",
+    )
+    assert (
+        system.stepping.stop_time,
+        system.stepping.step,
+        system.stepping.record,
+        system.stepping.algorithm,
+        system.seed,
+    ) == (
         120,
         0.5,
         1.0,
@@ -52,23 +62,23 @@ def test_the_whole_of_a_scenario():
     )
     assert (made["train[1].force"].delay, made["cruise[1].target_speed"].scale) == (1, 2.0)
     assert made["cruise[2].target_speed"].offset == 1.5
-    assert (system.preset, system.presets, system.default_preset) == (
+    assert (system.provenance.preset, system.provenance.presets, system.provenance.default_preset) == (
         "nominal",
         ("nominal", "gentle", "mixed"),
         "nominal",
     )
-    assert not system.modified
-    assert system.text == EXAMPLE
-    assert system.requirements.keys() | system.metrics.keys() == {"comfort", "settling", "gap"}
-    assert [entry["metric"] for entry in system.published] == ["settling", "gap[2]"]
-    assert system.figures[0]["title"] == "Speed"
+    assert not system.provenance.modified
+    assert system.provenance.text == EXAMPLE
+    assert system.judged.requirements.keys() | system.judged.metrics.keys() == {"comfort", "settling", "gap"}
+    assert [entry["metric"] for entry in system.judged.published] == ["settling", "gap[2]"]
+    assert system.judged.figures[0]["title"] == "Speed"
     assert [(event.signal, event.action, event.at, event.every) for event in system.events] == [
         ("cruise[1].ahead_speed", "bias", 30.0, 20.0),
         ("cruise[2].ahead_speed", "bias", 30.0, 20.0),
         ("target.value", "bias", 30.0, 20.0),
         ("train[1].disturbance", "set", 60.0, None),
     ]
-    assert system.tolerances == {"train[1].speed": [1e-3, 0.0], "train[2].speed": [0.0, 2e-3]}
+    assert system.stepping.tolerances == {"train[1].speed": [1e-3, 0.0], "train[2].speed": [0.0, 2e-3]}
 
 
 def test_origins_for_messages_of_later_checks():
@@ -172,11 +182,15 @@ def test_shipped_scenarios_open_with_source_and_expectation_and_load_under_every
     assert "Expect:" in comment
     for preset in preset_names(name):
         system = load(name, preset=preset)
-        assert system.preset == preset
-        assert not system.modified
-        owed = [entry for entry in system.published if entry.get("preset", system.default_preset) == preset]
+        assert system.provenance.preset == preset
+        assert not system.provenance.modified
+        owed = [
+            entry
+            for entry in system.judged.published
+            if entry.get("preset", system.provenance.default_preset) == preset
+        ]
         again = loads(dump(system))
-        system.published = owed
+        system.judged.published = owed
         assert again == system
 
 
@@ -200,8 +214,12 @@ def test_the_tolerances_and_events_of_the_documentation_are_read():
     (tolerances,) = [block for block in blocks("toml") if "[simulation.tolerances]" in block]
     (events,) = [block for block in blocks("toml") if "[[events]]" in block]
     system = loads(frame + tolerances + events)
-    assert system.tolerances["mass.position"] == [1e-6, 1e-3]
-    assert [system.tolerances[f"train[{k}].speed"] for k in (1, 2, 3)] == [[1e-4, 1e-3], [0.0, 1e-4], [1e-4, 1e-3]]
+    assert system.stepping.tolerances["mass.position"] == [1e-6, 1e-3]
+    assert [system.stepping.tolerances[f"train[{k}].speed"] for k in (1, 2, 3)] == [
+        [1e-4, 1e-3],
+        [0.0, 1e-4],
+        [1e-4, 1e-3],
+    ]
     assert [(event.signal, event.action, event.duration) for event in system.events] == [
         ("sensor[2].speed", "bias", 30.0),
         *((f"cruise[{k}].ahead_speed", "freeze", 5.0) for k in (1, 2, 3)),

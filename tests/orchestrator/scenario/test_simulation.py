@@ -130,16 +130,16 @@ def test_tolerances_of_all_of_a_name_of_one_and_of_names_without_quotes():
         ),
         "x.toml",
     )
-    assert system.tolerances == {
+    assert system.stepping.tolerances == {
         "train[1].speed": [1e-3, 0.0],
         "train[2].speed": [0.0, 0.1],
         "train[3].speed": [1e-3, 0.0],
         "mass.position": [1e-6, 1e-3],
         "train[1].force[2]": [1.0, 1.0],
     }
-    assert system.origins["simulation.tolerances.train[2].speed"] == "x.toml:5"
-    assert system.origins["simulation.tolerances.train[3].speed"] == "x.toml:6"
-    assert system.origins["simulation.tolerances.mass.position"] == "x.toml:7"
+    assert system.provenance.origins["simulation.tolerances.train[2].speed"] == "x.toml:5"
+    assert system.provenance.origins["simulation.tolerances.train[3].speed"] == "x.toml:6"
+    assert system.provenance.origins["simulation.tolerances.mass.position"] == "x.toml:7"
 
 
 TOLERANCES = simulation("[simulation.tolerances]", '"train[2].speed" = [0, 0.1]', '"mass.x[1]" = [0.5, 0]')

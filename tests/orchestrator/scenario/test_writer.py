@@ -50,7 +50,7 @@ NAMES = st.from_regex(r"[a-z][a-z0-9_]{0,5}", fullmatch=True).filter(
 
 def test_a_system_of_every_feature():
     system = loads(EXAMPLE, settings=["train[2].speed=[1, 2]", 'simulation.order=["train", "cruise", "target"]'])
-    system.published = []
+    system.judged.published = []
     assert loads(dump(system)) == system
 
 
@@ -73,11 +73,15 @@ def test_how_an_instance_steps_and_runs():
 
 def test_events_and_numerics():
     system = loads(EXAMPLE)
-    system.published = []
-    system.algorithm, system.algebraic_loops, system.acceleration = "iterative", "solve", "aitken"
-    system.extrapolation, system.tolerance, system.max_iterations = 2, 1e-9, 7
-    system.relaxation, system.min_step = 0.5, 1e-4
-    system.tolerances = {"train[2].position": [1e-6, 1e-3], "target.value": [0.0, 1.0]}
+    system.judged.published = []
+    system.stepping.algorithm, system.stepping.algebraic_loops, system.stepping.acceleration = (
+        "iterative",
+        "solve",
+        "aitken",
+    )
+    system.stepping.extrapolation, system.stepping.tolerance, system.stepping.max_iterations = 2, 1e-9, 7
+    system.stepping.relaxation, system.stepping.min_step = 0.5, 1e-4
+    system.stepping.tolerances = {"train[2].position": [1e-6, 1e-3], "target.value": [0.0, 1.0]}
     system.events = [
         Event("cruise[2].ahead_speed", "override", 10.0, np.float64(3.0), duration=2.0, every=5.0),
         Event("target.value", "freeze", -1.0),
@@ -93,7 +97,7 @@ def test_events_and_numerics():
 
 def test_defaults_are_not_written_out():
     system = loads(EXAMPLE)
-    system.published, system.events, system.tolerances = [], [], {}
+    system.judged.published, system.events, system.stepping.tolerances = [], [], {}
     text = dump(system)
     words = (
         "tolerance =",
@@ -158,7 +162,7 @@ def test_round_trip(families, title, step, seed, others):
             system.instances[f"{name}[{k}]"] = Instance(f"{name}[{k}]", "A", {}, dict(start), k, count)
     for name, instance in list(system.instances.items()):
         system.instances[name] = replace(instance, **options)
-        system.tolerances[f"{name}.x.y[1]"] = [step, 0.0]
+        system.stepping.tolerances[f"{name}.x.y[1]"] = [step, 0.0]
         system.events += [replace(event, signal=f"{name}.{event.signal}") for event in events]
     again = loads(dump(system))
     assert again == system

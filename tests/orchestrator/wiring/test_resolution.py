@@ -192,7 +192,7 @@ def test_a_required_input_that_nothing_feeds(resolve, mine):
 
 def test_an_input_with_a_broken_connection_is_not_told_twice(resolve, mine, pair):
     system = pair()
-    system.step = 0.2
+    system.stepping.step = 0.2
     system.add("it", mine("Needy"))
     system.connect("a.qqq", "it.needed")
     system.connect("a.row", "it.needed_row")

@@ -160,7 +160,7 @@ def test_a_step_longer_than_advised_is_noted_once(resolve, mine):
         system.add(name, mine("Needy"), needed=0.0, needed_row=0.0)
     note = "Needy is advised to step at 0.1 s or faster; this run steps at 0.2 s"
     assert resolve(system).notes == [note]
-    system.step, system.rescaled_from = 0.1, 0.2
+    system.stepping.step, system.provenance.rescaled_from = 0.1, 0.2
     assert resolve(system).notes == []
 
 
