@@ -18,17 +18,17 @@ ORDER = (
     ("linearization", "comparison", "packing"),
     ("run",),
     ("validation",),
+    ("scenario", "ssp"),
     ("master",),
     ("isolation",),
-    ("scenario", "ssp"),
     ("wiring",),
     ("figures",),
     ("evaluation",),
     ("fmi",),
     ("system",),
-    ("names",),
-    ("problems",),
     ("errors",),
+    ("problems",),
+    ("names",),
 )
 """The rooms and root files of the orchestrator; each imports itself and what stands in lines below."""
 RANKS = {room: rank for rank, rooms in enumerate(ORDER) for room in rooms}
