@@ -12,6 +12,7 @@ import pytest
 from railcosim.orchestrator.errors import FmuError, StoppedError
 from railcosim.orchestrator.fmi.interface import Interface
 from railcosim.orchestrator.fmi.models import load_fmu
+from railcosim.orchestrator.isolation import launch
 from railcosim.orchestrator.isolation import messages as doorbell
 from railcosim.orchestrator.isolation import process as host_process
 

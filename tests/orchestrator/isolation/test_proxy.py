@@ -6,6 +6,7 @@ import sys
 
 import pytest
 from railcosim.orchestrator.errors import FmuError
+from railcosim.orchestrator.isolation import launch
 from railcosim.orchestrator.isolation import proxy as isolated
 
 pytestmark = [
