@@ -10,6 +10,7 @@ import socket
 import subprocess
 import sys
 import time
+from collections.abc import Iterator
 from pathlib import Path
 from typing import IO
 
@@ -36,6 +37,15 @@ def starting(module: str) -> list[str]:
     return [sys.executable, "-u", "-P", "-c", _BOOT, package, str(orchestrator), module]
 
 
+@contextlib.contextmanager
+def _closed_on_failure(end: socket.socket) -> Iterator[None]:
+    try:
+        yield
+    except BaseException:
+        end.close()
+        raise
+
+
 def start_process(command: list[str], output: IO[bytes]) -> tuple[subprocess.Popen[bytes], socket.socket, bytes]:
     """A process; and a socket to it, or one at which it will show a password (empty where it needs none).
 
@@ -45,7 +55,7 @@ def start_process(command: list[str], output: IO[bytes]) -> tuple[subprocess.Pop
     """
     if INHERITS:
         near, far = socket.socketpair()
-        with far:
+        with far, _closed_on_failure(near):
             # In a session of its own: a Ctrl-C in the terminal is for the master, which ends the run properly.
             process = subprocess.Popen(
                 [*command, str(far.fileno())],
@@ -58,14 +68,15 @@ def start_process(command: list[str], output: IO[bytes]) -> tuple[subprocess.Pop
         return process, near, b""
     server = socket.create_server(("127.0.0.1", 0))
     address, port = server.getsockname()
-    process = subprocess.Popen(
-        [*command, f"{address}:{port}"],
-        stdin=subprocess.PIPE,
-        stdout=output,
-        stderr=output,
-        creationflags=_new_group(),
-        start_new_session=sys.platform != "win32",
-    )
+    with _closed_on_failure(server):
+        process = subprocess.Popen(
+            [*command, f"{address}:{port}"],
+            stdin=subprocess.PIPE,
+            stdout=output,
+            stderr=output,
+            creationflags=_new_group(),
+            start_new_session=sys.platform != "win32",
+        )
     password = secrets.token_hex(16).encode()
     assert process.stdin is not None
     with contextlib.suppress(OSError), process.stdin as pipe:

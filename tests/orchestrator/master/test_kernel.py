@@ -168,7 +168,6 @@ def test_sanitized(tmp_path, sanitizers):
     """The tests of the compiled loop under the compiler's sanitizers."""
     flags = "-g", "-O1", f"-fsanitize={','.join(sanitizers)}", "-fno-sanitize-recover"
     library = compile_kernel(tmp_path / "kernel.so", *flags)
-    (tmp_path / "sanitized.py").write_text(SANITIZED)
     preload = [
         subprocess.run(
             [GCC, f"-print-file-name=lib{name}.so"], check=True, capture_output=True, text=True
@@ -176,10 +175,10 @@ def test_sanitized(tmp_path, sanitizers):
         for name in (f"{sanitizer[0] if sanitizer != 'undefined' else 'ub'}san" for sanitizer in sanitizers)
     ]
     chosen = SANITIZERS[sanitizers]
-    command = [sys.executable, "-m", "pytest", "-p", "sanitized", "-p", "no:cacheprovider", "-n", "0", "-k", chosen]
+    command = [sys.executable, "-m", "pytest", "-p", "own_kernel", "-p", "no:cacheprovider", "-n", "0", "-k", chosen]
     environment = os.environ | {
         "KERNEL": str(library),
-        "PYTHONPATH": str(tmp_path),
+        "PYTHONPATH": str(Path(__file__).parent),
         "LD_PRELOAD": ":".join(preload),
         "ASAN_OPTIONS": "detect_leaks=0",
         "UBSAN_OPTIONS": "print_stacktrace=1",
@@ -197,17 +196,3 @@ def test_sanitized(tmp_path, sanitizers):
     assert "passed" in done.stdout
     assert "WARNING: ThreadSanitizer" not in done.stderr + done.stdout
     assert "runtime error" not in done.stderr + done.stdout
-
-
-SANITIZED = """
-import importlib.util, os, sys
-spec = importlib.util.spec_from_file_location("railcosim.orchestrator.master.kernel", os.environ["KERNEL"])
-module = importlib.util.module_from_spec(spec)
-spec.loader.exec_module(module)
-sys.modules["railcosim.orchestrator.master.kernel"] = module
-
-
-def pytest_sessionfinish():
-    from railcosim.orchestrator.master import compiled
-    assert compiled.kernel is module
-"""

@@ -308,8 +308,8 @@ def endless(tmp_path):
 
     yield start
     for process in processes:
-        process.kill()
-        process.wait()
+        with process:
+            process.kill()
 
 
 def steady(loaded):

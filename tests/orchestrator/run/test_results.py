@@ -229,7 +229,9 @@ def test_texts_are_written_as_text_at_once(tmp_path, now):
 def test_a_killed_run_is_read_up_to_its_last_whole_row(tmp_path, cut):
     """And made into text on request."""
     rows = [(float(k), value, k % 2) for k, value in enumerate(AWKWARD)]
-    recorded(tmp_path, ["x", "on"], rows, ["Real", "Boolean"]).flush()
+    recorder = recorded(tmp_path, ["x", "on"], rows, ["Real", "Boolean"])
+    recorder.flush()
+    recorder._writer._file.close()  # as the end of its process does
     (tmp_path / "run.json").write_text(json.dumps(RECORD | {"status": "running"}))
     path = tmp_path / "results.bin"
     path.write_bytes(path.read_bytes()[: -cut or None])

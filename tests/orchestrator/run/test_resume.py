@@ -169,6 +169,7 @@ def test_nothing_is_lost_whenever_a_resumed_run_is_killed(mine, tmp_path, monkey
         recorder = results.Recorder(list(columns.names()), ["Real"] * 2, out)
         recorder.extend(np.array([columns.time, *(columns[name] for name in columns.names())]).T)
         recorder.flush()
+        recorder._writer._file.close()  # as the end of its process does
         assert [path.name for path in out.glob("results*")] == ["results.bin"]
     before = Results.load(out)
     assert len(before) > 30

@@ -1,0 +1,225 @@
+"""How much of the code the tests reach: lines and branches, of Python per room and of the C per file.
+
+``python tests/measure_coverage.py`` runs the quick tests (Python), and those of the step loop and of the C runtime with
+both built for gcov (C), prints the tables, and fails where a file has more unreached branches than `uncovered.txt`
+grants it. ``--write`` writes that file anew. Its numbers may only fall: a branch that no test can reach is marked where
+it stands, with the reason (``# pragma: no cover: it is for Windows``).
+
+What the parts ``python`` and ``c`` find is kept in ``build/coverage`` and told by the part ``report``; without a part
+all three are done, from nothing. ``--select`` names the tests for Python: several calls of ``python`` add up.
+"""
+
+import argparse
+import json
+import os
+import shutil
+import subprocess
+import sys
+import sysconfig
+from collections import defaultdict
+from collections.abc import Iterable
+from dataclasses import dataclass, field
+from pathlib import Path
+
+ROOT = Path(__file__).parents[1]
+DATA = ROOT / "build" / "coverage"
+GRANTED = ROOT / "tests" / "uncovered.txt"
+KERNEL = [ROOT / "orchestrator" / "master" / name for name in ("kernel.c", "stepping.c", "team.c")]
+RUNTIME = sorted((ROOT / "fmus" / "runtime").glob("*.c"))
+LOOP_TESTS = [
+    *(f"tests/orchestrator/master/{name}.py" for name in ("test_compiled", "test_compiled_blocks", "test_kernel")),
+    *("tests/orchestrator/master/test_event_loops.py", "tests/orchestrator/fmi/test_foreign.py"),
+]
+RUNTIME_TESTS = ["tests/fmus/runtime"]
+COMPILER = """#!/bin/sh
+exec gcc "$@" -O0 --coverage -fprofile-update=atomic -dumpdir "$(mktemp -d "$COVERAGE_NOTES/XXXXXXXX")/"
+"""
+
+
+@dataclass
+class Reached:
+    """Of a file: how many lines and branches it has, and how many of them were reached."""
+
+    lines: int = 0
+    lines_reached: int = 0
+    branches: int = 0
+    branches_reached: int = 0
+
+    def __iadd__(self, other: "Reached") -> "Reached":
+        self.lines += other.lines
+        self.lines_reached += other.lines_reached
+        self.branches += other.branches
+        self.branches_reached += other.branches_reached
+        return self
+
+    @property
+    def missing(self) -> int:
+        return self.branches - self.branches_reached
+
+
+def run_tests(arguments: Iterable[str], prefix: Iterable[str] = (), **environment: str) -> None:
+    """A failure here is none of the code's: measured code is slower, and the tests themselves have run before."""
+    command = [sys.executable, *prefix, "-m", "pytest", "-p", "no:cacheprovider", *arguments]
+    print("+", *command[1:], flush=True)
+    code = subprocess.run(command, cwd=ROOT, env=os.environ | environment, check=False).returncode
+    if code > 1:
+        sys.exit(f"the tests could not be run: pytest ends with {code}")
+
+
+# -------------------------------------------------------------------- Python
+
+
+def measure_python(tests: list[str]) -> None:
+    """Run tests, and what they start in other processes, under coverage."""
+    DATA.mkdir(parents=True, exist_ok=True)
+    file = {"COVERAGE_FILE": str(DATA / "python")}
+    run_tests([*tests, "-n", "2"], ["-m", "coverage", "run", f"--rcfile={ROOT / 'pyproject.toml'}"], **file)
+    coverage = [sys.executable, "-m", "coverage"]
+    environment = os.environ | file
+    subprocess.run([*coverage, "combine", "--append", "--quiet"], cwd=ROOT, env=environment, check=True)
+    target = str(DATA / "python.json")
+    subprocess.run([*coverage, "json", "--quiet", "-o", target], cwd=ROOT, env=environment, check=True)
+
+
+def read_python() -> dict[str, Reached]:
+    """What was reached, by file."""
+    found = {}
+    for name, entry in json.loads((DATA / "python.json").read_text())["files"].items():
+        of = entry["summary"]
+        counts = of["num_statements"], of["covered_lines"], of["num_branches"], of["covered_branches"]
+        found[Path(name).as_posix()] = Reached(*counts)
+    return found
+
+
+# -------------------------------------------------------------------- C
+
+
+def measure_c() -> None:
+    """Run the tests of the step loop and of the C runtime with both compiled for gcov."""
+    notes = DATA / "c"
+    shutil.rmtree(notes, ignore_errors=True)
+    (notes / "kernel").mkdir(parents=True)
+    library = notes / "kernel" / "kernel.so"
+    command = [
+        "gcc",
+        "-shared",
+        "-fPIC",
+        "-O0",
+        "-ffp-contract=off",
+        "--coverage",
+        "-fprofile-update=atomic",
+        "-pthread",
+    ]
+    command += [f"-I{sysconfig.get_paths()['include']}", "-dumpdir", f"{notes / 'kernel'}/", *map(str, KERNEL)]
+    subprocess.run([*command, "-o", str(library)], check=True)
+    plugin = str(ROOT / "tests" / "orchestrator" / "master")
+    run_tests(["-p", "own_kernel", "-n", "0", *LOOP_TESTS], KERNEL=str(library), PYTHONPATH=plugin)
+    compiler = notes / "cc"
+    compiler.write_text(COMPILER)
+    compiler.chmod(0o755)
+    run_tests(["-n", "2", *RUNTIME_TESTS], CC=str(compiler), COVERAGE_NOTES=str(notes))
+
+
+@dataclass
+class Lines:
+    """Of a C file: how often each line was run, and each branch of it, in every build of it added up."""
+
+    counts: dict[int, int] = field(default_factory=lambda: defaultdict(int))
+    branches: dict[int, dict[int, list[int]]] = field(default_factory=lambda: defaultdict(dict))
+
+    def add(self, line: dict) -> None:
+        number = line["line_number"]
+        self.counts[number] += line["count"]
+        counts = [branch["count"] for branch in line["branches"]]
+        if counts:  # what is constant in a model leaves no branch in its build: builds are told apart by their number
+            before = self.branches[number].get(len(counts), [0] * len(counts))
+            self.branches[number][len(counts)] = [a + b for a, b in zip(before, counts, strict=True)]
+
+    def reached(self) -> Reached:
+        found = Reached(len(self.counts), sum(count > 0 for count in self.counts.values()))
+        for builds in self.branches.values():
+            best = max(builds.values(), key=lambda counts: (sum(c > 0 for c in counts) / len(counts), len(counts)))
+            found += Reached(0, 0, len(best), sum(count > 0 for count in best))
+        return found
+
+
+def read_c() -> dict[str, Reached]:
+    """What was reached, by file."""
+    names = {path.name: path.relative_to(ROOT).as_posix() for path in [*KERNEL, *RUNTIME]}
+    found: dict[str, Lines] = defaultdict(Lines)
+    for data in sorted((DATA / "c").rglob("*.gcda")):
+        command = ["gcov", "--json-format", "--branch-probabilities", "--stdout", str(data)]
+        for text in subprocess.run(command, check=True, capture_output=True, text=True).stdout.splitlines():
+            for file in json.loads(text)["files"]:
+                name = names.get(Path(file["file"]).name)
+                for line in file["lines"] if name else ():
+                    found[name].add(line)
+    return {name: found[name].reached() for name in sorted(found)}
+
+
+# -------------------------------------------------------------------- what is told
+
+
+def table(title: str, rows: dict[str, Reached]) -> None:
+    total = Reached()
+    for row in rows.values():
+        total += row
+    print(f"\n{title:44} {'lines':>7} {'reached':>8} {'branches':>9} {'reached':>8}")
+    for name, row in [*rows.items(), ("all", total)]:
+        lines, branches = (f"{100 * a / b if b else 100:7.1f}%" for a, b in (
+            (row.lines_reached, row.lines), (row.branches_reached, row.branches)))  # fmt: skip
+        print(f"{name:44} {row.lines:7} {lines} {row.branches:9} {branches}")
+
+
+def room(name: str) -> str:
+    """The folder of a file, no deeper than the rooms are: ``orchestrator/fmi``."""
+    parts = Path(name).parent.parts
+    return "/".join(parts[:2])
+
+
+def granted() -> dict[str, int]:
+    """How many unreached branches each file may have."""
+    lines = GRANTED.read_text().splitlines() if GRANTED.exists() else []
+    return {name: int(count) for name, count in (line.split() for line in lines if line and line[0] != "#")}
+
+
+def report(write: bool) -> int:
+    """Print the tables; how many files have more unreached branches than they are granted."""
+    python, c = read_python(), read_c()
+    rooms: dict[str, Reached] = defaultdict(Reached)
+    for name, row in sorted(python.items()):
+        rooms[room(name)] += row
+    table("Python", rooms)
+    table("C", c)
+    missing = {name: row.missing for name, row in {**python, **c}.items() if row.missing}
+    if write:
+        head = "# Branches that no test reaches, by file: see measure_coverage.py. The numbers may only fall.\n"
+        GRANTED.write_text(head + "".join(f"{name} {count}\n" for name, count in sorted(missing.items())))
+    allowed = granted()
+    worse = {name: count for name, count in missing.items() if count > allowed.get(name, 0)}
+    better = sum(count > missing.get(name, 0) for name, count in allowed.items())
+    print(f"\n{sum(missing.values())} branches are reached by no test; {sum(allowed.values())} are granted", end="")
+    print(f"; {better} files have fewer than they are granted: --write" if better else "")
+    for name, count in sorted(worse.items()):
+        print(f"{name}: {count} branches are reached by no test, {allowed.get(name, 0)} are granted")
+    return len(worse)
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("parts", nargs="*", choices=["python", "c", "report", []], help="all if none is named")
+    parser.add_argument("--select", nargs="+", default=["tests"], help="the tests for Python")
+    parser.add_argument("--write", action="store_true", help="write tests/uncovered.txt")
+    chosen = parser.parse_args()
+    if not chosen.parts:
+        shutil.rmtree(DATA, ignore_errors=True)
+    parts = chosen.parts or ["python", "c", "report"]
+    if "python" in parts:
+        measure_python(chosen.select)
+    if "c" in parts:
+        measure_c()
+    sys.exit("report" in parts and report(chosen.write) > 0)
+
+
+if __name__ == "__main__":
+    main()
