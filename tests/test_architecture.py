@@ -18,17 +18,17 @@ ORDER = (
     ("linearization", "comparison", "packing"),
     ("run",),
     ("validation",),
+    ("scenario", "ssp"),
     ("master",),
     ("isolation",),
-    ("scenario", "ssp"),
     ("wiring",),
     ("figures",),
     ("evaluation",),
     ("fmi",),
     ("system",),
-    ("names",),
-    ("problems",),
     ("errors",),
+    ("problems",),
+    ("names",),
 )
 """The rooms and root files of the orchestrator; each imports itself and what stands in lines below."""
 RANKS = {room: rank for rank, rooms in enumerate(ORDER) for room in rooms}
@@ -44,17 +44,16 @@ class Import(NamedTuple):
     name: str
 
 
-def code(folder):
+def code(folder, *suffixes):
     """Every file of code below a folder; what stands in ``resources`` is data, whatever it is."""
-    files = sorted(path for suffix in ("py", "c", "h") for path in (ROOT / folder).rglob(f"*.{suffix}"))
+    files = sorted(path for suffix in suffixes for path in (ROOT / folder).rglob(f"*.{suffix}"))
     return [path for path in files if not {"dist", "resources"} & set(path.relative_to(ROOT).parts)]
 
 
 MODULES = {
     ".".join(path.relative_to(ROOT).with_suffix("").parts).removesuffix(".__init__"): path
     for package in PACKAGES
-    for path in code(package)
-    if path.suffix == ".py"
+    for path in code(package, "py", "pyi")
 }
 FOLDERS = {name for name, path in MODULES.items() if path.name == "__init__.py"}
 
@@ -141,11 +140,9 @@ def test_files_are_short_and_folders_small():
     wrong = []
     folders = defaultdict(int)
     for folder, most in [*((name, MOST_LINES) for name in (*PACKAGES, "benchmarks")), ("tests", MOST_TEST_LINES)]:
-        for path in code(folder):
+        for path in code(folder, "py", "c", "h"):
             lines = len(path.read_text(encoding="utf-8").splitlines())
             wrong += [f"{path.relative_to(ROOT)} has {lines} lines, over {most}"] if lines > most else []
             folders[path.parent.relative_to(ROOT)] += path.parts[len(ROOT.parts)] in PACKAGES
-    wrong += [
-        f"{folder} has {count} files, over {MOST_FILES}" for folder, count in folders.items() if count > MOST_FILES
-    ]
+    wrong += [f"{x} has {count} files, over {MOST_FILES}" for x, count in folders.items() if count > MOST_FILES]
     assert not wrong, "\n".join(wrong)
