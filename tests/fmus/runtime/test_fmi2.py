@@ -174,6 +174,7 @@ def test_instantiate_refuses_what_it_cannot_be(load):
 def test_no_logger_and_no_callbacks_are_no_reason_to_crash(load):
     fmu = load("Gust", logger=False)
     assert fmu.step() == ERROR
+    assert fmu.instantiate(guid="{0}") is None
     assert fmu.instantiate(callbacks=False, guid="{0}") is None
     silent = fmu.instantiate(callbacks=False)
     assert fmu.library.fmi2Terminate(c_void_p(silent)) == ERROR

@@ -210,3 +210,11 @@ def test_a_place_that_is_taken_is_told(load, tmp_path):
     assert fmu.Terminate() == ERROR
     assert "cannot be written" in fmu.said
     assert [path.name for path in tmp_path.iterdir()] == ["tape"]
+
+
+def test_without_a_file_nothing_is_written(load, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    fmu = load(LEARNER).initialize(sample_time=0.1, tape_duration=1.0)
+    ride(fmu, 1, ERRORS)
+    assert fmu.Terminate() == OK
+    assert not list(tmp_path.iterdir())
