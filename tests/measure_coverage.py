@@ -77,14 +77,14 @@ def measure_python(tests: list[str]) -> None:
     coverage = [sys.executable, "-m", "coverage"]
     environment = os.environ | file
     subprocess.run([*coverage, "combine", "--append", "--quiet"], cwd=ROOT, env=environment, check=True)
-    target = str(DATA / "python.json")
+    target = str(DATA / "covered.json")
     subprocess.run([*coverage, "json", "--quiet", "-o", target], cwd=ROOT, env=environment, check=True)
 
 
 def read_python() -> dict[str, Reached]:
     """What was reached, by file."""
     found = {}
-    for name, entry in json.loads((DATA / "python.json").read_text())["files"].items():
+    for name, entry in json.loads((DATA / "covered.json").read_text())["files"].items():
         of = entry["summary"]
         counts = of["num_statements"], of["covered_lines"], of["num_branches"], of["covered_branches"]
         found[Path(name).as_posix()] = Reached(*counts)
@@ -177,10 +177,11 @@ def room(name: str) -> str:
     return "/".join(parts[:2])
 
 
-def granted() -> dict[str, int]:
-    """How many unreached branches each file may have."""
+def granted() -> dict[str, tuple[int, str]]:
+    """How many unreached branches each file may have, and why."""
     lines = GRANTED.read_text().splitlines() if GRANTED.exists() else []
-    return {name: int(count) for name, count in (line.split() for line in lines if line and line[0] != "#")}
+    parts = (line.split(maxsplit=2) for line in lines if line and line[0] != "#")
+    return {name: (int(count), " ".join(reason)) for name, count, *reason in parts}
 
 
 def report(write: bool) -> int:
@@ -193,9 +194,13 @@ def report(write: bool) -> int:
     table("C", c)
     missing = {name: row.missing for name, row in {**python, **c}.items() if row.missing}
     if write:
-        head = "# Branches that no test reaches, by file: see measure_coverage.py. The numbers may only fall.\n"
-        GRANTED.write_text(head + "".join(f"{name} {count}\n" for name, count in sorted(missing.items())))
-    allowed = granted()
+        head = (
+            "# Branches that no test reaches, by file, and why: see measure_coverage.py. The numbers may only fall.\n"
+        )
+        reasons = {name: reason for name, (_, reason) in granted().items()}
+        lines = (f"{name} {count} {reasons.get(name, '')}".rstrip() for name, count in sorted(missing.items()))
+        GRANTED.write_text(head + "\n".join(lines) + "\n")
+    allowed = {name: count for name, (count, _) in granted().items()}
     worse = {name: count for name, count in missing.items() if count > allowed.get(name, 0)}
     better = sum(count > missing.get(name, 0) for name, count in allowed.items())
     print(f"\n{sum(missing.values())} branches are reached by no test; {sum(allowed.values())} are granted", end="")

@@ -321,7 +321,7 @@ class Trips(Component):
 # -------------------------------------------------------------------- sampled
 
 
-class Counter(Component):
+class Count(Component):
     """10, 11, 12, ...: one more at each sample, without feed-through."""
 
     sample_time = Parameter("s", 0.0)
@@ -397,7 +397,7 @@ class Noisy(Component):
         return {"sum": self.sum + self.w}
 
 
-class Learner(Component):
+class Repeater(Component):
     """Adds to what it did at the same place of the trip before."""
 
     sample_time = Parameter("s", 0.05)
@@ -416,7 +416,7 @@ class Learner(Component):
 # -------------------------------------------------------------------- of every type
 
 
-class Types(Component):
+class EveryType(Component):
     """Passes every type on, from memory."""
 
     n = Input("1", 0, type=int, optional=True)

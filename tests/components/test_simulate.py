@@ -159,7 +159,7 @@ def test_update_may_put_a_state_back(samples):
     assert result["seen"].tolist() == result["position"].tolist()
 
 
-class Mixed(Component):
+class Swaps(Component):
     """Update and outputs read the values at the start of the sample, whatever else changes in it."""
 
     x = State("1", 10.0, output=True)
@@ -175,7 +175,7 @@ class Mixed(Component):
 
 def test_all_of_update_reads_the_old_values(running):
     """By hand: swap; x restarts at 11 and then integrates the new a = 2 over 1 s."""
-    simulation = running(Mixed())
+    simulation = running(Swaps())
     simulation.step(1.0)
     assert (simulation.get("a"), simulation.get("b"), simulation.get("x")) == (2.0, 1.0, pytest.approx(13.0))
 

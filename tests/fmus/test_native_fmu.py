@@ -313,6 +313,7 @@ def test_two_source_fmus_run_side_by_side_in_one_program(tmp_path, sample):
     assert numbers[1::2] == estimate
 
 
+@pytest.mark.filterwarnings("ignore:Implicitly cleaning up:ResourceWarning")  # FMPy leaves its build folder behind
 @pytest.mark.parametrize("what", ["PointMassTrain", MIXED], ids=["PointMassTrain", "Mixed"])
 def test_fmpy_compiles_the_sources_to_the_same_results(tmp_path, monkeypatch, what):
     """FMPy's own build of source FMUs, with CMake, its headers and other flags than ours."""

@@ -1,6 +1,6 @@
 """Components for the tests of the C runtime: one that fails on request, and integrators of its inputs."""
 
-from railcosim.components import Component, Input, Memory, Output, Parameter, State
+from railcosim.components import Component, Input, Memory, Output, Parameter, State, Tape
 
 
 class Breaks(Component):
@@ -43,3 +43,22 @@ class Integrators(Component):
 
     def outputs(self):
         return {"y": 2.0 * self.u + self.w[0], "late": 3.0 * self.x}
+
+
+class Spoils(Component):
+    """Memory, tape and a state that is put back, each with its own way of becoming infinite: an input that is zero."""
+
+    trip = Input("1", 1, type=int)
+    trip_time = Input("s", 0.0)
+    for_memory = Input("1", 1.0)
+    for_tape = Input("1", 1.0)
+    for_state = Input("1", 1.0)
+    x = State("1", 0.0, output=True)
+    m = Memory("1", 0.0, output=True)
+    effort = Tape("1")
+
+    def derivatives(self):
+        return {"x": 0.0}
+
+    def update(self):
+        return {"m": 1.0 / self.for_memory, "effort": 1.0 / self.for_tape, "x": 1.0 / self.for_state}

@@ -1,7 +1,7 @@
 """derivatives.c: directional derivatives and the rates of states."""
 
 import math
-from ctypes import c_size_t
+from ctypes import c_double, c_size_t, c_uint
 from pathlib import Path
 
 import pytest
@@ -100,6 +100,9 @@ def test_directional_derivatives_know_their_unknowns(load):
     assert fmu.directional(("count",), ("u",), (1.0,)) == ERROR
     assert fmu.directional(("through",), ("through",), (1.0,)) == ERROR
     assert fmu.GetDirectionalDerivative(NULL, c_size_t(1), NULL, c_size_t(0), NULL, NULL) == ERROR
+    for known, direction in ((NULL, (c_double * 1)()), ((c_uint * 1)(), NULL)):
+        assert fmu.GetDirectionalDerivative(NULL, c_size_t(0), known, c_size_t(1), direction, NULL) == ERROR
+        assert "NULL for an array" in fmu.said
 
 
 def test_rates_are_those_of_the_equations(load):

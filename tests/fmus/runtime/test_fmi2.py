@@ -174,6 +174,7 @@ def test_instantiate_refuses_what_it_cannot_be(load):
 def test_no_logger_and_no_callbacks_are_no_reason_to_crash(load):
     fmu = load("Gust", logger=False)
     assert fmu.step() == ERROR
+    assert fmu.instantiate(guid="{0}") is None
     assert fmu.instantiate(callbacks=False, guid="{0}") is None
     silent = fmu.instantiate(callbacks=False)
     assert fmu.library.fmi2Terminate(c_void_p(silent)) == ERROR
@@ -181,6 +182,47 @@ def test_no_logger_and_no_callbacks_are_no_reason_to_crash(load):
     fmu.library.fmi2FreeInstance(c_void_p(None))
     assert fmu.library.fmi2Terminate(c_void_p(None)) == ERROR
     assert fmu.library.fmi2GetReal(c_void_p(None), NULL, c_size_t(0), NULL) == ERROR
+
+
+WITHOUT_INSTANCE = [name for name in CALLS if name not in ("GetTypesPlatform", "saved states")]
+
+
+@pytest.mark.parametrize("call", WITHOUT_INSTANCE)
+def test_a_call_without_an_instance_is_an_error_and_no_crash(load, call):
+    fmu = load(BREAKS).initialize()
+    instance, fmu.instance = fmu.instance, NULL
+    try:
+        assert CALLS[call][0](fmu) == ERROR
+    finally:
+        fmu.instance = instance
+
+
+@pytest.mark.parametrize("function", ["GetFMUstate", "SetFMUstate", "FreeFMUstate"])
+def test_no_instance_has_a_state(load, function):
+    library, place = load("Gust").library, byref(c_void_p())
+    assert getattr(library, f"fmi2{function}")(NULL, place) == ERROR
+
+
+@pytest.mark.parametrize("function", ["SerializedFMUstateSize", "SerializeFMUstate", "DeSerializeFMUstate"])
+def test_no_instance_has_bytes_of_a_state(load, function):
+    library, place = load("Gust").library, byref(c_void_p())
+    arguments = (
+        [NULL, place, place, c_size_t(8)] if function != "DeSerializeFMUstate" else [NULL, b"x" * 8, c_size_t(8)]
+    )
+    assert getattr(library, f"fmi2{function}")(*arguments, place) == ERROR
+
+
+def test_an_fmu_without_a_guid_is_another(load):
+    create = load("Gust").library.fmi2Instantiate
+    create.restype = c_void_p
+    assert create(b"it", 1, NULL, b"", NULL, 0, 0) is None
+
+
+def test_a_status_has_no_place_to_go(load):
+    fmu = load("Gust").initialize()
+    assert fmu.GetRealStatus(2, NULL) == DISCARD
+    assert fmu.GetBooleanStatus(3, NULL) == DISCARD
+    assert fmu.GetBooleanStatus(0, byref(c_int())) == DISCARD
 
 
 def test_the_callbacks_are_not_read_after_instantiation(load):

@@ -28,6 +28,7 @@ def test_events_are_told_only_while_logging_is_on(load):
         (0, (), False),
         (1, (b"logStatusError",), False),
         (1, (b"logStatusError", b"logEvents"), True),
+        (1, (b"logEvents", b"logStatusError"), True),
         (0, (b"logEvents",), False),
     ):
         assert categories(on, *names) == OK

@@ -9,7 +9,7 @@ import pytest
 
 SAMPLES = Path(__file__).parents[1] / "native_samples.py"
 MIXED = f"{SAMPLES}:Mixed"
-BREAKS = f"{Path(__file__).parent / 'samples.py'}:Breaks"
+BREAKS, SPOILS = (f"{Path(__file__).parent / 'samples.py'}:{name}" for name in ("Breaks", "Spoils"))
 OTHERS = Path(__file__).parents[2] / "components" / "samples.py"
 COUNTER = f"{OTHERS}:Counter"
 OK = 0
@@ -127,3 +127,33 @@ def test_an_integer_that_is_none_is_an_error_that_names_it(load, u):
     assert fmu.step() == ERROR
     assert "'whole'" in fmu.said
     assert "32-bit integer" in fmu.said
+
+
+@pytest.mark.parametrize(
+    ("name", "said"),
+    [
+        ("for_memory", "update: 'm' is inf at t = 0"),
+        ("for_tape", "update: column 1 of the tape is inf at t = 0"),
+        ("for_state", "update: 'x' is inf at t = 0"),
+    ],
+)
+def test_what_is_kept_must_be_finite(load, name, said):
+    fmu = load(SPOILS).initialize(sample_time=0.1, tape_duration=1.0)
+    assert fmu.step(0.1) == OK
+    assert (fmu.get("m"), fmu.get("x")) == (1.0, 1.0)
+    assert fmu.set(name, 0.0) == OK
+    assert fmu.set("trip_time", 0.1) == OK
+    assert fmu.step(0.1) == ERROR
+    assert said.replace("t = 0", "t = 0.1") in fmu.said
+
+
+def test_what_is_asked_after_a_bad_value_was_set_is_an_error(load):
+    """Values, rates and derivatives alike: all of them are of outputs that are infinite."""
+    for ask in (
+        lambda f: f.status_of_get("y"),
+        lambda f: f.directional(["y"], ["u"], [1.0]),
+    ):
+        fmu = load(BREAKS).initialize()
+        assert fmu.set("u", 0.0) == OK
+        assert ask(fmu) == ERROR
+        assert "'y' is inf" in fmu.said

@@ -132,6 +132,21 @@ def test_a_state_saved_before_initialization_can_be_restored(load):
     fmu.FreeFMUstate(byref(state))
 
 
+def test_a_state_of_another_length_makes_way(load):
+    """A tape of other length needs more room than the state that is handed in for reuse has."""
+    short, long = (load(MIXED).initialize(seed=5, tape_duration=duration) for duration in (1.0, 4.0))
+    drive(long, 0, 3)
+    state = short.save()
+    before = len(short.to_bytes(state))
+    assert long.GetFMUstate(byref(state)) == OK
+    assert len(long.to_bytes(state)) > before
+    rows = drive(long, 3, 4)
+    assert long.SetFMUstate(state) == OK
+    long.time = 3 * STEP
+    assert drive(long, 3, 4) == rows
+    long.FreeFMUstate(byref(state))
+
+
 def test_bytes_that_are_no_state_are_refused(load):
     fmu, train = mixed(load), load("PointMassTrain").initialize()
     drive(fmu, 0, 3)
@@ -146,6 +161,11 @@ def test_bytes_that_are_no_state_are_refused(load):
     assert fmu.SetFMUstate(NULL) == ERROR
     assert fmu.GetFMUstate(NULL) == ERROR
     assert fmu.SerializedFMUstateSize(NULL, byref(c_size_t())) == ERROR
+    assert fmu.SerializedFMUstateSize(state, NULL) == ERROR
+    assert fmu.SerializeFMUstate(NULL, content, c_size_t(len(content))) == ERROR
+    assert fmu.SerializeFMUstate(state, NULL, c_size_t(len(content))) == ERROR
+    assert fmu.DeSerializeFMUstate(NULL, c_size_t(len(content)), byref(c_void_p())) == ERROR
+    assert fmu.DeSerializeFMUstate(content, c_size_t(len(content)), NULL) == ERROR
     assert fmu.FreeFMUstate(NULL) == OK
     assert fmu.FreeFMUstate(byref(c_void_p())) == OK
     copy = fmu.from_bytes(content + b"more")  # an importer may round a buffer's length up

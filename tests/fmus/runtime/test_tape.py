@@ -155,3 +155,67 @@ def test_the_file_does_not_depend_on_the_locale_of_the_host(tmp_path, unpack, mo
     in_another_process(LOCALE, __file__, folder, tmp_path / "native", "de_DE.utf8")
     python_deck(ERRORS).save(tmp_path / "python")
     assert (tmp_path / "native").read_bytes() == (tmp_path / "python").read_bytes()
+
+
+@pytest.mark.parametrize(
+    ("trip_time", "said"),
+    [(0.25, "is not a multiple of sample_time = 0.1"), (5.0, "is past the end of the tape; raise tape_duration")],
+)
+def test_a_time_without_a_place_on_the_tape_is_an_error(load, tmp_path, trip_time, said):
+    """Where it is read, and where a step would record it."""
+    fmu = learner(load, tmp_path / "tape")
+    assert fmu.set("trip_time", trip_time) == OK
+    assert fmu.status_of_get("command") == ERROR
+    assert said in fmu.said
+    other = learner(load, tmp_path / "tape")
+    assert other.set("trip_time", trip_time) == OK
+    assert other.step(0.1) == ERROR
+    assert said in other.said
+
+
+def test_a_step_past_the_end_of_the_tape_is_an_error(load, tmp_path):
+    """Within a step of several samples the tape runs on by itself."""
+    fmu = learner(load, tmp_path / "tape")
+    assert fmu.set("trip_time", 0.9) == OK
+    assert fmu.step(0.4) == ERROR
+    assert "past the end of the tape" in fmu.said
+
+
+def test_a_path_that_leads_nowhere_is_refused(load, tmp_path):
+    """A file in the place of a folder is no tape that has not been written yet."""
+    (tmp_path / "file").write_text("")
+    fmu = load(LEARNER).enter()
+    for name, value in (("sample_time", 0.1), ("tape_duration", 1.0), ("tape_file", str(tmp_path / "file" / "tape"))):
+        fmu.set(name, value)
+    assert fmu.ExitInitializationMode() == ERROR
+    assert "tape/tape cannot be read" in fmu.said.replace("file/tape", "tape/tape")
+
+
+@pytest.mark.skipif(not Path("/dev/full").exists(), reason="needs a device that is full")
+def test_a_full_disk_leaves_the_tape_of_before(load, tmp_path):
+    path = tmp_path / "tape"
+    python_deck(ERRORS).save(path)
+    before = path.read_bytes()
+    fmu = learner(load, path)
+    ride(fmu, 1, ERRORS)
+    (tmp_path / "tape.part").symlink_to("/dev/full")
+    assert fmu.Terminate() == ERROR
+    assert "cannot be written" in fmu.said
+    assert path.read_bytes() == before
+    assert not (tmp_path / "tape.part").exists()
+
+
+def test_a_place_that_is_taken_is_told(load, tmp_path):
+    fmu = learner(load, tmp_path / "tape")
+    (tmp_path / "tape").mkdir()
+    assert fmu.Terminate() == ERROR
+    assert "cannot be written" in fmu.said
+    assert [path.name for path in tmp_path.iterdir()] == ["tape"]
+
+
+def test_without_a_file_nothing_is_written(load, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    fmu = load(LEARNER).initialize(sample_time=0.1, tape_duration=1.0)
+    ride(fmu, 1, ERRORS)
+    assert fmu.Terminate() == OK
+    assert not list(tmp_path.iterdir())

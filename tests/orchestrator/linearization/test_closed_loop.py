@@ -1,6 +1,5 @@
-"""The linear model of a closed loop: matrices and eigenvalues known by hand, ways to get them, what it says."""
+"""The linear model of a closed loop: matrices known by hand, ways to get them, and the command."""
 
-import dataclasses
 import importlib.util
 import json
 import sys
@@ -13,9 +12,7 @@ from railcosim.orchestrator.cli import analysis as cli_analysis
 from railcosim.orchestrator.errors import ScenarioError
 from railcosim.orchestrator.isolation import isolate
 from railcosim.orchestrator.linearization.blocks import differences
-from railcosim.orchestrator.linearization.closed_loop import Linearization, linearize
-from railcosim.orchestrator.linearization.modes import stability
-from railcosim.orchestrator.linearization.responses import FrequencyResponse, step_response, string_stability
+from railcosim.orchestrator.linearization.closed_loop import linearize
 from typer.testing import CliRunner
 
 ALPHA, STEP = 0.2, 0.5
@@ -57,25 +54,6 @@ def pick(model, *names):
     """The block of A that belongs to these states."""
     at = [model.states.index(name) for name in names]
     return model.a[np.ix_(at, at)]
-
-
-def a_model(a, b, c, *, step=None, outputs=None, states=None):
-    """A linear model from bare matrices."""
-    a, b, c = np.array(a, float), np.array(b, float).reshape(len(a), -1), np.atleast_2d(np.array(c, float))
-    return Linearization(
-        a,
-        b,
-        c,
-        np.zeros((len(c), b.shape[1])),
-        tuple(states or (f"x{k}" for k in range(len(a)))),
-        tuple(f"u{k}" for k in range(b.shape[1])),
-        tuple(outputs or (f"y{k}" for k in range(len(c)))),
-        step,
-        0.0,
-        System(),
-        {},
-        {},
-    )
 
 
 # ---------------------------------------------------------------- one train: everything is known
@@ -180,7 +158,6 @@ def test_finite_differences_find_slopes_and_hold_what_switches():
 
 # ---------------------------------------------------------------- feed-through
 
-
 GAIN = """
 class Gain(Base):
     u = Input("1", 0.0)
@@ -228,7 +205,6 @@ def test_wrong_arguments_are_told_in_words(arguments, message):
 
 
 # ---------------------------------------------------------------- FMUs of other makers
-
 
 STATEFUL = """
     def _get_fmu_state(self):
@@ -287,88 +263,11 @@ def test_memory_that_is_not_listed_is_found_out(swapped):
         linearize(swapped(body + STATEFUL, 'canGetAndSetFMUstate="true"'), 1.0)
 
 
-# ---------------------------------------------------------------- what eigenvalues say
-
-
-@pytest.mark.parametrize(
-    ("a", "verdict", "words"),
-    [
-        ([[-1.0, 0.0], [0.0, -2.0]], "stable", "every deviation decays"),
-        ([[0.0, 1.0], [0.0, -2.0]], "stable", "but for 1 mode that nothing pulls back (x0)"),
-        ([[0.0, 1.0], [0.0, 0.0]], "drifts", "a push sends it off for ever"),
-        ([[0.0, 1.0], [-4.0, 0.0]], "undamped", "at 2 rad/s"),
-        ([[0.0, 1.0], [-4.0, 0.2]], "unstable", "2 modes grow, the fastest by e in 10 s"),
-    ],
-)
-def test_verdicts(a, verdict, words):
-    found = stability(a_model(a, [0, 1], np.eye(2)))
-    assert found.verdict == verdict
-    assert words in found.text
-
-
-def test_a_pair_is_one_mode_with_its_damping():
-    """s^2 + 2 zeta w s + w^2 with zeta = 0.3, w = 2."""
-    (mode,) = stability(a_model([[0.0, 1.0], [-4.0, -1.2]], [0, 1], [1, 0])).modes
-    assert (mode.count, mode.damping, mode.frequency) == pytest.approx((2, 0.3, 2.0))
-    assert mode.time_constant == pytest.approx(1.0 / 0.6)
-
-
-def test_discrete_modes_are_told_in_seconds_and_delays_as_gone():
-    """z = exp(-h / 5) decays in 5 s; a chain of three delays is gone, whatever rounding makes of its eigenvalues."""
-    a = np.zeros((4, 4))
-    a[0, 0], a[1, 0], a[2, 1], a[3, 2] = np.exp(-0.1 / 5.0), 1.0, 1.0, 1.0
-    found = stability(a_model(a, [1, 0, 0, 0], [1, 0, 0, 1], step=0.1))
-    slow, gone = found.modes
-    assert slow.time_constant == pytest.approx(5.0)
-    assert (gone.count, gone.pole.real) == (3, -np.inf)
-    assert found.verdict == "stable"
-
-
-def test_what_reaches_no_output_is_not_seen_but_judged():
-    found = stability(a_model([[-1.0, 0.0], [0.0, 0.5]], [1, 0], [1, 0]))
-    assert [mode.seen for mode in found.modes] == [False, True]
-    assert found.verdict == "unstable"
-    assert found.slowest is not None
-    assert found.slowest.time_constant == pytest.approx(1.0)
-
-
 # ---------------------------------------------------------------- responses
 
 
-def test_frequency_and_step_response_of_a_first_order_lag():
-    model = a_model([[-0.5]], [0.5], [1.0])
-    w = np.array([0.1, 0.5, 3.0])
-    assert FrequencyResponse(model)(w, 0)[0] == pytest.approx(0.5 / (1j * w + 0.5), rel=1e-12)
-    t, y = step_response(model, 0, 10.0)
-    assert y[0] == pytest.approx(1.0 - np.exp(-0.5 * t), abs=1e-12)
-    half = dataclasses.replace(model, a=np.array([[np.exp(-0.5)]]), b=np.array([[1.0 - np.exp(-0.5)]]), step=1.0)
-    t, y = step_response(half, 0, 10.0)
-    assert y[0] == pytest.approx(1.0 - np.exp(-0.5 * t), abs=1e-12)
-
-
-@pytest.mark.parametrize(("zeta", "holds"), [(0.9, True), (0.3, False)])
-def test_string_stability_finds_the_resonance(zeta, holds):
-    """Train 2 follows train 1 as w^2 / (s^2 + 2 zeta w s + w^2): peak 1/(2 zeta sqrt(1 - zeta^2)) where it has one."""
-    w = 0.5
-    a = [[-1.0, 0.0, 0.0], [0.0, 0.0, 1.0], [w * w, -w * w, -2.0 * zeta * w]]
-    outputs = ("train[1].speed", "train[2].speed")
-    (passing,) = string_stability(a_model(a, [1, 0, 0], [[1, 0, 0], [0, 1, 0]], outputs=outputs))
-    assert (passing.quantity, passing.pair, passing.holds) == ("train speed", "2 to 1", holds)
-    if holds:
-        assert passing.peak == pytest.approx(1.0, abs=1e-3)  # towards frequency 0
-    else:
-        assert passing.peak == pytest.approx(1.0 / (2.0 * zeta * np.sqrt(1.0 - zeta**2)), rel=1e-6)
-        assert passing.at == pytest.approx(w * np.sqrt(1.0 - 2.0 * zeta**2), rel=1e-3)
-
-
-def test_trains_that_the_input_does_not_reach_are_left_out():
-    a = np.diag([-1.0, -2.0, -3.0])
-    outputs = [f"train[{i}].speed" for i in (1, 2, 3)]
-    assert string_stability(a_model(a, [1, 0, 0], np.eye(3), outputs=outputs)) == []
-
-
 @pytest.mark.parametrize("step", [None, 0.5])
-def test_the_state_space_has_the_same_numbers_with_and_without_python_control(step, monkeypatch):
+def test_the_state_space_has_the_same_numbers_with_and_without_python_control(step, monkeypatch, a_model):
     model = a_model([[-0.5, 0.1], [0.0, -0.2]], [0.5, 1.0], np.eye(2), step=step, outputs=("train[1].speed", "y"))
     spaces = []
     if importlib.util.find_spec("control") is not None:

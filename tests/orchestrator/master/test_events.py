@@ -40,7 +40,7 @@ def chain(mine):
 
     def make(*events, **how):
         system = System(**{"stop_time": 5.0, "step": 1.0} | how, events=list(events))
-        system.add("source", mine("Counter"))
+        system.add("source", mine("Count"))
         system.add("through", mine("Pass"))
         system.add("end", mine("Keep"))
         system.connect("source.n", "through.u")
@@ -118,7 +118,7 @@ TYPES = [
 def test_every_type_as_an_output(mine, kind, case):
     action, value, name, values = case
     system = System(stop_time=5.0, step=1.0, events=[Event(f"it.{name}", action, 2.0, value, duration=2.0)])
-    system.add("it", mine("Types"))
+    system.add("it", mine("EveryType"))
     assert list(run(system, kind=kind)[f"it.{name}"]) == values
 
 
@@ -131,7 +131,7 @@ def test_every_type_as_an_input(mine, kind):
         Event("it.word", "freeze", 2.0, duration=2.0),
     ]
     system = System(stop_time=5.0, step=1.0, events=events)
-    system.add("it", mine("Types"))
+    system.add("it", mine("EveryType"))
     for source, target in (("m", "n"), ("off", "on"), ("said", "word")):
         system.connect(f"it.{source}", f"it.{target}")
     result = run(system, kind=kind)

@@ -57,7 +57,7 @@ def test_gauss_seidel_acts_on_values_of_one_time_stamp(system):
 
 def test_a_source_and_what_it_is_compared_with_are_of_one_instant(system):
     """The counters are equal at every point: their difference at the controller is nought, not one step's worth."""
-    instances = {"reference": ("Counter", {}), "plant": ("Keep", {}), "r": ("Pass", {}), "p": ("Pass", {})}
+    instances = {"reference": ("Count", {}), "plant": ("Keep", {}), "r": ("Pass", {}), "p": ("Pass", {})}
     wires = [("reference.n", "r.u"), ("plant.n", "p.u"), ("p.y", "plant.u")]
     result = go(system(instances, wires))
     assert np.array_equal(result["r.y"], result["p.y"])
@@ -75,7 +75,7 @@ def test_a_chain_of_feed_through_blocks_is_passed_in_one_step(system):
         "c": ("Pass", {}),
         "b": ("Pass", {}),
         "a": ("Pass", {}),
-        "source": ("Counter", {}),
+        "source": ("Count", {}),
         "end": ("Keep", {}),
     }
     wires = [("source.n", "a.u"), ("a.y", "b.u"), ("b.y", "c.u"), ("c.y", "end.u")]
@@ -106,14 +106,14 @@ def test_delay_of_an_output_without_feed_through(system, delay, order):
     one.
     """
     wires = [("source.n", "end.u", {"delay": delay})]
-    result = go(system({"source": ("Counter", {}), "end": ("Keep", {})}, wires, order=order))
+    result = go(system({"source": ("Count", {}), "end": ("Keep", {})}, wires, order=order))
     assert list(result["end.seen"]) == [-1, *(max(10, 10 + k - delay) for k in range(5))]
 
 
 @ALGORITHMS
 @pytest.mark.parametrize("delay", [0, 1, 2, 3])
 def test_delay_of_a_feed_through_output(system, algorithm, delay):
-    instances = {"source": ("Counter", {}), "through": ("Pass", {}), "end": ("Keep", {})}
+    instances = {"source": ("Count", {}), "through": ("Pass", {}), "end": ("Keep", {})}
     wires = [("source.n", "through.u"), ("through.y", "end.u", {"delay": delay})]
     result = go(system(instances, wires, algorithm=algorithm))
     lag = delay + (algorithm == "jacobi")
@@ -125,7 +125,7 @@ def test_delay_of_a_feed_through_output(system, algorithm, delay):
 )
 def test_a_delayed_feed_through_output_does_not_depend_on_where_its_receiver_stands(system, order):
     """The output itself does: it is computed from what its own FMU was given."""
-    instances = {"source": ("Counter", {}), "through": ("Pass", {}), "end": ("Keep", {})}
+    instances = {"source": ("Count", {}), "through": ("Pass", {}), "end": ("Keep", {})}
     wires = [("source.n", "through.u"), ("through.y", "end.u", {"delay": 1})]
     result = go(system(instances, wires, order=order))
     computed = result["through.y"]  # recorded at t_k+1: what was computed in step k
@@ -133,7 +133,7 @@ def test_a_delayed_feed_through_output_does_not_depend_on_where_its_receiver_sta
 
 
 def test_a_delay_does_not_concern_the_other_connections_of_an_instance(system):
-    instances = {"source": ("Counter", {}), "late": ("Keep", {}), "now": ("Keep", {}), "sum": ("Pass", {})}
+    instances = {"source": ("Count", {}), "late": ("Keep", {}), "now": ("Keep", {}), "sum": ("Pass", {})}
     wires = [("source.n", "late.u", {"delay": 2}), ("source.n", "now.u"), ("source.n", "sum.u", {"scale": 2.0})]
     result = go(system(instances, wires))
     assert list(result["late.seen"]) == [-1, 10, 10, 10, 11, 12]
@@ -203,7 +203,7 @@ def test_chains_settle_whatever_the_sequence(system, algorithm, backwards):
     names = [f"lag[{k}]" for k in range(n)]
     instances = {name: ("Resting", {}) for name in (names[::-1] if backwards else names)}
     wires = [("source.n", "lag[0].u"), *((f"lag[{k - 1}].x", f"lag[{k}].u") for k in range(1, n))]
-    result = go(system({"source": ("Counter", {})} | instances, wires, stop_time=1.0, algorithm=algorithm))
+    result = go(system({"source": ("Count", {})} | instances, wires, stop_time=1.0, algorithm=algorithm))
     assert [result[f"{name}.x"][0] for name in names] == [10.0] * n
 
 
@@ -309,7 +309,11 @@ def test_a_loop_in_which_a_delay_stands_is_solved_at_the_start_too(system):
 def test_every_type_travels(system, kind, algorithm):
     names = (("m", "n"), ("off", "on"), ("said", "word"))
     wires = [(f"{a}.{output}", f"{b}.{into}") for a, b in ("ab", "bc") for output, into in names]
-    instances = {"a": ("Types", {"m": 5, "off": False, "n": 8}), "b": ("Types", {}), "c": ("Types", {"on": True})}
+    instances = {
+        "a": ("EveryType", {"m": 5, "off": False, "n": 8}),
+        "b": ("EveryType", {}),
+        "c": ("EveryType", {"on": True}),
+    }
     result = go(system(instances, wires, stop_time=3.0, algorithm=algorithm), kind=kind)
     assert list(result["c.m"]) == [1, 2, 7, 11]  # from b's start, a's start, a's input
     assert list(result["c.off"]) == [1, 1, 0, 0]
@@ -333,7 +337,7 @@ def test_conversion_scale_and_offset_reach_the_input(mine, components, kind):
 
 @BOTH
 def test_an_integer_feeds_a_real(system, kind):
-    it = system({"a": ("Types", {"m": 7}), "b": ("Pass", {"gain": 0.5})}, [("a.m", "b.u")], stop_time=1.0)
+    it = system({"a": ("EveryType", {"m": 7}), "b": ("Pass", {"gain": 0.5})}, [("a.m", "b.u")], stop_time=1.0)
     assert list(go(it, kind=kind)["b.y"]) == [3.5, 3.5]
 
 
@@ -368,7 +372,7 @@ def test_a_value_that_is_no_number_at_the_start(system, foreign, xml, wires):
     """It is not taken for a loop that does not settle."""
     v = xml["variable"]
     body = "    def refresh(self, v):\n        v[1] = math.nan\n"
-    it = system({"source": ("Counter", {})})
+    it = system({"source": ("Count", {})})
     it.add("bad", foreign([v("u", "input", start=0.0), v("y", "output")], body))
     for wire in wires:
         it.connect(*wire)

@@ -55,7 +55,7 @@ def series(result, *names):
 
 @ALGORITHMS
 def test_a_slow_receiver_reads_at_the_begin_of_its_interval_and_shows_at_its_end(go, system, algorithm):
-    instances = {"source": ("Counter", None), "end": ("Keep", 3.0)}
+    instances = {"source": ("Count", None), "end": ("Keep", 3.0)}
     result = go(system(instances, [("source.n", "end.u")], algorithm=algorithm))
     assert list(result["source.n"]) == [10, 11, 12, 13, 14, 15, 16, 17, 18, 19]
     assert list(result["end.seen"]) == [-1, -1, -1, 10, 10, 10, 13, 13, 13, 16]
@@ -63,7 +63,7 @@ def test_a_slow_receiver_reads_at_the_begin_of_its_interval_and_shows_at_its_end
 
 @ALGORITHMS
 def test_what_a_slow_source_shows_changes_at_the_end_of_its_interval(go, system, algorithm):
-    instances = {"end": ("Keep", None), "source": ("Counter", 3.0)}
+    instances = {"end": ("Keep", None), "source": ("Count", 3.0)}
     result = go(system(instances, [("source.n", "end.u")], algorithm=algorithm))
     n, seen = series(result, "source.n", "end.seen")
     assert n == [10, 10, 10, 11, 11, 11, 12, 12, 12, 13]
@@ -73,7 +73,7 @@ def test_what_a_slow_source_shows_changes_at_the_end_of_its_interval(go, system,
 @ALGORITHMS
 @pytest.mark.parametrize("cls", ["Pass", "Sampled"])
 def test_what_passes_directly_through_a_slow_one_acts_at_once_and_is_held(go, system, algorithm, cls):
-    instances = {"source": ("Counter", None), "through": (cls, 3.0), "end": ("Keep", None)}
+    instances = {"source": ("Count", None), "through": (cls, 3.0), "end": ("Keep", None)}
     wires = [("source.n", "through.u"), ("through.y", "end.u")]
     result = go(system(instances, wires, algorithm=algorithm))
     y, seen = series(result, "through.y", "end.seen")
@@ -85,7 +85,7 @@ def test_what_passes_directly_through_a_slow_one_acts_at_once_and_is_held(go, sy
 
 @ALGORITHMS
 def test_two_of_different_steps_of_their_own(go, system, algorithm):
-    instances = {"source": ("Counter", 2.0), "end": ("Keep", 3.0), "fast": ("Keep", None)}
+    instances = {"source": ("Count", 2.0), "end": ("Keep", 3.0), "fast": ("Keep", None)}
     wires = [("source.n", "end.u"), ("source.n", "fast.u")]
     result = go(system(instances, wires, algorithm=algorithm, stop_time=12.0))
     n, seen, fast = series(result, "source.n", "end.seen", "fast.seen")
@@ -97,7 +97,7 @@ def test_two_of_different_steps_of_their_own(go, system, algorithm):
 @ALGORITHMS
 @pytest.mark.parametrize("delay", [1, 2, 4])
 def test_a_delay_counts_the_system_s_points(go, system, algorithm, delay):
-    instances = {"source": ("Counter", 3.0), "through": ("Pass", 3.0), "end": ("Keep", None), "late": ("Keep", None)}
+    instances = {"source": ("Count", 3.0), "through": ("Pass", 3.0), "end": ("Keep", None), "late": ("Keep", None)}
     wires = [("source.n", "through.u"), ("through.y", "end.u", delay), ("source.n", "late.u", delay)]
     result = go(system(instances, wires, algorithm=algorithm))
     n, y, end, late = series(result, "source.n", "through.y", "end.seen", "late.seen")
@@ -109,7 +109,7 @@ def test_a_delay_counts_the_system_s_points(go, system, algorithm, delay):
 
 @pytest.mark.parametrize("delay", [0, 1, 3])
 def test_a_slow_receiver_of_a_delayed_value(go, system, delay):
-    instances = {"source": ("Counter", None), "end": ("Keep", 3.0)}
+    instances = {"source": ("Count", None), "end": ("Keep", 3.0)}
     seen = list(go(system(instances, [("source.n", "end.u", delay)]))["end.seen"])
     assert seen[3::3] == [max(10, 10 + k - delay) for k in (0, 3, 6)]
 
@@ -124,7 +124,7 @@ def test_a_slow_receiver_of_a_delayed_value(go, system, delay):
     ],
 )
 def test_a_sampled_component_samples_within_its_own_step(go, system, sample_time, counts):
-    result = go(system({"source": ("Counter", 3.0, {"sample_time": sample_time})}))
+    result = go(system({"source": ("Count", 3.0, {"sample_time": sample_time})}))
     assert list(result["source.n"]) == counts
 
 
@@ -138,7 +138,7 @@ def test_states_are_integrated_over_the_longer_step(go, system):
 
 @pytest.mark.parametrize("record", [2.0, 4.0])
 def test_rows_between_two_points_of_a_slow_instance(go, system, record):
-    instances = {"source": ("Counter", 3.0), "through": ("Pass", 3.0)}
+    instances = {"source": ("Count", 3.0), "through": ("Pass", 3.0)}
     wires = [("source.n", "through.u")]
     fine = go(system(instances, wires))
     coarse = go(system(instances, wires, record=record))
@@ -167,7 +167,7 @@ SLOW = {
 def test_a_slow_output_is_changed_at_once_and_its_own_value_comes_back(go, system, algorithm, name):
     """Though the instance is at the end of its interval already: what it will show there is not told before."""
     event, changed = SLOW[name]
-    instances = {"end": ("Keep", None), "source": ("Counter", 3.0)}
+    instances = {"end": ("Keep", None), "source": ("Count", 3.0)}
     result = go(system(instances, [("source.n", "end.u")], event, algorithm=algorithm))
     n = [changed.get(k, 10 + k // 3) for k in range(10)]
     assert series(result, "source.n", "end.seen") == [n, [-1, *n[:-1]]]
@@ -176,25 +176,25 @@ def test_a_slow_output_is_changed_at_once_and_its_own_value_comes_back(go, syste
 @ALGORITHMS
 def test_of_two_on_a_slow_output_the_first_acts_again(go, system, algorithm):
     events = Event("source.n", "bias", 1.0, 100.0, duration=7.0), Event("source.n", "override", 4.0, 0.0, duration=3.0)
-    result = go(system({"source": ("Counter", 3.0)}, (), *events, algorithm=algorithm))
+    result = go(system({"source": ("Count", 3.0)}, (), *events, algorithm=algorithm))
     assert list(result["source.n"]) == [10, 110, 110, 111, 0, 0, 0, 112, 12, 13]
 
 
 def test_a_ramp_on_a_slow_output_steps_with_it(go, system):
-    result = go(system({"source": ("Counter", 3.0)}, (), Event("source.n", "ramp", 1.0, rate=1.0)))
+    result = go(system({"source": ("Count", 3.0)}, (), Event("source.n", "ramp", 1.0, rate=1.0)))
     assert list(result["source.n"]) == [10, 10, 10, 13, 13, 13, 17, 17, 17, 21]
 
 
 @ALGORITHMS
 def test_an_event_on_a_slow_input_counts_where_it_is_read(go, system, algorithm):
-    instances = {"source": ("Counter", None), "end": ("Keep", 3.0)}
+    instances = {"source": ("Count", None), "end": ("Keep", 3.0)}
     event = Event("end.u", "override", 1.0, 99.0, duration=3.0)
     result = go(system(instances, [("source.n", "end.u")], event, algorithm=algorithm))
     assert list(result["end.seen"]) == [-1, -1, -1, 10, 10, 10, 99, 99, 99, 16]
 
 
 def test_an_event_on_a_direct_slow_output(go, system):
-    instances = {"source": ("Counter", None), "through": ("Sampled", 3.0), "end": ("Keep", None)}
+    instances = {"source": ("Count", None), "through": ("Sampled", 3.0), "end": ("Keep", None)}
     wires = [("source.n", "through.u"), ("through.y", "end.u")]
     result = go(system(instances, wires, Event("through.y", "bias", 2.0, 100.0, duration=3.0)))
     y, seen = series(result, "through.y", "end.seen")
@@ -231,7 +231,7 @@ def test_a_sample_time_must_divide_the_instance_s_own_step(system, workspace):
     with pytest.raises(
         ScenarioError, match=r"source: the communication step 3 s is not a whole multiple of its sample"
     ):
-        check(system({"source": ("Counter", 3.0, {"sample_time": 2.0})}), workspace, "plain")
+        check(system({"source": ("Count", 3.0, {"sample_time": 2.0})}), workspace, "plain")
 
 
 @pytest.mark.parametrize("how", [{"algorithm": "iterative"}, {"algorithm": "adaptive"}, {"algebraic_loops": "solve"}])
@@ -240,7 +240,7 @@ def test_a_step_of_its_own_that_is_the_system_s_is_none(system, workspace, how):
 
 
 def test_check_tells_of_a_step_of_its_own(system, workspace):
-    checked = check(system({"slow": ("Counter", 3.0), "fast": ("Lag", None)}), workspace, "plain")
+    checked = check(system({"slow": ("Count", 3.0), "fast": ("Lag", None)}), workspace, "plain")
     assert describe_stepping(checked)[1:] == ["slow steps every 3 s"]
 
 
@@ -265,7 +265,7 @@ step = 0.5
 
 @pytest.fixture
 def text(mine):
-    return TEXT.format(mine("Counter"))
+    return TEXT.format(mine("Count"))
 
 
 def steps(system):

@@ -177,7 +177,7 @@ def test_what_was_learned_on_former_trips(same, mine, kind, every):
     """The checkpoint stands within the first, the second or the third trip; what the tape holds goes on growing."""
     system = System(stop_time=5.0, step=0.05)
     system.add("trips", mine("Trips"))
-    system.add("learner", mine("Learner"))
+    system.add("learner", mine("Repeater"))
     system.connect("trips.trip", "learner.trip")
     system.connect("trips.trip_time", "learner.trip_time")
     one, _ = same(dataclasses.replace(system, stop_time=2 * every - 0.05 if every == 3.1 else 5.0), every, kind)

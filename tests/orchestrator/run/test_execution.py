@@ -90,7 +90,7 @@ def test_overrides_do_not_touch_the_system_and_mark_the_run():
 def test_a_step_changed_twice_still_takes_the_sample_times_along(mine):
     """As `--step` with `--verify-step` does: the scenario's own step is what sample times are compared with."""
     system = System(stop_time=1.0, step=0.1)
-    system.add("s", mine("Counter"), sample_time=0.1)
+    system.add("s", mine("Count"), sample_time=0.1)
     first = run(system, step=0.05, kind="plain")
     second = run(first.system, step=0.025, kind="plain")
     assert [r["s.n"][-1] for r in (first, second)] == [30.0, 50.0]

@@ -78,7 +78,7 @@ class Needy(Base):
         return {"y": self.needed}
 
 
-class Dice(Base):
+class Random(Base):
     '''Random.'''
 
     hold = Parameter("s", 0.1)

@@ -166,9 +166,9 @@ def test_a_step_longer_than_advised_is_noted_once(resolve, mine):
 
 def test_every_instance_has_its_own_seed(resolve, mine):
     system = System(seed=1)
-    system.add("dice[1]", mine("Dice"))
-    system.add("dice[2]", mine("Dice"))
-    system.add("fixed", mine("Dice"), seed=5)
+    system.add("dice[1]", mine("Random"))
+    system.add("dice[2]", mine("Random"))
+    system.add("fixed", mine("Random"), seed=5)
     starts = resolve(system).starts
     assert starts["dice[1]"]["seed"] == instance_seed(1, "dice[1]")
     assert starts["dice[1]"]["seed"] != starts["dice[2]"]["seed"]

@@ -14,7 +14,7 @@ from railcosim.orchestrator.system import System
 
 BOTH = pytest.mark.parametrize("kind", ["python", "plain"])
 TYPES = """
-class Types(Base):
+class AllTypes(Base):
     '''All types, in scalars and in arrays.'''
 
     gain = Parameter("1", 2.0, tunable=True, description="factor")
@@ -74,7 +74,7 @@ def begin(slave):
 
 @BOTH
 def test_every_type_is_set_stepped_and_read(slave, components, kind):
-    it = slave(components(TYPES)("Types"), kind)
+    it = slave(components(TYPES)("AllTypes"), kind)
     it.setup(0.0, 10.0)
     it.channel("Real", ["gain"]).set([3.0])
     it.enter_initialization()
@@ -97,7 +97,7 @@ def test_every_type_is_set_stepped_and_read(slave, components, kind):
 
 @BOTH
 def test_part_of_an_array_leaves_the_rest(slave, components, kind):
-    it = begin(slave(components(TYPES)("Types"), kind))
+    it = begin(slave(components(TYPES)("AllTypes"), kind))
     it.channel("Real", ["row[1]", "row[2]", "row[3]"]).set([1.0, 2.0, 3.0])
     it.channel("Real", ["row[2]"]).set([20.0])
     assert it.channel("Real", ["back[1]", "back[2]", "back[3]"]).get() == [3.0, 20.0, 1.0]
@@ -191,7 +191,7 @@ def test_after_a_fatal_status_nothing_is_called_any_more(slave, mine, monkeypatc
 def test_instances_share_a_library_which_is_given_back_with_the_last(slave, components):
     """FMPy loads and inspects it for each instance: half a second for 256 of them."""
     before = dict(module._LIBRARIES)
-    reference = components(TYPES)("Types")
+    reference = components(TYPES)("AllTypes")
     first, second = (begin(slave(reference, name=name)) for name in ("first", "second"))
     (path,) = module._LIBRARIES.keys() - before.keys()
     assert module._LIBRARIES[path].users == 2
@@ -209,7 +209,7 @@ def test_instances_share_a_library_which_is_given_back_with_the_last(slave, comp
 
 @pytest.mark.parametrize("status", [-1, 6, 42])
 def test_a_status_that_the_standard_does_not_know_is_a_failure(slave, components, status):
-    it = begin(slave(components(TYPES)("Types"), name="it"))
+    it = begin(slave(components(TYPES)("AllTypes"), name="it"))
     with pytest.raises(FmuError, match=rf"^it, t = 0 s, status {status} \(unknown\): fmi2GetReal failed$"):
         it.check("fmi2GetReal", status)
 
@@ -222,7 +222,7 @@ def test_loading_does_not_move_the_working_directory(slave, foreign, xml):
 
 def test_forget_paths(slave, components, workspace):
     before = list(sys.path)
-    slave(components(TYPES)("Types"))
+    slave(components(TYPES)("AllTypes"))
     assert any(entry.startswith(str(workspace.folder)) for entry in sys.path)
     forget_paths(workspace.folder)
     assert sys.path == before

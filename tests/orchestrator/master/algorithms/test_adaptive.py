@@ -36,7 +36,7 @@ def refused(it, workspace, kind="plain"):
 
 def test_sampled_components_are_refused(mine, workspace):
     it = swing(mine)
-    it.add("counter", mine("Counter"))
+    it.add("counter", mine("Count"))
     told = refused(it, workspace)
     assert told.startswith(
         "counter: sampled at points of its own, which adaptive cannot step over; choose gauss-seidel"

@@ -1,0 +1,127 @@
+"""What master and host say to each other: frames over a socket, values in shared memory, errors as plain values."""
+
+import mmap
+import socket
+import struct
+import threading
+
+import pytest
+from railcosim.orchestrator.errors import FmuError, StoppedError
+from railcosim.orchestrator.isolation import messages
+from railcosim.orchestrator.isolation.messages import CALL, DONE, Cells, Door, as_error, content, describe, frame
+
+
+@pytest.fixture(params=["pair", "tcp"])
+def doors(request):
+    """Both ends, of the two kinds of sockets that are used."""
+    if request.param == "pair":
+        ends = socket.socketpair()
+    else:
+        with socket.create_server(("127.0.0.1", 0)) as server:
+            near = socket.create_connection(server.getsockname())
+            ends = near, server.accept()[0]
+    made = [Door(end) for end in ends]
+    yield made
+    for door in made:
+        door.close()
+
+
+def test_a_frame_is_its_kind_its_length_and_what_follows():
+    made = frame(CALL, ["step", 0.5])
+    assert struct.unpack("<BI", made[:5]) == (CALL, len(made) - 5)
+    assert content(made[5:]) == ["step", 0.5]
+    assert bytes([DONE, 0, 0, 0, 0]) == messages.ANSWER
+
+
+@pytest.mark.parametrize("size", [0, 1, 1 << 15, (1 << 16) - 6, 1 << 16, (1 << 16) + 1, 3_000_000])
+def test_frames_arrive_whole_and_in_order_however_long_they_are(doors, size):
+    """Also what comes close behind: the next frame begins where the last one ends."""
+    one, other = doors
+    bodies = [b"a" * size, b"b", b"c" * (size // 2)]
+    sent = b"".join(struct.pack("<BI", 20 + k, len(body)) + body for k, body in enumerate(bodies))
+    sender = threading.Thread(target=one.send, args=(sent,))
+    sender.start()
+    assert [other.receive() for _ in bodies] == [(20 + k, body) for k, body in enumerate(bodies)]
+    sender.join()
+
+
+def test_frames_arrive_in_pieces(doors):
+    one, other = doors
+    for byte in struct.pack("<BI", 7, 3):
+        one.send(bytes([byte]))
+    for byte in b"xyz":
+        one.send(bytes([byte]))
+    assert other.receive() == (7, b"xyz")
+
+
+@pytest.mark.parametrize(
+    "begun", [b"", b"\x01", struct.pack("<BI", 1, 5) + b"12", struct.pack("<BI", 1, 1 << 20) + b"12"]
+)
+def test_an_end_in_the_middle_is_told(doors, begun):
+    one, other = doors
+    one.send(begun)
+    one.close()
+    with pytest.raises(EOFError):
+        other.receive()
+
+
+def test_silence_has_a_limit(doors):
+    _, other = doors
+    other.wait_at_most(0.05)
+    with pytest.raises(TimeoutError):
+        other.receive()
+
+
+def test_notes_tell_call_and_channel_apart():
+    assert messages.note("set", 300) & 0xFF == messages.NUMBERS["set"]
+    assert messages.note("set", 300) >> 8 == 300
+    assert len({messages.note(call) for call in messages.CALLS}) == len(messages.CALLS)
+
+
+@pytest.mark.parametrize(
+    ("kind", "values", "layout"),
+    [("Real", [1.5, -0.0, 1e308], "=3d"), ("Integer", [-(2**63), 2**63 - 1], "=2q"), ("Boolean", [0, 1], "=2q")],
+)
+def test_values_stand_in_the_memory_as_c_has_them(kind, values, layout):
+    with mmap.mmap(-1, 4096) as memory:
+        cells = Cells(memory, 64, kind, len(values))
+        assert cells.write(values)
+        assert memory[64 : 64 + 8 * len(values)] == struct.pack(layout, *values)
+        assert cells.read() == values
+        assert not any(memory[:64])
+
+
+@pytest.mark.parametrize(
+    ("kind", "values"), [("Integer", [2**63]), ("Integer", [1.5]), ("Real", [1.0, 2.0]), ("Real", ["1"])]
+)
+def test_values_that_do_not_fit_go_another_way(kind, values):
+    with mmap.mmap(-1, 4096) as memory:
+        assert not Cells(memory, 64, kind, 1).write(values)
+
+
+@pytest.mark.parametrize(
+    ("used", "limit", "hint"),
+    [
+        (100.0, None, ""),
+        (512.0, 1024.0, ""),
+        (1536.0, 2048.0, "; it had 2 of the 2 MiB that memory_limit allows: a likely reason"),
+        (61440.0, 102400.0, "; it had 60 of the 100 MiB that memory_limit allows: a likely reason"),
+    ],
+)
+def test_memory_is_named_where_much_of_it_is_used(used, limit, hint):
+    assert messages.memory_hint(used, limit) == hint
+
+
+@pytest.mark.parametrize("kind", [FmuError, StoppedError])
+def test_an_error_comes_back_as_it_was(kind):
+    error = kind("no more", instance="a", time=2.5, status="error", log=["[error] no"])
+    again = as_error(**content(frame(0, describe(error))[5:]))
+    assert type(again) is kind
+    assert (str(again), again.instance, again.time, again.status) == (str(error), "a", 2.5, "error")
+    assert again.log == ["[error] no"]
+
+
+def test_any_other_error_is_one_of_the_fmu_s():
+    again = as_error(**describe(ZeroDivisionError("by zero")))
+    assert type(again) is FmuError
+    assert str(again) == "ZeroDivisionError: by zero"
