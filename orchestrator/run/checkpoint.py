@@ -210,7 +210,7 @@ def _system(data: dict[str, Any]) -> System:
     instances = {name: Instance(**entry) for name, entry in data.pop("instances").items()}
     connections = [Connection(**entry) for entry in data.pop("connections")]
     events = [Event(**entry) for entry in data.pop("events")]
-    data["presets"] = tuple(data["presets"])
+    data["provenance"]["presets"] = tuple(data["provenance"]["presets"])
     parts = {"stepping": Stepping, "judged": Judged, "provenance": Provenance}
     made = {name: part(**data.pop(name)) for name, part in parts.items()}
     return System(**data, **made, instances=instances, connections=connections, events=events)

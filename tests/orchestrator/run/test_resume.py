@@ -127,10 +127,12 @@ else:
 def killed(what, directory, until):
     """Run in a process of its own until a checkpoint is as far as that, and kill it."""
     with subprocess.Popen([sys.executable, "-c", LONG, what, directory]) as process:
-        while not (directory / "checkpoint.zip").exists() or checkpoint.read_checkpoint(directory).time < until:
-            assert process.poll() is None
-            time.sleep(0.02)
-        process.kill()
+        try:
+            while not (directory / "checkpoint.zip").exists() or checkpoint.read_checkpoint(directory).time < until:
+                assert process.poll() is None
+                time.sleep(0.02)
+        finally:
+            process.kill()
 
 
 @POSIX
