@@ -92,7 +92,7 @@ def system(case: Draw, *, intervene: bool) -> System:
     """The system of a run."""
     h = case.step
     made = System(stop_time=WAIT + TRIP, step=h, seed=case.seed)
-    made.requirements["speed_limit"] = "always monitor.largest_overspeed <= 0"
+    made.judged.requirements["speed_limit"] = "always monitor.largest_overspeed <= 0"
     made.add("timetable", "Timetable", sample_time=h, wait=WAIT, preview=case.late)
     ato = STUCK if "stuck_from" in case.ato else "Cailc"
     made.add("ato", ato, **{"sample_time": h, "delay": case.late, "alpha": ALPHA, "barrier": BARRIER} | case.ato)

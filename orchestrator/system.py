@@ -168,7 +168,7 @@ class Provenance:
     origins: dict[str, str] = field(default_factory=dict, compare=False, repr=False)
 
 
-@dataclass(init=False)
+@dataclass(init=False, slots=True)
 class System:
     """What is simulated and how.
 

@@ -3,17 +3,24 @@
 from __future__ import annotations
 
 from collections.abc import Collection, Mapping, Sequence
-from typing import TYPE_CHECKING
+from typing import Protocol
 
 import numpy as np
 
-from ..master import Operation
+from ..master import Master, Operation
 from ..names import SignalName
 from ..wiring import Link
-from .blocks import Array, Continuous, Stepped
+from .blocks import Array, Block, Continuous, Stepped
 
-if TYPE_CHECKING:
-    from .closed_loop import Loop
+
+class Parts(Protocol):
+    """What is composed: the blocks of a master, the real connections between them, and the signals that are chosen."""
+
+    master: Master
+    blocks: dict[str, Block]
+    links: dict[SignalName, Link]
+    inputs: list[SignalName]
+    outputs: list[SignalName]
 
 
 class Composition:
@@ -22,7 +29,7 @@ class Composition:
     Every quantity is a row over (states at the begin, chosen inputs); a row is passed on as the master passes values.
     """
 
-    def __init__(self, loop: Loop, models: Mapping[str, Stepped], steps: Sequence[tuple[Operation, str]]) -> None:
+    def __init__(self, loop: Parts, models: Mapping[str, Stepped], steps: Sequence[tuple[Operation, str]]) -> None:
         self.loop, self.models, self.steps = loop, models, steps
         self.states = [SignalName(n, s) for n, block in loop.blocks.items() for s in block.states]
         self.registers: list[tuple[SignalName, int]] = []

@@ -24,7 +24,7 @@ from ..master import Master
 from ..system import Connection, Event, Instance, Judged, Provenance, Stepping, System
 
 CHECKPOINT_FILE = "checkpoint.zip"
-_FORMAT = 1
+_FORMAT = 2
 
 
 @dataclass(frozen=True)

@@ -179,7 +179,7 @@ def test_a_platoon_of_trains_gains_an_order_by_extrapolation(reference):
     for algorithm, order in (("gauss-seidel", 0), ("gauss-seidel", 1), ("iterative", 1)):
         for h in (2.0, 1.0):
             it = case["comfort_system"](reference, step=h, stop=60.0, algorithm=algorithm)
-            it.extrapolation = order
+            it.stepping.extrapolation = order
             result = run(it, kind="native")
             speeds = np.column_stack([result[f"train[{i}].speed"] for i in range(1, 5)])
             errors[algorithm, order, h] = np.abs(speeds - reference.closed_loop(stop=60.0, interval=h).v).max()

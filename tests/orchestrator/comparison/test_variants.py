@@ -244,7 +244,7 @@ def test_quiet_prints_what_failed_only(orchestrate, small, tmp_path):
 
 def test_a_variant_that_lacks_a_signal_is_drawn_without_it(small, tmp_path):
     other = variants([small])["calm"]
-    other.metrics, other.requirements, other.figures = {}, {}, []
+    other.judged.metrics, other.judged.requirements, other.judged.figures = {}, {}, []
     other.instances = {"wagon": other.instances["train"]}
     other.instances["wagon"].name = "wagon"
     comparison = compare({**variants([small]), "other": other}, kind="plain", output=tmp_path / "out")

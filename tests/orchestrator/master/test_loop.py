@@ -222,7 +222,7 @@ def loop(system, gain, bias=1.0, u=0.0, cls="Pass"):
 def test_a_loop_is_solved(system, gain, kind, algorithm):
     """y = gain y + 1 has the root 1 / (1 - gain); exchange alone finds it only where |gain| < 1, and slowly near 1."""
     it = loop(system, gain)
-    it.algorithm = algorithm
+    it.stepping.algorithm = algorithm
     result = go(it, kind=kind)
     assert result["a.y"][0] == pytest.approx(1.0 / (1.0 - gain), rel=1e-9)
     assert result["b.y"][0] == pytest.approx(result["a.y"][0], rel=1e-9)

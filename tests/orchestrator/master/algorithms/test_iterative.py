@@ -220,8 +220,8 @@ def test_a_platoon_of_sampled_controllers_is_that_of_gauss_seidel():
     runs = []
     for algorithm in ("gauss-seidel", "iterative"):
         it = load("fault_tolerant_cruise")
-        it.algorithm, it.stop_time = algorithm, 1.0
-        it.requirements, it.metrics, it.published, it.figures = {}, {}, [], []
+        it.stepping.algorithm, it.stepping.stop_time = algorithm, 1.0
+        it.judged.requirements, it.judged.metrics, it.judged.published, it.judged.figures = {}, {}, [], []
         runs.append(run(it, kind="plain"))
     a, b = runs
     assert a.checked.order.late == ()
@@ -238,7 +238,7 @@ def test_a_platoon_of_sampled_controllers_is_that_of_gauss_seidel():
 def test_truth_values_are_repeated_too(mine):
     """A relay that switches within the step: on at its begin, off at its end, and off is what acts."""
     it = System(stop_time=1.0, step=0.3, algorithm="iterative", record=0.3)
-    it.stop_time = 0.9
+    it.stepping.stop_time = 0.9
     it.add("heater", mine("Heater"), x=0.0)
     it.add("relay", mine("Level"), upside_down=True, level=-1.0)
     it.connect("heater.x", "relay.u")
