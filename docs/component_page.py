@@ -23,7 +23,7 @@ from railcosim.components.declarations import Data, Input, Memory, Parameter, Si
 from railcosim.components.tracing import TracingError, feedthrough
 from railcosim.fmus.description import default_step, summary
 from railcosim.fmus.documentation import stepping
-from railcosim.fmus.reference_signals import EXCITATION, STEPS, reference_signals
+from railcosim.fmus.documentation.reference_signals import EXCITATION, STEPS, reference_signals
 
 EXPERIMENTS = tomllib.loads((Path(__file__).parent / "experiments.toml").read_text(encoding="utf-8"))
 _COLOURS = ("#3f7fd0", "#d9772b", "#2f9e63", "#b0559e", "#b8952a", "#5ba7b5")

@@ -19,7 +19,7 @@ from .kinds import FmuKind
 
 _FOLDER = Path(__file__).parent
 _MAKERS: dict[FmuKind, tuple[str, ...]] = {"python": (TOOL, "pythonfmu"), "native": (TOOL, "casadi")}
-_MADE_BY = ("*.py", "resources/*.png", "resources/*.txt", "runtime/*.[ch]")
+_MADE_BY = ("*.py", "documentation/*.py", "native/*.py", "resources/*.png", "resources/*.txt", "runtime/*.[ch]")
 
 
 def source_digest(component: Component, kind: FmuKind) -> str:

@@ -26,8 +26,8 @@ def sources(component: Component, guid: str) -> dict[str, str]:
             f"{type(component).__name__} imports {', '.join(component.requires)}, which C cannot: only a Python FMU "
             "can be made of it"
         )
-    from .tables import model_header  # noqa: PLC0415 (CasADi is an extra, and slow to import)
-    from .trace import trace  # noqa: PLC0415
+    from .native.tables import model_header  # noqa: PLC0415 (CasADi is an extra, and slow to import)
+    from .native.trace import trace  # noqa: PLC0415
 
     name = type(component).__name__
     traced = trace(component, name)

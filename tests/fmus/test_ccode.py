@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 ca = pytest.importorskip("casadi")
-ccode = pytest.importorskip("railcosim.fmus.ccode")
+ccode = pytest.importorskip("railcosim.fmus.native.ccode")
 HEAD = "#include <math.h>\n"
 PAIRS = [(0.7, 1.9), (-1.3, 2.0), (2.0, 2.0), (0.0, -0.5), (1e-300, 1e300), (-0.0, 0.0)]
 

@@ -16,8 +16,8 @@ from railcosim.components import CATALOGUE, ComfortCruise, ComponentError, Gust,
 from railcosim.fmus import documentation, toolchain
 from railcosim.fmus.build import build, native_problem
 from railcosim.fmus.documentation import page
-from railcosim.fmus.formulas import Formulas
-from railcosim.fmus.reference_signals import STEPS, reference_signals
+from railcosim.fmus.documentation.formulas import Formulas
+from railcosim.fmus.documentation.reference_signals import STEPS, reference_signals
 from railcosim.fmus.references import resolve
 
 ROOT = Path(__file__).parents[2]
@@ -301,7 +301,7 @@ def test_both_kinds_carry_the_same_page():
 
 def test_licences():
     own = (ROOT / "LICENSE").read_text()
-    assert (Path(documentation.__file__).parent / "resources" / "license.txt").read_text() == own
+    assert (Path(documentation.__file__).parents[1] / "resources" / "license.txt").read_text() == own
     of_kind = {kind: documentation.files(Gust(), kind) for kind in KINDS}
     for found in of_kind.values():
         assert found["documentation/licenses/license.txt"].decode() == own

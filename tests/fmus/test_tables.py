@@ -6,9 +6,9 @@ from pathlib import Path
 
 import pytest
 from railcosim.components import Component, ComponentError, Input, Output, Parameter, PointMassTrain
+from railcosim.fmus.native.tables import model_header
+from railcosim.fmus.native.trace import trace
 from railcosim.fmus.references import resolve
-from railcosim.fmus.tables import model_header
-from railcosim.fmus.trace import trace
 
 MIXED = f"{Path(__file__).parent / 'native_samples.py'}:Mixed"
 

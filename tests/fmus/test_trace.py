@@ -7,8 +7,8 @@ import casadi as ca
 import pytest
 from railcosim.components import Component, ComponentError, Input, Memory, Output, Parameter, Size, State, maths
 from railcosim.components.tracing import TracingError
-from railcosim.fmus.ccode import function, number
-from railcosim.fmus.trace import Symbol, layout, trace
+from railcosim.fmus.native.ccode import function, number
+from railcosim.fmus.native.trace import Symbol, layout, trace
 from railcosim.fmus.variables import scalar_variables
 
 

@@ -16,7 +16,7 @@ import pytest
 from fmpy import read_model_description
 from railcosim.components import CATALOGUE
 from railcosim.fmus.build import build
-from railcosim.fmus.reference_signals import STEPS
+from railcosim.fmus.documentation.reference_signals import STEPS
 from railcosim.fmus.toolchain import FLAGS, PLATFORMS, has_zig
 
 IMPORTER = Path(__file__).parent / "c" / "importer.c"

@@ -141,7 +141,7 @@ def test_what_is_not_an_array_is_refused(arguments):
 
 def compile_kernel(target, *flags):
     command = [GCC, "-Wall", "-Wextra", "-Wconversion", "-Wshadow", "-Werror", "-ffp-contract=off", "-shared", "-fPIC"]
-    sources = [MASTER / name for name in ("kernel.c", "stepping.c", "team.c")]
+    sources = [MASTER / "native" / name for name in ("kernel.c", "stepping.c", "team.c")]
     command += [f"-I{sysconfig.get_paths()['include']}", *flags, *sources, "-o", target]
     subprocess.run(command, check=True)
     return target

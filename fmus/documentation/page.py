@@ -9,17 +9,17 @@ from pathlib import Path
 
 import numpy as np
 
-from ..components import __name__ as _shipped
-from ..components.component import Component, ComponentError
-from ..components.declarations import State
-from ..components.tracing import TracingError, feedthrough
-from .description import arguments, summary
+from ...components import __name__ as _shipped
+from ...components.component import Component, ComponentError
+from ...components.declarations import State
+from ...components.tracing import TracingError, feedthrough
+from ..description import arguments, summary
+from ..kinds import NOTE_OF_KIND, FmuKind
+from ..variables import scalar_variables
 from .formulas import Formulas
-from .kinds import NOTE_OF_KIND, FmuKind
 from .reference_signals import EXCITATION, STEPS, reference_signals
-from .variables import scalar_variables
 
-_RESOURCES = Path(__file__).parent / "resources"
+_RESOURCES = Path(__file__).parents[1] / "resources"
 _STYLE = (
     "body{font:15px/1.5 sans-serif;max-width:60em;margin:2em auto;padding:0 1em;color:#222}"
     "table{border-collapse:collapse;width:100%}td,th{border-bottom:1px solid #ddd;padding:.2em .6em;text-align:left;"

@@ -12,10 +12,10 @@ from typing import Any
 
 import numpy as np
 
-from ..components.component import Component, Slot
-from ..components.declarations import Input, Output
-from ..components.simulate import simulate
-from .description import default_step
+from ...components.component import Component, Slot
+from ...components.declarations import Input, Output
+from ...components.simulate import simulate
+from ..description import default_step
 
 STEPS = 50
 EXCITATION = (

@@ -10,7 +10,7 @@ from __future__ import annotations
 import html
 from typing import Any
 
-from ..components.component import ComponentError
+from ...components.component import ComponentError
 
 _SIZE = 15.0
 """Font size in px."""

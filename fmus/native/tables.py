@@ -7,12 +7,12 @@ from typing import Any
 
 import numpy as np
 
-from ..components.component import Component, ComponentError
-from ..components.declarations import Input, Output, Parameter, Tape
-from ..components.tracing import feedthrough
+from ...components.component import Component, ComponentError
+from ...components.declarations import Input, Output, Parameter, Tape
+from ...components.tracing import feedthrough
+from ..variables import ScalarVariable, scalar_variables
 from .ccode import number
 from .trace import Traced
-from .variables import ScalarVariable, scalar_variables
 
 _TYPES = {float: "TYPE_REAL", int: "TYPE_INTEGER", bool: "TYPE_BOOLEAN", str: "TYPE_STRING"}
 _RUNTIME_VARIABLES = (

@@ -17,12 +17,12 @@ from typing import Any, NoReturn
 import casadi as ca
 import numpy as np
 
-from ..components.component import Component, ComponentError, Method, Slot, evaluated
-from ..components.declarations import Memory, Output, State, Tape
-from ..components.maths import SymbolArray, elementwise
-from ..components.tracing import TracingError
+from ...components.component import Component, ComponentError, Method, Slot, evaluated
+from ...components.declarations import Memory, Output, State, Tape
+from ...components.maths import SymbolArray, elementwise
+from ...components.tracing import TracingError
+from ..variables import scalar_variables
 from .ccode import function
-from .variables import scalar_variables
 
 _FUNCTIONS = {
     "sqrt": ca.sqrt,
@@ -36,7 +36,12 @@ _FUNCTIONS = {
     "abs": ca.fabs,
 }
 _REMEDY = "on values use operators, slices, reshaping and railcosim.components.maths, nothing else"
-_NOT_THE_AUTHORS = (Path(__file__).parent, Path(__file__).parents[1] / "components", Path(np.__file__).parent)
+_NOT_THE_AUTHORS = (
+    Path(__file__).parent,
+    Path(__file__).parents[1],
+    Path(__file__).parents[2] / "components",
+    Path(np.__file__).parent,
+)
 """Folders whose files are never to blame: this package, `maths` and its neighbours, NumPy."""
 
 
