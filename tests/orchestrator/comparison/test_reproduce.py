@@ -81,7 +81,7 @@ def test_the_command_of_every_shipped_case_loads_the_same_system() -> None:
         assert (program, run) == ("orchestrate", "run")
         again = load(name, preset=preset[1] if preset else None)
         assert again.instances == case.system.instances
-        assert not again.modified
+        assert not again.provenance.modified
 
 
 def test_one_table_with_claim_published_measured_tolerance_and_verdict_under_the_command(

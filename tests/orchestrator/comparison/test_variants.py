@@ -61,9 +61,9 @@ def test_one_scenario_has_its_presets_and_swaps_as_variants_after_itself():
         "cruise=RangePotentialCruise",
         "cruise[2]=FixedDistanceCruise,train=PointMassTrain",
     ]
-    assert found["as-stated"].preset == "as-stated"
+    assert found["as-stated"].provenance.preset == "as-stated"
     assert found["cruise=RangePotentialCruise"].instances["cruise[1]"].model == "RangePotentialCruise"
-    assert found["cruise=RangePotentialCruise"].preset == "figure-consistent"
+    assert found["cruise=RangePotentialCruise"].provenance.preset == "figure-consistent"
 
 
 def test_of_several_scenarios_each_has_the_presets_it_knows():

@@ -218,9 +218,9 @@ def test_what_a_container_cannot_do_is_refused_by_name(tmp_path, options, part):
     [
         ("[[events]]", lambda s: s.events.append(Event("gust.acceleration", "freeze", 0.5))),
         ("train: a step of its own", lambda s: setattr(s.instances["train"], "step", 0.2)),
-        ("algorithm = iterative", lambda s: setattr(s, "algorithm", "iterative")),
-        ("extrapolation = 1", lambda s: setattr(s, "extrapolation", 1)),
-        ("algebraic_loops = solve", lambda s: setattr(s, "algebraic_loops", "solve")),
+        ("algorithm = iterative", lambda s: setattr(s.stepping, "algorithm", "iterative")),
+        ("extrapolation = 1", lambda s: setattr(s.stepping, "extrapolation", 1)),
+        ("algebraic_loops = solve", lambda s: setattr(s.stepping, "algebraic_loops", "solve")),
     ],
 )
 def test_what_would_be_lost_in_a_container_is_refused(tmp_path, what, change):

@@ -29,7 +29,7 @@ def start(system, name):
 
 def test_the_default_preset_is_the_file_as_it_stands():
     assert loads(EXAMPLE, preset="nominal") == loads(EXAMPLE)
-    assert loads(edited(('default_preset = "nominal"\n', ""), ('preset = "nominal"\n', ""))).preset is None
+    assert loads(edited(('default_preset = "nominal"\n', ""), ('preset = "nominal"\n', ""))).provenance.preset is None
 
 
 def test_a_preset_is_not_a_modification():
@@ -58,8 +58,8 @@ def test_a_preset_is_not_a_modification():
     ],
 )
 def test_anything_changed_beyond_the_preset_is_a_modification(changes):
-    assert loads(EXAMPLE, **changes).modified
-    assert loads(EXAMPLE, preset="gentle", **changes).modified
+    assert loads(EXAMPLE, **changes).provenance.modified
+    assert loads(EXAMPLE, preset="gentle", **changes).provenance.modified
 
 
 @pytest.mark.parametrize(
@@ -73,7 +73,7 @@ def test_anything_changed_beyond_the_preset_is_a_modification(changes):
     ],
 )
 def test_a_change_to_the_same_value_is_none(changes):
-    assert not loads(EXAMPLE, **changes).modified
+    assert not loads(EXAMPLE, **changes).provenance.modified
 
 
 @pytest.mark.parametrize("change", [{"step": 0.25}, {"settings": ["simulation.step=0.25"]}])

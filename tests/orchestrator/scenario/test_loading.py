@@ -82,7 +82,7 @@ def test_the_whole_of_a_scenario():
 
 
 def test_origins_for_messages_of_later_checks():
-    origins = loads(EXAMPLE, "two.toml", preset="gentle", settings=["train[2].speed=3"]).origins
+    origins = loads(EXAMPLE, "two.toml", preset="gentle", settings=["train[2].speed=3"]).provenance.origins
     assert origins["train[1]"] == "two.toml:9"
     assert origins["train[1].speed"] == "two.toml:13"
     assert origins["train[2].speed"] == "--set train[2].speed=3"
@@ -140,7 +140,7 @@ def test_one_instance_that_differs_and_instances_listed_singly():
 
 def test_order_names_instances_or_all_of_a_name():
     text = edited(("record = 1.0", 'order = ["cruise", "train[2]", "train[1]", "target"]'))
-    assert loads(text).order == ["cruise[1]", "cruise[2]", "train[2]", "train[1]", "target"]
+    assert loads(text).stepping.order == ["cruise[1]", "cruise[2]", "train[2]", "train[1]", "target"]
 
 
 # -------------------------------------------------------------------- shipped scenarios, files
@@ -169,7 +169,7 @@ def test_what_is_said_when_there_is_no_such_scenario(monkeypatch, tmp_path):
         with pytest.raises(ScenarioError) as caught:
             find(name)
         assert str(caught.value).startswith(message)
-    assert load("mine.toml").title == "Two trains"
+    assert load("mine.toml").provenance.title == "Two trains"
     assert preset_names(tmp_path / "mine.toml") == ("nominal", "gentle", "mixed")
 
 

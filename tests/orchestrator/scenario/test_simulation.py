@@ -31,8 +31,9 @@ def problems(text, **changes):
 def test_without_a_word_the_values_are_those_of_a_system():
     system, other = loads(TEXT), System()
     keys = ("extrapolation", "algebraic_loops", "tolerance", "tolerances", "max_iterations")
-    for key in (*keys, "relaxation", "acceleration", "min_step", "events"):
-        assert getattr(system, key) == getattr(other, key), key
+    for key in (*keys, "relaxation", "acceleration", "min_step"):
+        assert getattr(system.stepping, key) == getattr(other.stepping, key), key
+    assert system.events == other.events
 
 
 @pytest.mark.parametrize(
@@ -50,13 +51,13 @@ def test_without_a_word_the_values_are_those_of_a_system():
     ],
 )
 def test_a_value_in_the_file_in_a_preset_and_on_the_command_line(key, text, value):
-    assert getattr(loads(simulation(f"{key} = {text}")), key) == value
+    assert getattr(loads(simulation(f"{key} = {text}")).stepping, key) == value
     preset = TEXT + f'[presets.other]\n"simulation.{key}" = {text}\n'
-    assert getattr(loads(preset, preset="other"), key) == value
-    assert getattr(loads(preset), key) != value
+    assert getattr(loads(preset, preset="other").stepping, key) == value
+    assert getattr(loads(preset).stepping, key) != value
     changed = loads(TEXT, settings=[f"simulation.{key}={text}"])
-    assert (getattr(changed, key), changed.modified) == (value, True)
-    assert changed.origins[f"simulation.{key}"] == f"--set simulation.{key}={text}"
+    assert (getattr(changed.stepping, key), changed.provenance.modified) == (value, True)
+    assert changed.provenance.origins[f"simulation.{key}"] == f"--set simulation.{key}={text}"
 
 
 @pytest.mark.parametrize(
@@ -109,7 +110,7 @@ def test_the_shortest_step_is_compared_with_the_step_there_is():
 
 def test_steps_of_variable_length_need_no_grid():
     text = simulation('algorithm = "adaptive"', "record = 0.03").replace("stop_time = 10.0", "stop_time = 10.123")
-    assert (loads(text).record, loads(text).stop_time) == (0.03, 10.123)
+    assert (loads(text).stepping.record, loads(text).stepping.stop_time) == (0.03, 10.123)
     assert [problem.partition(": ")[0] for problem in problems(text, algorithm="jacobi")] == ["x.toml:2", "x.toml:5"]
     assert problems(text.replace("0.03", "0")) == [
         "x.toml:5: simulation.record: the distance of rows must be greater than 0 s, not 0 s"
@@ -161,12 +162,12 @@ TOLERANCES = simulation("[simulation.tolerances]", '"train[2].speed" = [0, 0.1]'
 def test_what_comes_later_wins_all_over_one_and_arrays_over_elements(setting, line, changed):
     made = {"train[2].speed": [0.0, 0.1], "mass.x[1]": [0.5, 0.0]} | changed
     expected = {name: pair for name, pair in made.items() if pair is not None}
-    assert loads(TOLERANCES, settings=[f"simulation.tolerances.{setting}"]).tolerances == expected
+    assert loads(TOLERANCES, settings=[f"simulation.tolerances.{setting}"]).stepping.tolerances == expected
     for key in ("[presets.other.simulation.tolerances]\n", '[presets.other."simulation.tolerances"]\n'):
-        assert loads(f"{TOLERANCES}{key}{line}\n", preset="other").tolerances == expected
+        assert loads(f"{TOLERANCES}{key}{line}\n", preset="other").stepping.tolerances == expected
     name, _, value = setting.partition("=")
     table = f'simulation.tolerances={{ "{name}" = {value} }}'
-    assert loads(TOLERANCES, settings=[table]).tolerances == expected
+    assert loads(TOLERANCES, settings=[table]).stepping.tolerances == expected
 
 
 @pytest.mark.parametrize(
