@@ -116,7 +116,7 @@ def test_defaults_are_not_written_out():
 def test_published_values_are_owed_by_the_preset_they_belong_to_and_by_no_modified_system():
     assert [entry["metric"] for entry in loads(dump(loads(EXAMPLE))).judged.published] == ["settling"]
     gentle = loads(dump(loads(EXAMPLE, preset="gentle")))
-    assert (gentle.preset, [entry["metric"] for entry in gentle.published]) == ("gentle", ["gap[2]"])
+    assert (gentle.provenance.preset, [entry["metric"] for entry in gentle.judged.published]) == ("gentle", ["gap[2]"])
     assert loads(dump(loads(EXAMPLE, stop_time=60))).judged.published == []
 
 
