@@ -22,7 +22,7 @@ duration = 20.0
 def test_a_frozen_position_sensor_makes_a_requirement_fail(tmp_path):
     """For 20 s all believe that the second of four trains stands still: the gap behind it seems to close by 1.7 km."""
     scenario = tmp_path / "frozen.toml"
-    scenario.write_text(load("comfort_cruise").text + FROZEN)
+    scenario.write_text(load("comfort_cruise").provenance.text + FROZEN)
     result, before = execute(load(scenario, stop_time=300.0)), execute(load("comfort_cruise", stop_time=300.0))
     fine, verdicts = ({v.name: v for v in outcome.requirements} for outcome in (before, result))
     assert (fine["spacing"].verdict, verdicts["spacing"].verdict) == ("pass", "fail")

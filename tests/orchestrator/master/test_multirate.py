@@ -287,7 +287,7 @@ def test_a_step_of_its_own_stays_unless_it_is_the_system_s(text, way):
 def test_half_the_step_halves_the_base(text, tmp_path, capsys):
     """What samples twice as often counts twice as far, and what keeps its own step counts as before."""
     half = at_half_the_step(loads(text, "x.toml"))
-    assert (half.step, half.record, half.rescaled_from) == (0.25, 0.5, 0.5)
+    assert (half.stepping.step, half.stepping.record, half.provenance.rescaled_from) == (0.25, 0.5, 0.5)
     assert steps(half) == ([0.25, 2.0, 0.25], [0.25, 2.0, 0.25])
     result = execute(half, kind="plain")
     assert list(result.time) == [0.5 * k for k in range(13)]

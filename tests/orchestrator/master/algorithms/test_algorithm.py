@@ -95,7 +95,7 @@ def test_what_it_says_of_itself_is_heard(pair, backwards, tmp_path, capsys):
     assert "backwards steps in the order" in said
     assert call(["list"]) == 0
     assert "  backwards: Instances step one after the other, the last one first." in capsys.readouterr().out
-    assert loads(path.read_text(), str(path)).algorithm == "backwards"
+    assert loads(path.read_text(), str(path)).stepping.algorithm == "backwards"
     with pytest.raises(ScenarioError, match="it is for two"):
         run(pair("backwards", 3), kind="plain")
 
