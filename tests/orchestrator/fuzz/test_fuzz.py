@@ -298,7 +298,7 @@ def try_text(watched, tmp_path):
         if system is None:
             return
         again = loads(dump(system), path)
-        again.published = system.judged.published  # those of other presets are left out
+        again.judged.published = system.judged.published  # those of other presets are left out
         assert comparable(again) == comparable(system)
         if checked:
             with Workspace() as place, contextlib.suppress(RailcosimError), watched(place.folder):
@@ -331,7 +331,7 @@ def test_any_file_is_a_scenario_or_refused(explore, watched, tmp_path):
 
     explore(rule, damaged() | st.binary(max_size=60), quick=60, deep=600)
     path.write_bytes(b"\xef\xbb\xbf" + SMALL.replace("\n", "\r\n").encode())
-    assert load(path).title == "Small"
+    assert load(path).provenance.title == "Small"
 
 
 DEEP = 20_000
