@@ -172,15 +172,19 @@ class Provenance:
 class System:
     """What is simulated and how.
 
-    Attributes:
-        instances: by name. connections: between them. events: what happens on the way.
-        seed: of all noise.
-        stepping: how it is stepped. judged: what is made of the results. provenance: where it came from.
-
     Args:
-        instances, connections, events, seed, stepping, judged, provenance: as above.
+        instances: by name.
+        connections: between them.
+        events: what happens on the way.
+        seed: of all noise.
+        stepping: how it is stepped.
+        judged: what is made of the results.
+        provenance: where it came from.
         **values: fields of `Stepping`, `Judged` and `Provenance` by their names, in place of those given:
             ``System(step=0.1, stop_time=60.0, metrics={"peak": "max(train.speed)"})``.
+
+    Attributes:
+        instances, connections, events, seed, stepping, judged, provenance: as above.
 
     Raises:
         TypeError: there is no such field.
