@@ -293,7 +293,7 @@ def truth(entry: Entry, problems: list[Problem]) -> bool:
 
 def choice(entry: Entry, problems: list[Problem], valid: Collection[str], what: str) -> str:
     """One of a few words; `what` they are called in the message."""
-    if entry.value in valid:
+    if isinstance(entry.value, str) and entry.value in valid:
         return str(entry.value)
     near = suggestion(str(entry.value), valid) or f"there are {', '.join(valid)}"
     problems.append(entry.problem(f"there is no {what} {shown(entry.value)}", near))

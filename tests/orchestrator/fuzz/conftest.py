@@ -18,7 +18,7 @@ def explore(request):
             max_examples=quick if request.param == "quick" else deep,
             derandomize=request.param == "quick",
             database=None,
-            deadline=10_000,
+            deadline=60_000,  # ms: the largest scenario takes 0.6 s, and what may not take long takes for ever
             suppress_health_check=list(HealthCheck),
         )
         @given(st.tuples(*strategies))

@@ -95,7 +95,8 @@ def commands(draw):
     for given in draw(st.lists(st.one_of(OPTIONS[name]), max_size=3)):
         arguments += given
     if not draw(st.integers(0, 15)):
-        arguments.insert(draw(st.integers(0, len(arguments))), draw(WORDS))
+        places = [k for k in range(len(arguments) + 1) if not k or arguments[k - 1] != "-o"]  # where files go is known
+        arguments.insert(draw(st.sampled_from(places)), draw(WORDS))
     return arguments
 
 

@@ -64,6 +64,11 @@ MISTAKES = [
         "algorithm = 3",
         "two.toml:7: simulation.algorithm: there is no algorithm 3; there are adaptive, gauss-seidel",
     ),
+    (
+        "record = 1.0",
+        'algorithm = ["jacobi"]',
+        "two.toml:7: simulation.algorithm: there is no algorithm ['jacobi']; did you mean 'jacobi'?",
+    ),
     ("record = 1.0", "seed = 1.5", "two.toml:7: simulation.seed: takes a whole number from 0 to 2**63 - 1, not 1.5"),
     ("record = 1.0", "seed = -1", "two.toml:7: simulation.seed: takes a whole number from 0 to 2**63 - 1, not -1"),
     (
