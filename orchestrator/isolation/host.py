@@ -9,7 +9,6 @@ import contextlib
 import ctypes
 import mmap
 import os
-import pickle
 import signal
 import socket
 import sys
@@ -199,7 +198,7 @@ class Host:
                 told["failed"] = k, self._describe(error)
                 break
             if cells is None or not cells.write(values):
-                told.setdefault("texts", {})[k] = values
+                told.setdefault("texts", []).append((k, values))
         return told
 
     def _add_channel(self, content: tuple[Any, Sequence[str], int | None]) -> None:
@@ -249,7 +248,7 @@ def main(folder: str, door: str) -> None:
         door: the number of the inherited socket, or ``"host:port"`` of one to connect to.
     """
     end = _connect(door)
-    start: dict[str, Any] = pickle.loads((Path(folder) / "start").read_bytes())
+    start: dict[str, Any] = messages.content((Path(folder) / "start").read_bytes())
     with contextlib.suppress(ValueError):  # a Ctrl-C is for the master, which ends the run properly
         signal.signal(signal.SIGINT, signal.SIG_IGN)
     sys.path[:] = start["path"]
@@ -258,9 +257,9 @@ def main(folder: str, door: str) -> None:
     with (Path(folder) / "memory").open("r+b") as stream:
         memory = mmap.mmap(stream.fileno(), 0)
     notes = memoryview(memory)[: messages.HEAD].cast("q")
-    from ..fmi.binding import SLAVES  # noqa: PLC0415 (after the path is set; and what it needs is not the FMU's memory)
+    from ..fmi.binding import SLAVES, read_interface  # noqa: PLC0415 (after the path is set; and what it needs is not the FMU's memory)
 
-    name, folder_of_fmu, interface = start["name"], Path(start["folder"]), pickle.loads(start["interface"])
+    name, folder_of_fmu, interface = start["name"], Path(start["folder"]), read_interface(start["interface"])
     before = _memory_in_use()
     limit = _limit_memory(before, start["memory_limit"])
     host = Host(end, memory, notes, before, limit)

@@ -6,11 +6,13 @@ rung leaves the memory alone until the other has answered.
 
 from __future__ import annotations
 
+import base64
+import json
 import mmap
-import pickle
 import socket
 import struct
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
 from ..errors import FmuError, StoppedError
@@ -50,14 +52,69 @@ def note(call: str, channel: int = 0) -> int:
 
 
 def frame(kind: int, content: Any) -> bytes:
-    """A frame of Python objects."""
-    body = pickle.dumps(content, pickle.HIGHEST_PROTOCOL)
+    """A frame of numbers, texts, bytes, and lists and mappings of them: JSON, because who reads it trusts nobody."""
+    body = encoded(content)
     return FRAME.pack(kind, len(body)) + body
 
 
+def encoded(content: Any) -> bytes:
+    """The same without a head; `content` reads it."""
+    return json.dumps(content, default=_as_text).encode()
+
+
 def content(body: bytes) -> Any:
-    """What a frame of Python objects holds."""
-    return pickle.loads(body)
+    """What such a frame holds."""
+    return json.loads(body, object_hook=_as_bytes)
+
+
+_BYTES = "bytes in base64"
+
+
+def _as_text(value: Any) -> Any:
+    if isinstance(value, bytes):
+        return {_BYTES: base64.b64encode(value).decode()}
+    raise TypeError(f"a {type(value).__name__} goes into no message")
+
+
+def _as_bytes(found: dict[str, Any]) -> Any:
+    return base64.b64decode(found[_BYTES]) if found.keys() == {_BYTES} else found
+
+
+@dataclass(frozen=True)
+class Report:
+    """What a host has to tell.
+
+    Attributes:
+        time: of the instance, in s. result: of a call. error: what went wrong.
+        texts: values that have no place in the memory, by channel.
+        failed: the channel that could not be read, and why.
+    """
+
+    time: float
+    result: Any = None
+    error: FmuError | None = None
+    texts: Mapping[int, list[Any]] = field(default_factory=dict)
+    failed: tuple[int, FmuError] | None = None
+
+    @classmethod
+    def read(cls, body: bytes, instance: str) -> Report:
+        """Out of a frame, which an FMU may have written as well.
+
+        Raises:
+            ValueError: there is anything else in it.
+        """
+        try:
+            told = content(body)
+            time, error, failed = float(told["time"]), told.get("error"), told.get("failed")
+            return cls(
+                time,
+                told.get("result"),
+                None if error is None else as_error(error, instance, time),
+                {int(channel): list(values) for channel, values in told.get("texts", ())},
+                None if failed is None else (int(failed[0]), as_error(failed[1], instance, time)),
+            )
+        except Exception as error:
+            raise ValueError(f"{type(error).__name__}: {error}") from error
 
 
 class Door:
@@ -161,6 +218,13 @@ def describe(error: Exception) -> dict[str, Any]:
     return {"stops": False, "message": f"{type(error).__name__}: {error}", "log": []}
 
 
-def as_error(stops: bool, message: str, **told: Any) -> FmuError:
-    """The error that `describe` described."""
-    return (StoppedError if stops else FmuError)(message, **told)
+def as_error(told: Mapping[str, Any], instance: str, time: float) -> FmuError:
+    """The error that `describe` described, of this instance at this time in s where it does not say."""
+    kind, time_told = StoppedError if told["stops"] else FmuError, told.get("time", time)
+    return kind(
+        str(told["message"]),
+        instance=str(told.get("instance", instance)),
+        time=None if time_told is None else float(time_told),
+        status=str(told.get("status", "")),
+        log=[str(line) for line in told["log"]],
+    )

@@ -5,7 +5,6 @@ from __future__ import annotations
 import contextlib
 import mmap
 import os
-import pickle
 import subprocess
 import sys
 import tempfile
@@ -14,6 +13,7 @@ from collections.abc import Callable
 from pathlib import Path
 
 from ..fmi import Interface
+from ..fmi.binding import plain_interface
 from . import messages
 from .launch import accept, end_process, signal_name, start_process, starting
 from .messages import NOTE_CALL, NOTE_MEMORY, Door
@@ -71,9 +71,9 @@ class HostProcess:
             "memory_limit": _default_limit() if memory_limit is None else memory_limit,
             "name": name,
             "folder": str(folder),
-            "interface": pickle.dumps(interface, pickle.HIGHEST_PROTOCOL),
+            "interface": plain_interface(interface),
         }
-        (self._folder / "start").write_bytes(pickle.dumps(start))
+        (self._folder / "start").write_bytes(messages.encoded(start))
         with (self._folder / "memory").open("w+b") as stream:
             stream.truncate(messages.HEAD + 8 * cells)
             self.memory = mmap.mmap(stream.fileno(), 0)

@@ -18,7 +18,7 @@ from ..errors import FmuError, LostError
 from ..fmi import Interface, Type
 from ..fmi.binding import call_name
 from . import messages
-from .messages import Cells, frame
+from .messages import Cells, Report, frame
 from .process import HostLostError, HostProcess
 
 _SPARE_CELLS = 4096
@@ -250,7 +250,8 @@ class IsolatedSlave:
             wanted = [channel, *habit]
             self._take(wanted, self._call("get", [x.index for x in wanted]))
         if channel.problem is not None and channel.problem[0] == self.moment:
-            raise self._error(channel.problem[1])
+            self.log = channel.problem[1].log
+            raise channel.problem[1]
 
     # ---------------------------------------------------------------- talk
 
@@ -272,12 +273,12 @@ class IsolatedSlave:
             self._finish()
         if operation not in ("save", "serialize"):
             self.outdate()
-        return self._call(operation, *arguments).get("result")
+        return self._call(operation, *arguments).result
 
-    def _call(self, operation: str, *arguments: Any) -> dict[str, Any]:
+    def _call(self, operation: str, *arguments: Any) -> Report:
         # The queue first: what waits to be set may stand in it.
         self._send(frame(messages.CALL, (self._dirty, operation, arguments)))
-        return self._checked(self._receive() or {})
+        return self._checked(self._receive())
 
     def _send(self, ring: bytes) -> None:
         if self._lost is not None:
@@ -294,7 +295,7 @@ class IsolatedSlave:
         """Wait for the process and for the instance in it."""
         try:
             self._process.wait_until_ready()
-            self._checked(self._receive() or {})
+            self._checked(self._receive())
         except HostLostError as lost:
             raise self._mourn(lost) from lost
         except FmuError as error:
@@ -302,17 +303,17 @@ class IsolatedSlave:
             raise
         self._is_made = True
 
-    def _receive(self) -> dict[str, Any] | None:
+    def _receive(self) -> Report | None:
         """What the process tells; None if there is nothing to tell."""
         if self._lost is not None:
             raise self._lost
         try:
             kind, body = self._process.receive()
-            return messages.content(body) if kind == messages.REPORT else None
+            return Report.read(body, self.name) if kind == messages.REPORT else None
         except HostLostError as lost:
             raise self._mourn(lost) from lost
-        except Exception as error:  # of reading what an FMU has overwritten
-            message = f"its process sends what cannot be read ({type(error).__name__}: {error}) and was ended"
+        except ValueError as error:  # an FMU has written there
+            message = f"its process sends what cannot be read ({error}) and was ended"
             self._process.kill()
             raise self._mourn(HostLostError(message, [])) from error
         except BaseException:  # a second Ctrl-C: it is not waited for
@@ -329,27 +330,24 @@ class IsolatedSlave:
         self._lost = LostError(str(lost), instance=self.name, time=time, log=lost.log)
         return self._lost
 
-    def _checked(self, report: dict[str, Any]) -> dict[str, Any]:
+    def _checked(self, report: Report | None) -> Report:
         """A report of something that went well; anything else is raised."""
-        self.time = report.get("time", self.time)
-        if "error" in report:
-            raise self._error(report["error"])
+        if report is None:
+            return Report(self.time)
+        self.time = report.time
+        if report.error is not None:
+            self.log = report.error.log
+            raise report.error
         return report
 
-    def _error(self, told: dict[str, Any]) -> FmuError:
-        self.log = told["log"]
-        whole: dict[str, Any] = {"instance": self.name, "time": self.time} | told
-        return messages.as_error(**whole)
-
-    def _take(self, channels: Iterable[IsolatedChannel], report: dict[str, Any]) -> None:
+    def _take(self, channels: Iterable[IsolatedChannel], report: Report) -> None:
         """Note what was read."""
-        texts = report.get("texts", {})
-        failed, error = report.get("failed", (None, {}))
+        failed, error = report.failed or (None, None)
         for channel in channels:
-            if channel.index == failed:
+            if channel.index == failed and error is not None:
                 channel.problem = self.moment, error
                 break
-            channel.moment, channel.texts = self.moment, texts.get(channel.index)
+            channel.moment, channel.texts = self.moment, report.texts.get(channel.index)
 
     def _name_call(self, call: str, channel: int) -> str:
         known = list(self._known)
@@ -372,7 +370,7 @@ class IsolatedChannel:
         self.cells = cells
         self.moment = -1
         self.texts: list[Any] | None = None
-        self.problem: tuple[int, dict[str, Any]] | None = None
+        self.problem: tuple[int, FmuError] | None = None
 
     def set(self, values: Sequence[Any]) -> None:
         """Set all of them; what is wrong with it may be said by a later call."""

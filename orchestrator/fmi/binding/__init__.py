@@ -5,6 +5,7 @@ Light to import: the process of an isolated FMU needs this and little else.
 
 from .channel import FmuChannel
 from .fmi2 import FmuSlave
+from .interfaces import plain_interface, read_interface
 from .libraries import forget_paths, library, names_of_platform
 from .loaded import LoadedSlave
 from .versions import SLAVES, call_name
@@ -18,4 +19,6 @@ __all__ = [
     "forget_paths",
     "library",
     "names_of_platform",
+    "plain_interface",
+    "read_interface",
 ]

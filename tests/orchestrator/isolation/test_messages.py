@@ -8,7 +8,17 @@ import threading
 import pytest
 from railcosim.orchestrator.errors import FmuError, StoppedError
 from railcosim.orchestrator.isolation import messages
-from railcosim.orchestrator.isolation.messages import CALL, DONE, Cells, Door, as_error, content, describe, frame
+from railcosim.orchestrator.isolation.messages import (
+    CALL,
+    DONE,
+    Cells,
+    Door,
+    Report,
+    as_error,
+    content,
+    describe,
+    frame,
+)
 
 
 @pytest.fixture(params=["pair", "tcp"])
@@ -115,13 +125,32 @@ def test_memory_is_named_where_much_of_it_is_used(used, limit, hint):
 @pytest.mark.parametrize("kind", [FmuError, StoppedError])
 def test_an_error_comes_back_as_it_was(kind):
     error = kind("no more", instance="a", time=2.5, status="error", log=["[error] no"])
-    again = as_error(**content(frame(0, describe(error))[5:]))
+    again = as_error(content(frame(0, describe(error))[5:]), "b", 1.0)
     assert type(again) is kind
     assert (str(again), again.instance, again.time, again.status) == (str(error), "a", 2.5, "error")
     assert again.log == ["[error] no"]
 
 
 def test_any_other_error_is_one_of_the_fmu_s():
-    again = as_error(**describe(ZeroDivisionError("by zero")))
+    again = as_error(describe(ZeroDivisionError("by zero")), "a", 2.5)
     assert type(again) is FmuError
-    assert str(again) == "ZeroDivisionError: by zero"
+    assert str(again) == "a, t = 2.5 s: ZeroDivisionError: by zero"
+
+
+def test_what_goes_to_the_other_comes_there_to_the_bit():
+    told = [0.1, -0.0, 1e-320, float("inf"), 2**64, "a\udcff\0", b"\0\xff", None, True, {"x": [b""]}]
+    assert repr(content(frame(CALL, told)[5:])) == repr(told)
+    with pytest.raises(TypeError, match="a set goes into no message"):
+        frame(CALL, {1})
+
+
+@pytest.mark.parametrize(
+    "body",
+    [
+        *(b"", b"\x80\x04.", b"[]", b"{}", b"[" * 100_000, b'{"time": "late"}', b'{"time": 0, "texts": [[1, 2]]}'),
+        *(b'{"time": 0, "error": {}}', b'{"time": 0, "failed": [1, {"message": 2}]}'),
+    ],
+)
+def test_what_is_no_report_is_refused(body):
+    with pytest.raises(ValueError, match="Error: "):
+        Report.read(body, "a")
