@@ -2,9 +2,14 @@
 
 from __future__ import annotations
 
+import atexit
+import functools
 import hashlib
 import importlib.util
+import io
+import logging
 import os
+import shutil
 import tempfile
 import zipfile
 from collections.abc import Callable, Mapping, Sequence
@@ -23,6 +28,7 @@ from .kinds import FmuKind, PackagingKind
 from .references import read_arguments, resolve
 from .toolchain import CompilerError
 
+_LOG = logging.getLogger(__name__)
 _EPOCH = (1980, 1, 1, 0, 0, 0)
 """The earliest time a zip can hold: archives of equal content are equal files."""
 
@@ -80,16 +86,56 @@ def build_component(component: Component, kind: FmuKind = "python", platforms: S
 
 
 def _keep(identity: str, name: str, make: Callable[[], Mapping[str, bytes]]) -> Path:
-    """The FMU of this identity in the cache, made only if it is not there."""
-    target = cache_folder() / identity[:32] / f"{name}.fmu"
-    if not target.exists():
-        archive = make()
-        try:
-            write_archive(archive, target)
-        except PermissionError:  # on Windows: another process has just written the same file and is reading it
-            if not target.exists():
-                raise
+    """The FMU of this identity in the cache, made if it is not there, or is not what was put there."""
+    place = Path(identity[:32]) / f"{name}.fmu"
+    target = cache_folder() / place
+    if _is_sound(target):
+        return target
+    content = _archive(make())
+    try:
+        _put(content, target)
+    except OSError as error:
+        if target.is_file() and target.read_bytes() == content:  # Windows: another process has just put it there
+            return target
+        _warn_once(f"{cache_folder()} cannot be written ({error.strerror or error}): what is built is not kept")
+        target = _instead() / place
+        _put(content, target)
     return target
+
+
+def _put(content: bytes, target: Path) -> None:
+    write_whole(content, target)
+    write_whole(_digest(content, target), _digest_file(target))
+
+
+def _is_sound(target: Path) -> bool:
+    """Whether the cache has this file as it was put there: disks, other programs and power cuts change files."""
+    try:
+        return _digest_file(target).read_bytes() == _digest(target.read_bytes(), target)
+    except OSError:
+        return False
+
+
+def _digest_file(target: Path) -> Path:
+    return target.with_name(f"{target.name}.sha256")
+
+
+def _digest(content: bytes, target: Path) -> bytes:
+    """As ``sha256sum -c`` reads it."""
+    return f"{hashlib.sha256(content).hexdigest()}  {target.name}\n".encode()
+
+
+@functools.cache
+def _instead() -> Path:
+    """A folder of this process's, where the cache cannot be written."""
+    folder = tempfile.mkdtemp(prefix="railcosim_")
+    atexit.register(shutil.rmtree, folder, ignore_errors=True)
+    return Path(folder)
+
+
+@functools.cache
+def _warn_once(message: str) -> None:
+    _LOG.warning("%s; name another folder in RAILCOSIM_CACHE", message)
 
 
 def package(
@@ -145,16 +191,34 @@ def cache_folder() -> Path:
 
 def write_archive(archive: Mapping[str, bytes], target: Path) -> None:
     """Write an FMU, whole or not at all; the same content gives the same bytes."""
+    write_whole(_archive(archive), target)
+
+
+def _archive(contents: Mapping[str, bytes]) -> bytes:
+    stream = io.BytesIO()
+    with zipfile.ZipFile(stream, "w", zipfile.ZIP_DEFLATED) as fmu:
+        for path in sorted(contents):
+            entry = zipfile.ZipInfo(path, _EPOCH)
+            entry.create_system = 3  # what Unix writes, everywhere
+            entry.compress_type = zipfile.ZIP_DEFLATED
+            entry.external_attr = 0o644 << 16
+            fmu.writestr(entry, contents[path])
+    return stream.getvalue()
+
+
+def write_whole(content: bytes, target: Path) -> None:
+    """Write a file so that there is never a part of it under its name, not after a power cut either.
+
+    Raises:
+        OSError: it cannot be written; what stood there stands there still.
+    """
     target.parent.mkdir(parents=True, exist_ok=True)
     handle, name = tempfile.mkstemp(suffix=".part", dir=target.parent)
     try:
-        with os.fdopen(handle, "wb") as stream, zipfile.ZipFile(stream, "w", zipfile.ZIP_DEFLATED) as fmu:
-            for path in sorted(archive):
-                entry = zipfile.ZipInfo(path, _EPOCH)
-                entry.create_system = 3  # what Unix writes, everywhere
-                entry.compress_type = zipfile.ZIP_DEFLATED
-                entry.external_attr = 0o644 << 16
-                fmu.writestr(entry, archive[path])
+        with os.fdopen(handle, "wb") as stream:
+            stream.write(content)
+            stream.flush()
+            os.fsync(handle)
         os.chmod(name, 0o644)
         os.replace(name, target)
     except BaseException:

@@ -3,9 +3,6 @@
 from __future__ import annotations
 
 import hashlib
-import os
-import shutil
-import tempfile
 import time
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
@@ -13,7 +10,7 @@ from typing import Any
 
 from ..components import ComponentError
 from . import toolchain
-from .build import package
+from .build import package, write_whole
 from .kinds import PackagingKind
 from .references import resolve
 
@@ -61,7 +58,7 @@ def release(
         begin = time.perf_counter()
         source, made, problem = package(reference, arguments, kind, platforms)
         target = directory / source.name
-        _copy(source, target)
+        write_whole(source.read_bytes(), target)
         written.append(target)
         note = f", not a native one: {problem}" if problem else ""
         what = f"native, {' '.join(chosen)}" if made == "native" else f"a Python FMU{note}"
@@ -88,15 +85,3 @@ def _check(references: Sequence[str], kind: PackagingKind, platforms: Sequence[s
         name = resolve(reference).__name__
         if names.setdefault(name, reference) != reference:
             raise ComponentError(f"{names[name]} and {reference} would both be written to {name}.fmu; build them apart")
-
-
-def _copy(source: Path, target: Path) -> None:
-    handle, name = tempfile.mkstemp(suffix=".part", dir=target.parent)
-    os.close(handle)
-    try:
-        shutil.copyfile(source, name)
-        os.chmod(name, 0o644)
-        os.replace(name, target)
-    except BaseException:
-        Path(name).unlink(missing_ok=True)
-        raise
