@@ -79,6 +79,11 @@ class FmuError(RunError):
         return "\n".join([f"{head}{super().__str__()}", *lines])
 
 
+def cut(line: str, length: int = 500) -> str:
+    """A line of an FMU's log at no more than some length, with a count of what was left out."""
+    return line if len(line) <= length else f"{line[:length]}... ({len(line) - length} more characters)"
+
+
 class LostError(FmuError):
     """The process of an isolated FMU is gone: it crashed, hung or used too much memory."""
 

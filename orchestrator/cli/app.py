@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import importlib.metadata
 import io
+import logging
 import os
 import sys
 from collections.abc import Sequence
@@ -16,7 +17,7 @@ from ...components.component import ComponentError
 from ..errors import FmuError, RailcosimError, RunError, ScenarioError
 from . import analysis, models, runs, scenarios
 from .options import FMU_FAILED, OK, WRONG_INPUT
-from .printing import folded
+from .printing import Log, folded, tell
 
 app = typer.Typer(
     no_args_is_help=True,
@@ -30,6 +31,7 @@ def main() -> None:
     """Entry point: every expected error becomes one message and an exit code."""
     if isinstance(sys.stdout, io.TextIOWrapper):  # a terminal or pipe may lack letters that a title or a file name has
         sys.stdout.reconfigure(errors="backslashreplace")
+    logging.getLogger().addHandler(Log(logging.WARNING))
     code = call()
     for stream in (sys.stdout, sys.stderr):
         with suppress(OSError):  # whoever read it may be gone
@@ -58,7 +60,7 @@ def call(arguments: Sequence[str] | None = None) -> int:
 
 def _fail(messages: Sequence[str], code: int) -> int:
     for message in messages:
-        print(f"error: {message}", file=sys.stderr)
+        tell(f"error: {message}")
     return code
 
 

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import shlex
-import sys
 from pathlib import Path
 from typing import Annotated
 
@@ -34,7 +33,7 @@ from .options import (
     build_arguments,
     load_system,
 )
-from .printing import open_console, say, show_interface, show_notes, show_report
+from .printing import open_console, say, show_interface, show_notes, show_report, tell
 from .skeleton import write_skeleton
 
 
@@ -104,7 +103,7 @@ def build(
         kind=kind.value,
         platforms=[name.strip() for name in (platforms or "").split(",") if name.strip()],
         checksums=every,
-        tell=(lambda line: None) if quiet else (lambda line: print(line, file=sys.stderr, flush=True)),
+        tell=(lambda line: None) if quiet else tell,
     )
     for path in written:
         print(path)

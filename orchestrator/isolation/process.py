@@ -12,6 +12,7 @@ import threading
 from collections.abc import Callable
 from pathlib import Path
 
+from ..errors import cut
 from ..fmi import Interface
 from ..fmi.binding import plain_interface
 from . import messages
@@ -231,7 +232,7 @@ class HostProcess:
             size = stream.seek(0, os.SEEK_END)
             stream.seek(max(0, size - _LINES * _LINE))
             lines = stream.read().decode(errors="replace").splitlines()
-        return [line[:_LINE] for line in lines[-_LINES:]]
+        return [cut(line, _LINE) for line in lines[-_LINES:]]
 
 
 _KILL = 9

@@ -4,7 +4,7 @@
 """
 
 from .comparison import show_comparison
-from .console import and_figures, counted, folded, open_console, say, show_notes
+from .console import Log, and_figures, counted, folded, open_console, say, show_notes, tell
 from .interface import show_interface
 from .outcome import show_run
 from .progress import show_progress
@@ -12,6 +12,7 @@ from .validation import show_report
 from .verdicts import show_published, summary
 
 __all__ = [
+    "Log",
     "and_figures",
     "counted",
     "folded",
@@ -25,4 +26,5 @@ __all__ = [
     "show_report",
     "show_run",
     "summary",
+    "tell",
 ]

@@ -1,13 +1,16 @@
-"""Lines on the terminal, or in a file or pipe."""
+"""Lines on the terminal, or in a file or pipe. What came from outside is made harmless here, and only here."""
 
 from __future__ import annotations
 
+import logging
 import os
 import re
 import sys
+import unicodedata
 from collections.abc import Iterable
 
-from rich.console import Console
+from rich.console import Console, ConsoleOptions, ConsoleRenderable, RenderHook, RenderResult
+from rich.segment import Segment
 from rich.text import Text
 
 from ...problems import Problem
@@ -19,7 +22,49 @@ def open_console(stderr: bool = False) -> Console:
     """A console as wide as the terminal, or as ``COLUMNS`` says; wide enough for tables in a file or a pipe."""
     stream = sys.stderr if stderr else sys.stdout
     follow = stream.isatty() or os.environ.get("COLUMNS", "").isdigit()
-    return Console(stderr=stderr, width=None if follow else _PIPE_WIDTH, highlight=False)
+    console = Console(stderr=stderr, width=None if follow else _PIPE_WIDTH, highlight=False)
+    console.push_render_hook(_Harmless())
+    return console
+
+
+def printable(text: str) -> str:
+    """A text in which nothing steers a terminal: letters that colour, erase, retitle or turn it round are named."""
+    if text.isprintable():
+        return text
+    return "".join(letter if _is_harmless(letter) else letter.encode("unicode_escape").decode() for letter in text)
+
+
+def _is_harmless(letter: str) -> bool:
+    return letter.isprintable() or letter in "\n\t" or unicodedata.category(letter) == "Zs"
+
+
+class _Harmless(RenderHook):
+    """Makes all that a console prints `printable`, but for the console's own colours."""
+
+    def process_renderables(self, renderables: list[ConsoleRenderable]) -> list[ConsoleRenderable]:
+        return [_Rendered(renderable) for renderable in renderables]
+
+
+class _Rendered:
+    def __init__(self, renderable: ConsoleRenderable) -> None:
+        self._renderable = renderable
+
+    def __rich_console__(self, console: Console, options: ConsoleOptions) -> RenderResult:
+        for text, style, control in console.render(self._renderable, options):
+            yield Segment(text if control else printable(text), style, control)
+
+
+def tell(line: str) -> None:
+    """Print a line beside the results, at once."""
+    print(printable(line), file=sys.stderr, flush=True)
+
+
+class Log(logging.Handler):
+    """Warnings of all rooms, as lines beside the results."""
+
+    def emit(self, record: logging.LogRecord) -> None:
+        """Print one."""
+        tell(f"{record.levelname.lower()}: {record.getMessage()}")
 
 
 def say(out: Console, text: str, style: str = "", *, whole: bool = False) -> None:

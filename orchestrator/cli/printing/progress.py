@@ -9,7 +9,7 @@ from contextlib import contextmanager
 from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn, TimeRemainingColumn
 
 from ...run import Progress as OnProgress
-from .console import open_console
+from .console import open_console, tell
 
 
 @contextmanager
@@ -49,6 +49,6 @@ def _lines(title: str, start: float, reached: float) -> OnProgress:
         told = max(told, before)
         while told < done:
             told += 1
-            print(f"{title}: {10 * told} % of {stop - start:g} s", file=sys.stderr, flush=True)
+            tell(f"{title}: {10 * told} % of {stop - start:g} s")
 
     return show

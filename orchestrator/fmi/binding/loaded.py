@@ -18,7 +18,7 @@ from typing import Any, ClassVar
 from fmpy import fmi2
 from fmpy.fmi1 import printLogMessage
 
-from ...errors import FmuError, StoppedError
+from ...errors import FmuError, StoppedError, cut
 from ..interface import Interface, Type
 from ..slave import STATUS, Channel
 from .channel import FmuChannel, MixedChannel, NegatedChannel
@@ -44,7 +44,8 @@ def keep_message(keys: Sequence[int | bytes | None], status: int, message: bytes
         log = None if key is None else _LOGS.get(key)
         if log is not None:
             label = STATUS[status] if 0 <= status < len(STATUS) else str(status)
-            log.extend(f"[{label}] {line}" for line in (message or b"").decode(errors="replace").splitlines())
+            lines = (message or b"").decode(errors="replace").splitlines()
+            log.extend(cut(f"[{label}] {line}") for line in lines)
             return True
     return False
 
