@@ -13,7 +13,7 @@ from ...fmus.annotation import Annotation
 from ...fmus.build import build as build_fmu
 from ...fmus.release import default_directory, release
 from ..errors import ScenarioError
-from ..fmi import Workspace, load_fmu
+from ..fmi import Workspace, is_fmu_name, load_fmu
 from ..packing import pack as pack_system
 from ..validation import TIMEOUT
 from ..validation import validate as validate_fmu
@@ -46,9 +46,9 @@ def describe(
     Variables by causality, with units, start values and direct dependencies; build arguments; where it comes from.
     """
     arguments = build_arguments(builds)
-    if model.endswith(".fmu") and arguments:
+    if is_fmu_name(model) and arguments:
         raise ScenarioError(f"{model} is built already; it takes no --with {', '.join(arguments)}")
-    path = Path(model) if model.endswith(".fmu") else build_fmu(model, arguments)
+    path = Path(model) if is_fmu_name(model) else build_fmu(model, arguments)
     with Workspace() as workspace:
         interface = load_fmu(path, workspace).interface
     out = open_console()

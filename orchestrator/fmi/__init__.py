@@ -10,6 +10,7 @@ from ...fmus.kinds import Kind
 from .archive import Workspace
 from .interface import Interface, Type, Unit, Variable
 from .models import Model, load_fmu, load_models
+from .recognition import is_fmu_name
 from .slave import Channel, Slave
 from .snapshot import state_names, take_snapshot
 from .translation import is_pedantry
@@ -24,6 +25,7 @@ __all__ = [
     "Unit",
     "Variable",
     "Workspace",
+    "is_fmu_name",
     "is_pedantry",
     "load_fmu",
     "load_models",

@@ -17,6 +17,7 @@ from .binding.versions import SLAVES
 from .interface import Interface
 from .plain import PlainSlave
 from .reader import read_interface
+from .recognition import is_fmu_name
 from .slave import Slave
 
 
@@ -76,7 +77,7 @@ def load_models(system: System, workspace: Workspace, kind: Kind = "auto") -> di
 
 
 def _load(instance: Instance, workspace: Workspace, kind: Kind) -> Model:
-    if instance.model.endswith(".fmu"):
+    if is_fmu_name(instance.model):
         if instance.build:
             raise FmuFileError(
                 f"{instance.model} is built already; it takes no build arguments {sorted(instance.build)}"
@@ -103,5 +104,6 @@ def load_fmu(path: Path, workspace: Workspace, kind: ModelKind = "fmu") -> Model
     Raises:
         FmuFileError: missing, hostile or unusable.
     """
-    folder, digest = workspace.unpack(path)
-    return Model(read_interface(folder, str(path)), kind, folder, path, digest)
+    folder, digest, notes = workspace.unpack(path)
+    interface = read_interface(folder, str(path))
+    return Model(replace(interface, warnings=(*notes, *interface.warnings)), kind, folder, path, digest)

@@ -23,7 +23,7 @@ from lxml import etree
 
 from ...fmus.build import build, write_archive
 from ..errors import RailcosimError, ScenarioError
-from ..fmi import Model, Workspace
+from ..fmi import Model, Workspace, is_fmu_name
 from ..master import ALGORITHMS, Explicit
 from ..problems import Problem
 from ..run import Checked, check
@@ -72,7 +72,7 @@ def pack(system: System, path: Path, *, expose: Sequence[str] = (), platforms: S
         ScenarioError: the system cannot run, or has what a container cannot do; all of it is listed.
         RailcosimError: fmu-manipulation-toolbox is missing or refuses.
     """
-    if path.suffix != ".fmu":
+    if not is_fmu_name(path.name):
         raise ScenarioError(Problem(str(path), "an FMU is a file that ends in .fmu"))
     platforms = _chosen(platforms)
     with Workspace() as workspace:
@@ -126,7 +126,7 @@ def _refused(system: System, checked: Checked, platforms: Sequence[str]) -> list
             other = f"{model.interface.model} is FMI {model.interface.version}"
             problems.append(Problem(name, other, "only FMI 2.0 is packed"))
         binaries = model.folder / "binaries"
-        if system.instances[name].model.endswith(".fmu"):  # the others are built for what is asked
+        if is_fmu_name(system.instances[name].model):  # the others are built for what is asked
             problems += [
                 Problem(name, f"{system.instances[name].model} has no binary for {platform}")
                 for platform in platforms
@@ -166,7 +166,7 @@ def _refused_link(link: Link) -> Iterator[Problem]:
 def _file(system: System, name: str, model: Model, platforms: Sequence[str]) -> Path:
     """The FMU of an instance: of a component, with a binary for every platform asked for."""
     instance = system.instances[name]
-    if platforms and not instance.model.endswith(".fmu"):
+    if platforms and not is_fmu_name(instance.model):
         return build(instance.model, instance.build, kind="native", platforms=tuple(platforms))
     assert model.path is not None  # only plain components have none
     return model.path

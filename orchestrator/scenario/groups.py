@@ -14,6 +14,7 @@ from dataclasses import dataclass, field
 from typing import Any
 
 from ..errors import ScenarioError
+from ..fmi import is_fmu_name
 from ..problems import Problem, suggestion
 from ..system import Instance
 from .patterns import NAME, Rule, member
@@ -141,12 +142,14 @@ def resolve_model(text: Any, folder: str, kind: str = "component") -> str:
     """
     if not isinstance(text, str) or not text.strip():
         raise ScenarioError("takes a text: a component's name, 'file.py:Class', or the path of an .fmu")
-    is_fmu = text.lower().endswith(".fmu")
+    is_fmu = is_fmu_name(text)
     if kind == "component" and is_fmu:
         raise ScenarioError(Problem("", f"'{text}' is an FMU file", "write fmu = ... instead of component = ..."))
     if is_fmu or kind == "fmu":
         if not is_fmu:
             remedy = "for a component of the catalogue write component = ..."
+            if text.lower().endswith(".ssp"):
+                remedy = "it is a system of FMUs: unpack it, and name one of those in its resources/"
             raise ScenarioError(Problem("", f"'{text}' does not end in .fmu", remedy))
         return _existing(text, folder)
     match = _PYTHON_CLASS.fullmatch(text)
@@ -163,6 +166,8 @@ def _existing(text: str, folder: str) -> str:
     path = os.path.abspath(os.path.join(folder, text))
     if os.path.isfile(path):
         return path
+    if os.path.isdir(path):
+        raise ScenarioError(Problem("", f"'{path}' is a folder", "name a file; an unpacked FMU is to be zipped"))
     near = ""
     if os.path.isdir(os.path.dirname(path)):
         near = suggestion(os.path.basename(path), os.listdir(os.path.dirname(path)))
@@ -212,7 +217,7 @@ def expand_group(group: Group, problems: list[Problem]) -> list[tuple[Instance, 
         options = {**group.options, **one.options}
         model, swapped = one.model or group.model, group.swapped if one.swapped is None else one.swapped
         build = {**group.build, **one.build}
-        if build and model.lower().endswith(".fmu"):  # what a swap left behind is nobody's mistake
+        if build and is_fmu_name(model):  # what a swap left behind is nobody's mistake
             if not swapped:
                 finished = f"'{model}' is a finished FMU and takes no build arguments"
                 problems.append(Problem(one.origin or group.origin, finished))

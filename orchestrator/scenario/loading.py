@@ -19,6 +19,7 @@ from typing import Any
 from railcosim import models
 
 from ..errors import ScenarioError
+from ..fmi import is_fmu_name
 from ..problems import Problem, suggestion
 from ..system import Instance, System
 from .changes import apply_preset, apply_settings, apply_step, apply_swaps
@@ -62,6 +63,14 @@ def find(name_or_path: str | os.PathLike[str]) -> Path:
         return MODELS / f"{text}.toml"
     if os.path.isfile(text) and text.endswith(".toml"):
         return Path(text)
+    if is_fmu_name(text):
+        remedy = (
+            f"see 'orchestrate describe', and name it in a scenario: [instances.it] fmu = {os.path.basename(text)!r}"
+        )
+        raise ScenarioError(Problem("", f"'{text}' is an FMU, not a scenario", remedy))
+    if text.lower().endswith(".ssp"):
+        remedy = "unpack it, and write a scenario with the FMUs in its resources/"
+        raise ScenarioError(Problem("", f"'{text}' is an SSP, and a scenario is a TOML file", remedy))
     names = [name for name, _ in shipped()]
     folder, file = os.path.split(text)
     if not text.endswith(".toml") and not folder:

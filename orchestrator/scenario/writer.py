@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 
+from ..fmi import is_fmu_name
 from ..system import Connection, Instance, Stepping, System
 from .events import EVENT_KEYS
 from .groups import OPTION_KEYS
@@ -70,7 +71,7 @@ def _applies(entry: Mapping[str, Any], system: System) -> bool:
 
 def _instance(instance: Instance) -> Iterator[str]:
     yield from ("", f"[instances.{_key(instance.name)}]")
-    yield f"{'fmu' if instance.model.lower().endswith('.fmu') else 'component'} = {_value(instance.model)}"
+    yield f"{'fmu' if is_fmu_name(instance.model) else 'component'} = {_value(instance.model)}"
     keys = (*OPTION_KEYS, "swapped")
     yield from _assignments({key: value for key in keys if (value := getattr(instance, key)) != getattr(Instance, key)})
     yield from _assignments({"build": instance.build or None})

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import fmpy
 import pytest
 from railcosim.orchestrator.cli import app as cli
+from railcosim.orchestrator.errors import FmuFileError
 from railcosim.orchestrator.master import compiled
 from railcosim.orchestrator.run.results import Results
 
@@ -162,6 +163,20 @@ def traced(tmp_path, monkeypatch):
     """The file in which calls are written down."""
     monkeypatch.setenv("FOREIGN_TRACE", str(tmp_path / "trace"))
     return tmp_path / "trace"
+
+
+@pytest.fixture
+def refused(workspace):
+    """Why an archive is not unpacked; it names the file, and nothing of the archive stays."""
+
+    def ask(path):
+        with pytest.raises(FmuFileError) as caught:
+            workspace.unpack(path)
+        assert str(path) in str(caught.value)
+        assert not list(workspace.folder.iterdir())
+        return str(caught.value)
+
+    return ask
 
 
 @pytest.fixture(params=["compiled", "interpreted"])
