@@ -56,13 +56,14 @@ class Connection:
         source: ``"cruise[1].force"``; a whole array by its bare name.
         target: ``"train[1].force"``.
         delay: how many communication points older the value is than it would be without.
+        scale: 1 where it is not given; one that is given also says that units which do not convert are taken care of.
         origin: where it was written, for messages.
     """
 
     source: str
     target: str
     delay: int = 0
-    scale: float = 1.0
+    scale: float | None = None
     offset: float = 0.0
     origin: str = field(default="", compare=False)
 
@@ -243,7 +244,9 @@ class System:
         self.instances[name] = Instance(name, model, dict(build or {}), dict(start))
         return self.instances[name]
 
-    def connect(self, source: str, target: str, delay: int = 0, scale: float = 1.0, offset: float = 0.0) -> None:
+    def connect(
+        self, source: str, target: str, delay: int = 0, scale: float | None = None, offset: float = 0.0
+    ) -> None:
         """Let an input follow an output; both are written ``"instance.variable"``."""
         self.connections.append(Connection(source, target, delay, scale, offset))
 

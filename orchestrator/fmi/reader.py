@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import re
 import tempfile
 from collections.abc import Iterable
@@ -214,9 +215,10 @@ def _number(text: Any) -> float | None:
 
 def _unit(unit: Any) -> Unit:
     base = unit.baseUnit
-    if base is None:
+    factor, offset = (0.0, 0.0) if base is None else (float(base.factor), float(base.offset))
+    if not factor or not math.isfinite(factor) or not math.isfinite(offset):
         return Unit(unit.name, None)
-    return Unit(unit.name, tuple(getattr(base, e) for e in _EXPONENTS), float(base.factor), float(base.offset))
+    return Unit(unit.name, tuple(getattr(base, e) for e in _EXPONENTS), factor, offset)
 
 
 def _arrays(variables: dict[str, Variable]) -> dict[str, tuple[str, ...]]:

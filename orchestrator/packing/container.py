@@ -155,7 +155,7 @@ def _refused_link(link: Link) -> Iterator[Problem]:
     if (link.scale, link.offset) == (1.0, 0.0):
         return
     what = f"scale {link.scale:g} and offset {link.offset:g}"
-    if (connection.scale, connection.offset) == (1.0, 0.0):
+    if connection.scale in (None, 1.0) and not connection.offset:
         what = f"the conversion of units (times {link.scale:g}, plus {link.offset:g})"
     yield Problem(where, f"{what} cannot be packed", names=ends)
 

@@ -346,7 +346,8 @@ class Reader:
             self.problem(f"takes a whole number of communication steps, at least 0, not {shown(delay)}", *path, "delay")
         else:
             made.delay = delay
-        made.scale = number(self.entry(value.get("scale", 1.0), *path, "scale"), self.problems, 1.0)
+        if "scale" in value:
+            made.scale = number(self.entry(value["scale"], *path, "scale"), self.problems, 1.0)
         made.offset = number(self.entry(value.get("offset", 0.0), *path, "offset"), self.problems)
         return made
 
