@@ -40,8 +40,8 @@ def test_scale_and_offset_apply_after_the_conversion(connected):
 
 def test_another_dimension_is_refused(connected):
     assert [str(problem) for problem in connected("a.seconds", "b.metres").problems] == [
-        "'b.metres' = 'a.seconds': unit 's' does not convert to 'm': they are of different dimensions; if the values fit, "
-        "give the connection a scale (scale = 1.0)"
+        "'b.metres' = 'a.seconds': unit 's' does not convert to 'm': they are of different dimensions; if the values "
+        "fit, give the connection a scale (scale = 1.0)"
     ]
 
 
