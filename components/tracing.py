@@ -21,6 +21,10 @@ _TAPE_SOURCES: Names = frozenset({"trip_time", "sample_time", "tape_duration", "
 """What a tape reads depends on where along the trip the component is, and on the file it was filled from."""
 
 
+_DRIVING: Names = frozenset({"trip", "trip_time"})
+"""The inputs that drive a tape, whatever the equations make of them."""
+
+
 class TracingError(ComponentError):
     """An equation did something with a value that only works on plain numbers."""
 
@@ -87,6 +91,20 @@ def initial_dependencies(component: Component) -> tuple[dict[str, Names], dict[s
             cells = [Sourced(computed[name]) for name in slot.scalars]
             probe.present_values[slot.name] = _cells(cells, slot.shape)
     return computed, _collect(probe, "outputs", Output)
+
+
+def used_inputs(component: Component) -> Names:
+    """The scalar inputs that something is computed from: an output, a rate, a start value, or what a sample leaves."""
+    probe = _sourced_copy(component)
+    computed, started = initial_dependencies(component)
+    found = [computed, started, dependencies(component), _collect(probe, "derivatives", State)]
+    probe.present_values["step"] = Sourced(frozenset({"time"}))
+    found.append(_collect(probe, "update", State, Memory, Tape))
+    kept = evaluated(probe, "keep")
+    used = set(_DRIVING if component.of(Tape) else ()) | (kept.names if isinstance(kept, Sourced) else frozenset())
+    used.update(*(names for part in found for names in part.values()))
+    inputs = component.of(Input)
+    return frozenset(name for slot in inputs for name in slot.scalars if name in used or slot.type is str)
 
 
 def feedthrough(component: Component) -> dict[str, Names]:

@@ -27,6 +27,7 @@ class Annotation:
         note: what a user must know.
         requires: packages that it imports.
         optional_inputs: names of inputs that may stay unconnected.
+        unused_inputs: names of inputs that nothing is computed from: a port has them, this component does without.
         recommended_step: longest advisable communication step in s.
         sampled: whether it acts at samples.
     """
@@ -40,6 +41,7 @@ class Annotation:
     note: str = ""
     requires: tuple[str, ...] = ()
     optional_inputs: tuple[str, ...] = ()
+    unused_inputs: tuple[str, ...] = ()
     recommended_step: float | None = None
     sampled: bool = False
 
@@ -57,6 +59,7 @@ def write(annotation: Annotation, root: Any) -> None:
         "note": annotation.note,
         "requires": " ".join(annotation.requires),
         "optionalInputs": " ".join(annotation.optional_inputs),
+        "unusedInputs": " ".join(annotation.unused_inputs),
         "recommendedStep": "" if step is None else repr(float(step)),
         "sampled": "true" if annotation.sampled else "",
     }
@@ -84,6 +87,7 @@ def read(root: Any) -> Annotation | None:
         note=element.get("note", ""),
         requires=tuple(element.get("requires", "").split()),
         optional_inputs=tuple(element.get("optionalInputs", "").split()),
+        unused_inputs=tuple(element.get("unusedInputs", "").split()),
         recommended_step=float(step) if step else None,
         sampled=element.get("sampled") == "true",
     )

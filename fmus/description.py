@@ -13,7 +13,14 @@ from lxml import etree
 
 from ..components.component import Component, ComponentError, evaluated
 from ..components.declarations import Input, Memory, Parameter, State
-from ..components.tracing import Names, TracingError, dependencies, initial_dependencies, rate_dependencies
+from ..components.tracing import (
+    Names,
+    TracingError,
+    dependencies,
+    initial_dependencies,
+    rate_dependencies,
+    used_inputs,
+)
 from .annotation import TOOL, Annotation
 from .annotation import write as write_annotation
 from .kinds import NOTE_OF_KIND, FmuKind
@@ -39,12 +46,14 @@ class Structure:
         rates: the same for the rate of each scalar state.
         initial: for each scalar that is computed at the start, what it follows from.
         computed: scalars of State and Memory that ``initial`` computes.
+        used: the inputs that anything is computed from at all.
     """
 
     direct: Mapping[str, Names] | None
     rates: Mapping[str, Names] | None
     initial: Mapping[str, Names] | None
     computed: frozenset[str]
+    used: Names | None
 
 
 def structure(component: Component) -> Structure:
@@ -52,13 +61,14 @@ def structure(component: Component) -> Structure:
     try:
         computed, initial = initial_dependencies(component)
         rates = rate_dependencies(component)
-        return Structure(dependencies(component), rates, {**computed, **initial}, frozenset(computed))
+        started = {**computed, **initial}
+        return Structure(dependencies(component), rates, started, frozenset(computed), used_inputs(component))
     except TracingError:
         if not component.requires:
             raise
-        started = evaluated(component, "initial")
-        names = frozenset(n for s in component.of(State, Memory) if s.name in started for n in s.scalars)
-        return Structure(None, None, None, names)
+        returned = evaluated(component, "initial")
+        names = frozenset(n for s in component.of(State, Memory) if s.name in returned for n in s.scalars)
+        return Structure(None, None, None, names, None)
 
 
 def write(component: Component, kind: FmuKind, digest: str) -> bytes:
@@ -115,7 +125,7 @@ def write(component: Component, kind: FmuKind, digest: str) -> bytes:
         for name, description in _LOG_CATEGORIES.items():
             etree.SubElement(categories, "Category", name=name, description=description)
     etree.SubElement(root, "DefaultExperiment", startTime="0", stepSize=_number(default_step(component)))
-    write_annotation(_annotation(component, kind, digest), root)
+    write_annotation(_annotation(component, kind, digest, depends.used), root)
     block = etree.SubElement(root, "ModelVariables")
     for variable in variables:
         _write_variable(block, variable, component, depends)
@@ -151,9 +161,10 @@ def arguments(component: Component) -> str:
         ) from error
 
 
-def _annotation(component: Component, kind: FmuKind, digest: str) -> Annotation:
+def _annotation(component: Component, kind: FmuKind, digest: str, used: Names | None) -> Annotation:
     cls = type(component)
-    inputs = ((slot, slot.declaration) for slot in component.of(Input))
+    inputs = [(slot, slot.declaration) for slot in component.of(Input)]
+    every = [name for slot, _ in inputs for name in slot.scalars]
     return Annotation(
         component=cls.__name__,
         arguments=json.loads(arguments(component)),
@@ -164,6 +175,7 @@ def _annotation(component: Component, kind: FmuKind, digest: str) -> Annotation:
         note=cls.note,
         requires=cls.requires,
         optional_inputs=tuple(n for s, d in inputs if isinstance(d, Input) and d.optional for n in s.scalars),
+        unused_inputs=() if used is None else tuple(name for name in every if name not in used),
         recommended_step=cls.recommended_step,
         sampled=component.is_sampled,
     )

@@ -10,11 +10,13 @@ import typer
 
 from ...components import CATALOGUE
 from ...fmus.annotation import Annotation
-from ...fmus.build import build as build_fmu
+from ...fmus.build import package
 from ...fmus.release import default_directory, release
 from ..errors import ScenarioError
 from ..fmi import Workspace, is_fmu_name, load_fmu
 from ..packing import pack as pack_system
+from ..problems import Problem, suggestion
+from ..scenario import shipped
 from ..validation import TIMEOUT
 from ..validation import validate as validate_fmu
 from .options import (
@@ -33,22 +35,37 @@ from .options import (
     build_arguments,
     load_system,
 )
-from .printing import open_console, say, show_interface, show_notes, show_report, tell
+from .printing import open_console, say, show_interface, show_notes, show_report, show_system, tell
 from .skeleton import write_skeleton
 
 
 def describe(
-    model: Annotated[str, typer.Argument(help="A component's name, my_file.py:Class, or the path of any FMU.")],
+    name: Annotated[
+        str,
+        typer.Argument(
+            metavar="NAME", help="A component, my_file.py:Class, the path of any FMU, or a scenario as 'run' takes it."
+        ),
+    ],
     builds: Annotated[list[str] | None, typer.Option("--with", help="Give a build argument: carriages=8.")] = None,
 ) -> None:
-    """Show the interface of a component or of any FMU.
+    """Show what a component, any FMU or a scenario is.
 
-    Variables by causality, with units, start values and direct dependencies; build arguments; where it comes from.
+    Of a model its variables by causality, with units, start values and direct dependencies; its build arguments, where
+    it comes from, and the kind that a run takes. Of a scenario its source, presets, instances, connections, and what is
+    judged and drawn.
     """
     arguments = build_arguments(builds)
-    if is_fmu_name(model) and arguments:
-        raise ScenarioError(f"{model} is built already; it takes no --with {', '.join(arguments)}")
-    path = Path(model) if is_fmu_name(model) else build_fmu(model, arguments)
+    is_fmu, is_scenario = is_fmu_name(name), name.endswith(".toml") or name in dict(shipped())
+    if is_fmu and arguments:
+        raise ScenarioError(f"{name} is built already; it takes no --with {', '.join(arguments)}")
+    if is_scenario:
+        show_system(open_console(), load_system(name, None, None, builds, None))
+        return
+    if not (is_fmu or name in CATALOGUE or ".py:" in name):
+        known = (*CATALOGUE, *dict(shipped()))
+        remedy = suggestion(name, known) or "'orchestrate list' has them; a file is named with its ending"
+        raise ScenarioError(Problem("", f"there is no component or shipped scenario {name!r}", remedy))
+    path, _, lacks = (Path(name), "", "") if is_fmu else package(name, arguments)
     with Workspace() as workspace:
         interface = load_fmu(path, workspace).interface
     out = open_console()
@@ -61,6 +78,7 @@ def describe(
         "build arguments": ", ".join(f"{k} = {v!r}" for k, v in annotation.arguments.items()),
         "digest": annotation.digest,
         "kind": f"{annotation.kind}: {annotation.kind_note}" if annotation.kind else "",
+        "not native": lacks,
         "FMI": interface.version,
         "made with": interface.generator,
         "guid": interface.guid,

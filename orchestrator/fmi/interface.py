@@ -110,6 +110,11 @@ class Interface:
         """Inputs that may stay unconnected without a word."""
         return frozenset(self.annotation.optional_inputs if self.annotation else ())
 
+    @cached_property
+    def unused_inputs(self) -> frozenset[str]:
+        """Inputs that one of our own FMUs computes nothing from."""
+        return frozenset(self.annotation.unused_inputs if self.annotation else ())
+
     @property
     def own_kind(self) -> FmuKind | None:
         """How one of our own FMUs is packaged."""

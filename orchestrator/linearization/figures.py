@@ -11,6 +11,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from ...fmus.units import BASE
+from ...fmus.units import parse as parse_unit
 from ..figures import COLOURS, DASHES, bracketed, colour, legend, page
 from ..names import SignalName
 from .blocks import Array
@@ -148,13 +150,33 @@ def _bode(model: Linearization, title: str, path: Path) -> Path:
                 style: Any = {"label": label, "color": colour(n, len(curves)), "linestyle": DASHES[0]}
                 size.loglog(frequencies, np.abs(g), **style)
                 phase.semilogx(frequencies, np.degrees(np.unwrap(np.angle(g))), **style)
-            size.set_ylabel(f"{panel}\n|G| {bracketed(curves[0][2])}".rstrip())
+            ratio = unit_of_ratio(curves[0][2], model.units.get(model.inputs[index], ""))
+            size.set_ylabel(f"{panel}\n|G| {bracketed(ratio)}".rstrip())
             phase.set_ylabel("phase [°]")
             _legend(size, len(curves))
             for ax in (size, phase):
                 ax.margins(x=0.01)
         axes[-1].set_xlabel("angular frequency [rad/s]")
     return path
+
+
+def unit_of_ratio(output: str, input: str) -> str:
+    """The unit of an output over an input, in lowest terms: ``s`` for m/s over m/s2; ``1`` where both are the same."""
+    if output == input or not input:
+        return "1" if input else output
+    try:
+        above, below = parse_unit(output or "1"), parse_unit(input)
+    except ValueError:  # a unit of another maker
+        return f"({output or '1'})/({input})"
+    if (above.factor, below.factor) != (1.0, 1.0):
+        return f"({output or '1'})/({input})"
+    powers = {base: a - b for base, a, b in zip(BASE, above.exponents, below.exponents, strict=True)}
+    top, bottom = (
+        [f"{base}{abs(power) if abs(power) > 1 else ''}" for base, power in powers.items() if sign * power > 0]
+        for sign in (1, -1)
+    )
+    lower = ".".join(bottom) if len(bottom) < 2 else f"({'.'.join(bottom)})"
+    return "/".join([".".join(top) or "1", *([lower] if lower else [])])
 
 
 def _string(model: Linearization, passings: Sequence[Passing], title: str, path: Path) -> Path:

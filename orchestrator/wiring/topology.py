@@ -1,8 +1,8 @@
 """Who hears whom: the information graph of a platoon, out of its connections and flags.
 
 A controller hears a neighbour when its flag (``has_ahead``, ``has_behind``, ``has_leader``) is set and its inputs
-(``ahead_speed``, ...) are connected; a radio in between is looked through. The Laplacian is L = D - A, with A[i, j] = 1
-where vehicle i hears vehicle j, and D the number of vehicles each one hears.
+(``ahead_speed``, ``ahead_position``, ...) are connected and used by its law; a radio in between is looked through. The
+Laplacian is L = D - A, with A[i, j] = 1 where vehicle i hears vehicle j, and D the number of vehicles each one hears.
 """
 
 from __future__ import annotations
@@ -99,7 +99,7 @@ def topologies(interfaces: Mapping[str, Interface], wiring: Wiring) -> list[Topo
             side: source
             for side in SIDES
             if _flag(controller, f"has_{side}", fed, interfaces, wiring)
-            and (source := _origin(fed[controller].get(f"{side}_speed"), known, feeders)) is not None
+            and (source := _origin(_source(side, fed[controller], interfaces[controller]), known, feeders)) is not None
             and source != own
         }
     graph = nx.Graph()
@@ -132,6 +132,12 @@ def _text(value: complex) -> str:
     if value.imag == 0.0:
         return f"{value.real:.4g}"
     return f"{value.real:.4g}{value.imag:+.4g}i"
+
+
+def _source(side: str, fed: Mapping[str, str], interface: Interface) -> str | None:
+    """The instance that what is used of a side comes from; None where nothing is."""
+    names = (f"{side}_speed", f"{side}_position")
+    return next((fed[name] for name in names if name in fed and name not in interface.unused_inputs), None)
 
 
 def _flag(

@@ -18,7 +18,14 @@ from railcosim.components import (
     State,
     maths,
 )
-from railcosim.components.tracing import Sourced, TracingError, dependencies, feedthrough, initial_dependencies
+from railcosim.components.tracing import (
+    Sourced,
+    TracingError,
+    dependencies,
+    feedthrough,
+    initial_dependencies,
+    used_inputs,
+)
 
 
 class Probe(Component):
@@ -195,3 +202,39 @@ def test_a_wrong_shape_is_told_while_tracing():
 def test_a_traced_value_is_not_hashable():
     with pytest.raises(TypeError):
         hash(Sourced(frozenset()))
+
+
+class EachItsInput(Component):
+    """Every method reads an input of its own; `spare` is read by none."""
+
+    to_output, to_rate, to_start, to_memory, to_keep, spare = (Input("1") for _ in range(6))
+    word = Input("1", "")
+    y = Output("1")
+    x = State("1")
+    kept = State("1")
+    m = Memory("1", 0.0)
+    sample_time = Parameter("s", 1.0)
+
+    def initial(self):
+        return {"kept": self.to_start}
+
+    def derivatives(self):
+        return {"x": self.to_rate, "kept": 0.0}
+
+    def outputs(self):
+        return {"y": 2.0 * self.to_output}
+
+    def update(self):
+        return {"m": self.m + self.step * self.to_memory}
+
+    def keep(self):
+        return self.to_keep > 0.0
+
+
+def test_an_input_is_used_whichever_method_reads_it():
+    assert used_inputs(EachItsInput()) == {"to_output", "to_rate", "to_start", "to_memory", "to_keep", "word"}
+
+
+def test_a_port_has_inputs_that_a_law_does_without():
+    every = {name for slot in ComfortCruise().of(Input) for name in slot.scalars}
+    assert every - used_inputs(ComfortCruise()) == {"leader_position"}

@@ -8,6 +8,7 @@ from .console import Log, and_figures, counted, folded, open_console, say, show_
 from .interface import show_interface
 from .outcome import show_run
 from .progress import show_progress
+from .scenario import show_system
 from .validation import show_report
 from .verdicts import show_published, summary
 
@@ -25,6 +26,7 @@ __all__ = [
     "show_published",
     "show_report",
     "show_run",
+    "show_system",
     "summary",
     "tell",
 ]

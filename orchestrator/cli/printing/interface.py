@@ -39,6 +39,7 @@ def _variables(title: str, variables: Sequence[Variable], interface: Interface) 
         cells = [v.name, v.fmi_type or v.type, v.unit or ""]
         cells += ["" if v.start is None else _start(v.start)] if starts else []
         hint = "optional" if v.name in interface.optional_inputs else ""
+        hint = f"{hint}, not used".strip(", ") if v.name in interface.unused_inputs else hint
         hint = "tunable" if v.causality == "parameter" and v.variability == "tunable" else hint
         hint = ", ".join([*([hint] if hint else []), *(f"{name} = {value}" for name, value in v.choices)])
         cells += [f"{v.description} ({hint})".strip() if hint else v.description]

@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from railcosim.orchestrator.cli.skeleton import write_skeleton
 from railcosim.orchestrator.fmi.archive import Workspace
 from railcosim.orchestrator.run.checking import check
 from railcosim.orchestrator.scenario.loading import load
@@ -43,6 +44,13 @@ def test_predecessor_and_leader():
     assert np.diag(graph.laplacian).tolist() == [0.0, 1.0, *[2.0] * 8]
     assert (graph.laplacian[2:, 0] <= -1.0).all()
     assert graph.eigenvalues == pytest.approx([0.0, 1.0, *[2.0] * 8], abs=1e-6)
+
+
+def test_a_law_that_looks_ahead_only_hears_nobody_behind_whatever_is_connected(tmp_path):
+    write_skeleton(tmp_path / "my_law.py")
+    (graph,), _ = found("comfort_cruise", swaps=[f"cruise={tmp_path / 'my_law.py'}:MyLaw"])
+    assert graph.name == "predecessor only"
+    assert (graph.laplacian == np.diag([0.0, 1.0, 1.0, 1.0]) - np.diag([1.0] * 3, -1)).all()
 
 
 def test_a_radio_in_between_is_looked_through():

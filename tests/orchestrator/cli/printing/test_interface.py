@@ -15,7 +15,13 @@ def test_an_interface_stands_by_causality_with_what_each_output_depends_on(shown
         Variable("w", 5, "Real", "output", "continuous", None, None),
     ]
     interface = Interface(
-        "M", "M", "{1}", {v.name: v for v in variables}, {}, {}, annotation=Annotation(optional_inputs=("u",))
+        "M",
+        "M",
+        "{1}",
+        {v.name: v for v in variables},
+        {},
+        {},
+        annotation=Annotation(optional_inputs=("u",), unused_inputs=("on", "u")),
     )
     lines = [" ".join(line.split()) for line in shown(show_interface, interface)]
     assert [line for line in lines if line in ("Parameters", "Inputs", "Outputs")] == [
@@ -24,8 +30,8 @@ def test_an_interface_stands_by_causality_with_what_each_output_depends_on(shown
         "Outputs",
     ]
     assert "gain Real 1/s 0.5 of the loop (tunable)" in lines
-    assert "on Boolean true" in lines
-    assert "u Real m 0 what comes in (optional)" in lines
+    assert "on Boolean true (not used)" in lines
+    assert "u Real m 0 what comes in (optional, not used)" in lines
     assert "y Real m on, u" in lines
     assert "z Real no input" in lines
     assert "w Real not said" in lines
