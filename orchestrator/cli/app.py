@@ -3,12 +3,9 @@
 from __future__ import annotations
 
 import importlib.metadata
-import io
 import logging
 import os
-import sys
 from collections.abc import Sequence
-from contextlib import suppress
 from typing import Annotated
 
 import typer
@@ -18,6 +15,7 @@ from ..errors import FmuError, RailcosimError, RunError, ScenarioError
 from . import analysis, models, runs, scenarios
 from .options import FMU_FAILED, OK, WRONG_INPUT
 from .printing import Log, folded, tell
+from .streams import flush_streams, secure_streams
 
 app = typer.Typer(
     no_args_is_help=True,
@@ -30,13 +28,10 @@ app = typer.Typer(
 
 def main() -> None:
     """Entry point: every expected error becomes one message and an exit code."""
-    if isinstance(sys.stdout, io.TextIOWrapper):  # a terminal or pipe may lack letters that a title or a file name has
-        sys.stdout.reconfigure(errors="backslashreplace")
+    secure_streams()
     logging.getLogger().addHandler(Log(logging.WARNING))
     code = call()
-    for stream in (sys.stdout, sys.stderr):
-        with suppress(OSError):  # whoever read it may be gone
-            stream.flush()
+    flush_streams()
     # pythonfmu 0.7 frees its interpreter state twice when C++ is torn down, and some exits crash: leave before that.
     os._exit(code)
 
