@@ -137,7 +137,7 @@ def _cells(cells: list[Sourced], shape: tuple[int, ...]) -> Any:
     return array.reshape(shape).view(SymbolArray)
 
 
-def _collect(component: Component, method: Method, *kinds: type[Output | State | Memory]) -> dict[str, Names]:
+def _collect(component: Component, method: Method, *kinds: type[Output | State | Memory | Tape]) -> dict[str, Names]:
     where = f"{type(component).__name__}.{method}"
     try:
         returned = dict(evaluated(component, method))
