@@ -12,17 +12,22 @@ from ..errors import ScenarioError
 from ..problems import Problem
 
 MAX_DEPTH = 100
+MAX_SIZE = 1 << 24
+"""Characters of a scenario: far more than people write, and read within seconds."""
 Path_ = tuple[str | int, ...]  # where a value stands: ("instances", "train", "count"), ("published", 0, "value")
 
 _TOKEN = re.compile(
-    r'"""(?:\\.|[^\\])*?"{3,5}'  # multi-line strings; up to two quotes may stand just inside the end
-    r"|'''.*?'{3,5}"
-    r'|"(?:\\.|[^"\\\n])*"'
-    r"|'[^'\n]*'"
+    # Possessive: what is once read is kept, or a long string costs a hundred times its size in ways back.
+    r'"""(?:[^"\\]++|\\.|"(?!""))*+"{3,5}'  # multi-line strings; up to two quotes may stand just inside the end
+    r"|'''(?:[^']++|'(?!''))*+'{3,5}"
+    r'|"(?:[^"\\\n]++|\\.)*+"'
+    r"|'[^'\n]*+'"
     r"|\#[^\n]*"
     r"|\n|[\[\]{}=.,]|[^\S\n]+|[^\s\[\]{}=.,\#\"']+",
     re.DOTALL,
 )
+_ENDS = frozenset("[]{}=,\n")
+"""Tokens at which no key goes on."""
 _UNQUOTED_INDEX = re.compile(r"^\s*[A-Za-z_][\w.-]*\[[^\]]*\][^=]*=")
 
 
@@ -36,6 +41,7 @@ class Source:
     def __init__(self, text: str, label: str) -> None:
         self.label = label
         self.text = text.removeprefix("\ufeff")
+        self._check_size(len(text))
         self.data = self._parse()
         self._lines = _locate(self.text)
         huge = [self.origin(*path) for path in _huge_integers(self.data, ())]
@@ -51,7 +57,8 @@ class Source:
             ScenarioError: it cannot be read, is not UTF-8, or is not TOML (with line and column).
         """
         try:
-            return cls(path.read_text(encoding="utf-8"), label)
+            with path.open(encoding="utf-8") as stream:
+                return cls(stream.read(MAX_SIZE + 1), label)
         except UnicodeDecodeError as error:
             message = f"not a text in UTF-8 ({error.reason} at byte {error.start})"
             raise ScenarioError(Problem(label, message, "save it as UTF-8")) from None
@@ -69,6 +76,18 @@ class Source:
         """``"scenario.toml:31"``, or the file alone where the line is unknown."""
         line = self.line(*path)
         return self.label if line is None else f"{self.label}:{line}"
+
+    def _check_size(self, length: int) -> None:
+        """Refuse what would take the memory of the machine, or hours, before a value is read."""
+        if length > MAX_SIZE:
+            message = f"it has more than {MAX_SIZE >> 20} million characters"
+            raise ScenarioError(Problem(self.label, message, "give long profiles as JSON files, by name"))
+        dots = 0
+        for token, number in _tokens(self.text):
+            dots = 0 if token in _ENDS else dots + (token == ".")
+            if dots > MAX_DEPTH:
+                message = f"a key of more than {MAX_DEPTH} parts"
+                raise ScenarioError(Problem(f"{self.label}:{number}", message, "no scenario needs that"))
 
     def _parse(self) -> dict[str, Any]:
         try:

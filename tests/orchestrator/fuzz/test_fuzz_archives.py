@@ -12,7 +12,7 @@ import zipfile
 import pytest
 from hypothesis import strategies as st
 from railcosim.orchestrator.errors import FmuFileError
-from railcosim.orchestrator.fmi import archive
+from railcosim.orchestrator.fmi import members
 from railcosim.orchestrator.fmi.archive import Workspace
 
 DESCRIPTION = b"<x/>"
@@ -116,7 +116,7 @@ def everything_below(folder):
 
 @pytest.fixture(autouse=True)
 def less_is_enough(monkeypatch):
-    monkeypatch.setattr(archive, "MAX_SIZE", SMALL)
+    monkeypatch.setattr(members, "MAX_SIZE", SMALL)
 
 
 def test_any_archive_is_unpacked_into_its_folder_or_refused_by_name(explore, watched, confined):

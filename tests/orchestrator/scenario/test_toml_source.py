@@ -1,6 +1,7 @@
 """Lines of keys in TOML text, and what is said about text that is not TOML."""
 
 import tomllib
+import tracemalloc
 
 import pytest
 from hypothesis import given, settings
@@ -106,8 +107,14 @@ def test_an_origin_is_file_and_line_or_the_file_alone():
         ),
         ("a = " + "9" * 5000, "x.toml: Exceeds the limit (4300 digits) for integer string conversion"),
         ("a = " + "[" * 5000, "x.toml: nested too deeply; no scenario needs that"),
-        ("a" + ".a" * 2000 + " = 1", "x.toml: nested more than 100 levels deep; no scenario needs that"),
-        ("[a" + ".a" * 2000 + "]", "x.toml: nested more than 100 levels deep; no scenario needs that"),
+        ("a = 1\nb" + ".a" * 100_000 + " = 1", "x.toml:2: a key of more than 100 parts; no scenario needs that"),
+        ("[a" + ".a" * 2000 + "]", "x.toml:1: a key of more than 100 parts; no scenario needs that"),
+        ("a = [{ b" + ".a" * 2000 + " = 1 }]", "x.toml:1: a key of more than 100 parts; no scenario needs that"),
+        ("a = " + "[" * 101 + "]" * 101, "x.toml: nested more than 100 levels deep; no scenario needs that"),
+        (
+            f'a = "{"x" * (1 << 24)}"',
+            "x.toml: it has more than 16 million characters; give long profiles as JSON files, by name",
+        ),
     ],
 )
 def test_what_is_said_about_text_that_is_not_toml(text, message):
@@ -205,3 +212,13 @@ def test_every_key_of_every_valid_text_has_the_line_it_stands_on(lines):
         for part in path:
             value = value[part]
         assert 1 <= line <= text.count("\n") + 1
+
+
+def test_long_strings_and_lists_cost_memory_of_their_own_size():
+    text = 'a = "' + "x" * 300_000 + '"\nb = [' + "1.5, " * 2_000 + "]\nc = '''" + "y'" * 50_000 + "'''\nlast = 1"
+    tracemalloc.start()
+    try:
+        assert Source(text, "x.toml").line("last") == 4
+        assert tracemalloc.get_traced_memory()[1] < 20 * len(text)
+    finally:
+        tracemalloc.stop()
