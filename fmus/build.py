@@ -81,8 +81,25 @@ def build_component(component: Component, kind: FmuKind = "python", platforms: S
         return _keep(digest, name, lambda: python_fmu.contents(component, digest))
     chosen = toolchain.chosen(platforms)
     identity = hashlib.sha256(f"{digest} {toolchain.identity(chosen)}".encode()).hexdigest()
-    zig = cache_folder().with_name("zig")
-    return _keep(identity, name, lambda: native_fmu.contents(component, digest, chosen, zig))
+    return _keep(identity, name, lambda: native_fmu.contents(component, digest, chosen, _zig_cache()))
+
+
+def _zig_cache() -> Path:
+    """Where ziglang keeps the C libraries it makes, which are the same for every folder of FMUs.
+
+    In the user's cache directory, wherever ``RAILCOSIM_CACHE`` is, so that they are made once; where that cannot be
+    written, beside the FMUs.
+    """
+    usual = _user_cache() / "zig"
+    try:
+        usual.mkdir(parents=True, exist_ok=True)
+    except OSError:
+        return cache_folder().with_name("zig")
+    return usual if os.access(usual, os.W_OK) else cache_folder().with_name("zig")
+
+
+def _user_cache() -> Path:
+    return Path(platformdirs.user_cache_dir("railcosim", appauthor=False))
 
 
 def _keep(identity: str, name: str, make: Callable[[], Mapping[str, bytes]]) -> Path:
@@ -186,7 +203,7 @@ def plain(reference: str, arguments: Mapping[str, Any] | None = None, *, folder:
 def cache_folder() -> Path:
     """Where built FMUs are kept: ``RAILCOSIM_CACHE``, or the user's cache directory."""
     chosen = os.environ.get("RAILCOSIM_CACHE")
-    return (Path(chosen) if chosen else Path(platformdirs.user_cache_dir("railcosim", appauthor=False))) / "fmus"
+    return (Path(chosen) if chosen else _user_cache()) / "fmus"
 
 
 def write_archive(archive: Mapping[str, bytes], target: Path) -> None:

@@ -51,8 +51,6 @@ def release(
     listing = directory / CHECKSUMS
     if checksums:
         listing.unlink(missing_ok=True)  # it would not fit the new FMUs if this is interrupted
-    if kind != "python" and chosen != (toolchain.here(),):
-        tell("cross-compiling with ziglang: its first build for Windows takes about a minute")
     written: list[Path] = []
     for count, reference in enumerate(references, start=1):
         begin = time.perf_counter()

@@ -16,6 +16,7 @@ from __future__ import annotations
 import functools
 import importlib.metadata
 import importlib.util
+import logging
 import os
 import platform
 import shutil
@@ -23,6 +24,7 @@ import subprocess
 import sys
 import tempfile
 from collections.abc import Iterable
+from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -38,6 +40,7 @@ FLAGS = (
     "-fno-tree-vectorize",
 )
 CL_FLAGS = ("/nologo", "/std:c11", "/O2", "/fp:precise", "/W3", "/D_CRT_SECURE_NO_WARNINGS", "/LD")
+_LOG = logging.getLogger(__name__)
 _HEADERS = Path(fmpy.__file__).parent / "c-code"
 
 
@@ -141,8 +144,9 @@ def compile_library(source: Path, target: Path, name: str, *, only: bool, cache:
         target: the library to write.
         name: a key of `PLATFORMS`.
         only: whether this machine's platform is all that is asked for; then the system's compiler serves.
-        cache: where ziglang keeps what it made of its own C libraries, which takes a minute for Windows and seconds for
-            the others; its own folder in the user's home by default. ``ZIG_GLOBAL_CACHE_DIR`` overrides both.
+        cache: where ziglang keeps what it made of its own C libraries, which takes minutes for Windows and seconds for
+            the others; several processes may share it. Its own folder in the user's home by default;
+            ``ZIG_GLOBAL_CACHE_DIR`` overrides both.
 
     Raises:
         CompilerError: no compiler for that platform, or it failed.
@@ -161,8 +165,36 @@ def compile_library(source: Path, target: Path, name: str, *, only: bool, cache:
         if compiler is not None:
             _run(_system_command(compiler, source.name, relative), source.parent)
         else:
+            mark = _Mark(name, cache)
+            _LOG.info("%s: compiling for %s%s", target.stem, name, mark.note)
             _cross_compile(source, made, PLATFORMS[name], cache)
+            mark.leave()
         os.replace(made, target)
+
+
+class _Mark:
+    """A file that says that a cache of ziglang's has a platform's C library: what follows takes under a second."""
+
+    def __init__(self, name: str, cache: Path | None) -> None:
+        chosen = os.environ.get("ZIG_GLOBAL_CACHE_DIR")
+        folder = Path(chosen) if chosen else cache
+        version = importlib.metadata.version("ziglang")
+        self._cost = "minutes" if name == "win64" else "some seconds"
+        self._file = folder / "railcosim" / f"{name}-{version}" if folder else None
+
+    @property
+    def note(self) -> str:
+        """What to tell whoever waits."""
+        if self._file is None or self._file.exists():
+            return ""
+        return f"; ziglang first makes that platform's C library, once, which takes {self._cost}"
+
+    def leave(self) -> None:
+        """Leave the mark; a cache that cannot be written goes without."""
+        if self._file is not None:
+            with suppress(OSError):
+                self._file.parent.mkdir(parents=True, exist_ok=True)
+                self._file.touch()
 
 
 def _system_command(compiler: str, source: str, target: str) -> list[str]:
@@ -180,7 +212,7 @@ def _cross_compile(source: Path, made: Path, machine: Platform, cache: Path | No
     environment = dict(os.environ)
     if cache is not None:
         environment.setdefault("ZIG_GLOBAL_CACHE_DIR", str(cache))
-        environment.setdefault("ZIG_LOCAL_CACHE_DIR", environment["ZIG_GLOBAL_CACHE_DIR"])
+        environment.setdefault("ZIG_LOCAL_CACHE_DIR", str(made.parent / "zig"))  # what no other build could use
     parts = []
     for target in machine.targets:
         part = made.parent / target / made.name

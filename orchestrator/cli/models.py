@@ -35,7 +35,16 @@ from .options import (
     build_arguments,
     load_system,
 )
-from .printing import open_console, say, show_interface, show_notes, show_report, show_system, tell
+from .printing import (
+    open_console,
+    say,
+    show_compilations,
+    show_interface,
+    show_notes,
+    show_report,
+    show_system,
+    tell,
+)
 from .skeleton import write_skeleton
 
 
@@ -65,7 +74,8 @@ def describe(
         known = (*CATALOGUE, *dict(shipped()))
         remedy = suggestion(name, known) or "'orchestrate list' has them; a file is named with its ending"
         raise ScenarioError(Problem("", f"there is no component or shipped scenario {name!r}", remedy))
-    path, _, lacks = (Path(name), "", "") if is_fmu else package(name, arguments)
+    with show_compilations(quiet=False):
+        path, _, lacks = (Path(name), "", "") if is_fmu else package(name, arguments)
     with Workspace() as workspace:
         interface = load_fmu(path, workspace).interface
     out = open_console()
@@ -114,15 +124,16 @@ def build(
     wanted = [*(names or []), *(CATALOGUE if every else [])]
     if not wanted:
         raise ScenarioError(f"name the components to build, or --all; there is {', '.join(CATALOGUE)}")
-    written = release(
-        tuple(dict.fromkeys(wanted)),
-        build_arguments(builds),
-        output or default_directory(),
-        kind=kind.value,
-        platforms=[name.strip() for name in (platforms or "").split(",") if name.strip()],
-        checksums=every,
-        tell=(lambda line: None) if quiet else tell,
-    )
+    with show_compilations(quiet):
+        written = release(
+            tuple(dict.fromkeys(wanted)),
+            build_arguments(builds),
+            output or default_directory(),
+            kind=kind.value,
+            platforms=[name.strip() for name in (platforms or "").split(",") if name.strip()],
+            checksums=every,
+            tell=(lambda line: None) if quiet else tell,
+        )
     for path in written:
         print(path)
 
@@ -148,7 +159,8 @@ def pack(
 ) -> None:
     """Write one FMU that holds a whole scenario, for another tool to run as a block."""
     system = load_system(scenario, preset, settings, builds, swaps, stop=stop, step=step, algorithm=algorithm)
-    packed = pack_system(system, output, expose=expose or (), platforms=(platforms or "").split(","))
+    with show_compilations(quiet=False):
+        packed = pack_system(system, output, expose=expose or (), platforms=(platforms or "").split(","))
     out = open_console()
     show_notes(out, packed.notes)
     shown = f"{len(packed.exposed)} variables, for {', '.join(packed.platforms)}"

@@ -11,7 +11,7 @@ from ..run import describe_stepping
 from ..scenario import load, shipped
 from ..wiring import describe_topology
 from .options import Algorithm, Preset, Scenario, Set, Swap, With, load_system
-from .printing import counted, open_console, say, show_notes
+from .printing import counted, open_console, say, show_compilations, show_notes
 
 
 def list_all() -> None:
@@ -43,7 +43,7 @@ def check(
     """Find what is wrong before a run, and show how the run would step."""
     system = load_system(scenario, preset, settings, builds, swaps, algorithm=algorithm)
     out = open_console()
-    with Workspace() as workspace:
+    with Workspace() as workspace, show_compilations(quiet=False):
         checked = check_system(system, workspace)
     say(out, system.provenance.title or system.provenance.name, "bold")
     connections = len(checked.wiring.links)

@@ -142,15 +142,15 @@ def test_an_unknown_platform_is_refused_before_anything_is_built(tmp_path, monke
     assert not (tmp_path / "out").exists()
 
 
-def test_a_first_build_for_windows_is_announced(tmp_path, told, monkeypatch):
+def test_every_platform_asked_for_is_built_and_told(tmp_path, told, monkeypatch):
     made = tmp_path / "cache" / "Gust.fmu"
     made.parent.mkdir()
     made.write_bytes(b"an FMU")
     asked = []
     monkeypatch.setattr(module, "build", lambda *_, **how: asked.append(how) or made)
     release(["Gust"], {}, tmp_path, platforms=["all"], tell=told.append)
-    assert "Windows takes about a minute" in told[0]
-    assert f"Gust: native, {' '.join(PLATFORMS)} (" in told[1]
+    assert len(told) == 1
+    assert f"Gust: native, {' '.join(PLATFORMS)} (" in told[0]
     assert asked == [{"kind": "native", "platforms": ["all"]}]
 
 

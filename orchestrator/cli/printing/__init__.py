@@ -7,7 +7,7 @@ from .comparison import show_comparison
 from .console import Log, and_figures, counted, folded, open_console, say, show_notes, tell
 from .interface import show_interface
 from .outcome import show_run
-from .progress import show_progress
+from .progress import show_compilations, show_progress
 from .scenario import show_system
 from .validation import show_report
 from .verdicts import show_published, summary
@@ -20,6 +20,7 @@ __all__ = [
     "open_console",
     "say",
     "show_comparison",
+    "show_compilations",
     "show_interface",
     "show_notes",
     "show_progress",

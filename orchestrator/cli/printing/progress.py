@@ -1,15 +1,17 @@
-"""How far a run has got."""
+"""How far a run has got, and what is being compiled."""
 
 from __future__ import annotations
 
+import logging
 import sys
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 
-from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn, TimeRemainingColumn
+from rich.progress import BarColumn, Progress, SpinnerColumn, TextColumn, TimeElapsedColumn, TimeRemainingColumn
 
+from ....fmus import toolchain
 from ...run import Progress as OnProgress
-from .console import open_console, tell
+from .console import open_console, printable, tell
 
 
 @contextmanager
@@ -33,11 +35,54 @@ def show_progress(
             task = bar.add_task(title, total=None, reached="")
 
             def show(time: float, stop: float) -> None:
-                bar.update(task, completed=time - start, total=stop - start, reached=f"{time:.6g} of {stop:.6g} s")
+                at = f"{time:.6g} of {stop:.6g} s"
+                bar.update(task, description=title, completed=time - start, total=stop - start, reached=at)
 
-            yield show
+            with _compilations(lambda what: bar.update(task, description=what)):
+                yield show
     else:
-        yield _lines(title, start, start if reached is None else reached)
+        with _compilations(tell):
+            yield _lines(title, start, start if reached is None else reached)
+
+
+@contextmanager
+def show_compilations(quiet: bool) -> Iterator[None]:
+    """What is compiled for another machine, as it is begun: on a terminal with the time it takes, else a line each."""
+    if quiet:
+        yield
+    elif sys.stderr.isatty():
+        columns = (SpinnerColumn(), TextColumn("{task.description}", markup=False), TimeElapsedColumn())
+        with Progress(*columns, console=open_console(stderr=True), transient=True) as bar:
+            task = bar.add_task("", start=False, visible=False)
+            with _compilations(lambda what: bar.reset(task, description=what, visible=True)):
+                yield
+    else:
+        with _compilations(tell):
+            yield
+
+
+@contextmanager
+def _compilations(show: Callable[[str], object]) -> Iterator[None]:
+    """Hand on what the toolchain tells."""
+    teller, handler = logging.getLogger(toolchain.__name__), _Teller(show)
+    level = teller.level
+    teller.setLevel(logging.INFO)
+    teller.addHandler(handler)
+    try:
+        yield
+    finally:
+        teller.removeHandler(handler)
+        teller.setLevel(level)
+
+
+class _Teller(logging.Handler):
+    def __init__(self, show: Callable[[str], object]) -> None:
+        super().__init__(logging.INFO)
+        self._show = show
+
+    def emit(self, record: logging.LogRecord) -> None:
+        if record.levelno == logging.INFO:  # warnings are the console's
+            self._show(printable(record.getMessage()))
 
 
 def _lines(title: str, start: float, reached: float) -> OnProgress:

@@ -1,6 +1,20 @@
 """What is told of a run that goes on."""
 
-from railcosim.orchestrator.cli.printing import show_progress
+import io
+import logging
+import sys
+from functools import partial
+
+import pytest
+from railcosim.fmus import toolchain
+from railcosim.orchestrator.cli.printing import show_compilations, show_progress
+
+
+class Terminal(io.StringIO):
+    """A stream that says it is one."""
+
+    def isatty(self):
+        return True
 
 
 def test_progress_starts_at_the_start_time(capsys):
@@ -13,3 +27,32 @@ def test_progress_starts_at_the_start_time(capsys):
     assert lines == {100.0: [], 104.0: told[:4], 110.0: told[4:]}
     with show_progress("quiet", True) as progress:
         assert progress is None
+
+
+def compile_something():
+    logging.getLogger(toolchain.__name__).info("%s: compiling for %s", "Gust\x1b[2J", "win64")
+
+
+@pytest.mark.parametrize(
+    ("show", "quiet", "lines"),
+    [
+        (show_compilations, False, ["Gust\\x1b[2J: compiling for win64"]),
+        (show_compilations, True, []),
+        (partial(show_progress, "run"), False, ["Gust\\x1b[2J: compiling for win64"]),
+        (partial(show_progress, "run"), True, []),
+    ],
+)
+def test_without_a_terminal_each_compilation_is_a_line(show, quiet, lines, capsys):
+    with show(quiet=quiet):
+        compile_something()
+    compile_something()
+    assert capsys.readouterr().err.splitlines() == lines
+
+
+def test_on_a_terminal_a_compilation_shows_its_time(monkeypatch):
+    terminal = Terminal()
+    monkeypatch.setattr(sys, "stderr", terminal)
+    with show_compilations(quiet=False):
+        compile_something()
+    assert "compiling for win64" in terminal.getvalue()
+    assert "0:00:0" in terminal.getvalue()
