@@ -79,6 +79,8 @@ class Interface:
         arrays: names of scalars by the bare array name (``"force"`` -> ``"force[1]"``, ...).
         annotation: what one of our own FMUs says beyond the standard; None for one of another maker.
         version: of the FMI standard, ``"1.0"``, ``"2.0"`` or ``"3.0"``.
+        event_mode: whether its events may be handled by its importer (FMI 3.0).
+        output_derivatives: the highest order of them that it gives.
         left_out: what variables are that the FMU has and we do not take, by name: ``"an array"``, ``"binary"``.
         warnings: what is wrong with the file though it can be used.
     """
@@ -101,6 +103,8 @@ class Interface:
     variable_step: bool = True
     single_instance: bool = False
     needs_tool: bool = False
+    event_mode: bool = False
+    output_derivatives: int = 0
     annotation: Annotation | None = None
     left_out: Mapping[str, str] = field(default_factory=dict)
     warnings: tuple[str, ...] = ()

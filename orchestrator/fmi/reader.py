@@ -90,6 +90,8 @@ def _interface(description: Any, root: Any, beside: Beside) -> Interface:
         variable_step=bool(simulation.canHandleVariableCommunicationStepSize),
         single_instance=bool(simulation.canBeInstantiatedOnlyOncePerProcess),
         needs_tool=bool(simulation.needsExecutionTool),
+        event_mode=bool(simulation.hasEventMode),
+        output_derivatives=int(simulation.maxOutputDerivativeOrder or 0),
         annotation=read_annotation(root),
         left_out=beside.left_out,
     )

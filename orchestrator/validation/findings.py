@@ -9,7 +9,7 @@ from typing import Literal
 
 from ..fmi import Interface
 
-Verdict = Literal["pass", "warning", "fail", "skipped"]
+Verdict = Literal["pass", "note", "warning", "fail", "skipped"]
 _LISTED = 20
 
 
@@ -36,7 +36,7 @@ class Report:
         return all(finding.verdict != "fail" for finding in self.findings)
 
 
-def listed(check: str, problems: Sequence[str], fine: str) -> Finding:
-    """A check that fails by any problem; `fine` is what to say where there is none."""
+def listed(check: str, problems: Sequence[str], fine: str, verdict: Verdict = "fail") -> Finding:
+    """A check that fails (or has another verdict) by any problem; `fine` is what to say where there is none."""
     more = f"\n... and {len(problems) - _LISTED} more" if len(problems) > _LISTED else ""
-    return Finding(check, "fail", "\n".join(problems[:_LISTED]) + more) if problems else Finding(check, "pass", fine)
+    return Finding(check, verdict, "\n".join(problems[:_LISTED]) + more) if problems else Finding(check, "pass", fine)

@@ -1,22 +1,21 @@
 """One probe of one FMU, run by `probing` in a process of its own, which the FMU may take down.
 
-What it needs to know stands in the file named as its only argument; it writes its verdict to the file named in there.
+What it needs to know stands in the file named as its only argument; it adds its verdict to the file named in there.
 """
 
 from __future__ import annotations
 
 import contextlib
 import io
-import json
 import os
 import pickle
 from pathlib import Path
 
 from ..errors import FmuError
-from . import probes, probes_fmi2
-from .probes import DoubtfulError, Task
+from . import claims, probes, probes_fmi2
+from .probes import DoubtfulError, NotedError, Task
 
-PROBES = {**probes.PROBES, **probes_fmi2.PROBES}
+PROBES = {**probes.PROBES, **claims.PROBES, **probes_fmi2.PROBES}
 _KEPT = 5
 """Lines of what an FMU said that stand under what it did."""
 
@@ -29,14 +28,13 @@ def main(path: str) -> None:
         with contextlib.redirect_stdout(printed):
             detail = PROBES[task.probe](task)
         verdict = "skipped" if detail.startswith("skipped: ") else "pass"
-    except DoubtfulError as error:
-        verdict, detail = "warning", str(error)
+    except (DoubtfulError, NotedError) as error:
+        verdict, detail = "warning" if isinstance(error, DoubtfulError) else "note", str(error)
     except FmuError as error:
         verdict, detail = "fail", _in_a_line(error, printed.getvalue())
     except Exception as error:
         verdict, detail = "fail", f"{type(error).__name__}: {error}"
-    answer = {"verdict": verdict, "detail": detail.removeprefix("skipped: ")}
-    task.answer.write_text(json.dumps(answer), encoding="utf-8")
+    task.record.add(verdict=verdict, detail=detail.removeprefix("skipped: "))
     # A library that crashes while it is unloaded has done its part by now (pythonfmu 0.7 does, in one exit of a few).
     os._exit(0)
 

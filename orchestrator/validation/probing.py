@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-import json
 import os
 import pickle
 import subprocess
 import tempfile
+from collections.abc import Sequence
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
@@ -25,15 +25,25 @@ PROBES = {
     "reset": "resets",
     "instances": "several instances",
     "state": "saves its state",
+    "dependencies": "dependencies",
+    "steps": "steps of other lengths",
+    "derivatives": "derivatives",
     "order": "wrong calls",
 }
 """The probes of `probe_process`, as a user reads them."""
 TIMEOUT = 60.0
 """How long one probe may take by default, in s."""
 _DEFAULT_STEP = 0.1
+_SAID = "output.txt"
+_RESUMED = ("dependencies", "order")
+"""Probes that do what importers must not: what takes their process down is left out by the next one."""
+_MOST_LIVES = 10
+_HANGS = "not finished after"
 
 
-def try_out(interface: Interface, folder: Path, path: Path, timeout: float) -> list[Finding]:
+def try_out(
+    interface: Interface, folder: Path, path: Path, timeout: float, probes: Sequence[str] = tuple(PROBES)
+) -> list[Finding]:
     """Whether there is a library for this machine, and what every probe of it finds.
 
     Args:
@@ -41,6 +51,7 @@ def try_out(interface: Interface, folder: Path, path: Path, timeout: float) -> l
         folder: where it was unpacked; the probes write beside it.
         path: the archive, for messages.
         timeout: how long one probe may take, in s.
+        probes: which ones.
     """
     binaries = folder / "binaries"
     platforms = sorted(p.name for p in binaries.iterdir() if p.is_dir()) if binaries.is_dir() else []
@@ -60,8 +71,8 @@ def try_out(interface: Interface, folder: Path, path: Path, timeout: float) -> l
     problems = [f"{problem}: most importers need that" for problem in problems]
     findings = [listed("binary", problems, f"for {', '.join(platforms)}")]
     with ThreadPoolExecutor(os.cpu_count() or 1) as pool:
-        answers = pool.map(lambda probe: _probe(probe, interface, folder, timeout), PROBES)
-        findings += [_judged(title, answer, interface) for title, answer in zip(PROBES.values(), answers, strict=True)]
+        answers = pool.map(lambda probe: _probe(probe, interface, folder, timeout), probes)
+        findings += [_judged(PROBES[probe], answer, interface) for probe, answer in zip(probes, answers, strict=True)]
     return findings
 
 
@@ -70,28 +81,35 @@ def _probe(probe: str, interface: Interface, folder: Path, timeout: float) -> tu
         return "skipped", "tried with FMI 2.0 only"
     place = Path(tempfile.mkdtemp(prefix=f"{probe}_", dir=folder.parent))
     step = interface.default_step or interface.recommended_step or _DEFAULT_STEP
-    task = Task(probe, interface, folder, step, answer=place / "answer.json", trying=place / "trying.txt")
+    task = Task(probe, interface, folder, step, answer=place / "answer.jsonl")
     (place / "task").write_bytes(pickle.dumps(task))
+    for _ in range(_MOST_LIVES if probe in _RESUMED else 1):
+        death = _live(place, timeout)
+        if task.record.last("verdict") is not None:
+            return task.record.last("verdict"), str(task.record.last("detail"))
+        task.record.add(died=death)
+    culprit = task.record.last("trying")
+    what = f"took its process down{f' at {culprit}' if culprit else ''} ({death})"
+    if death.startswith(_HANGS):
+        what = f"{death} by {culprit or 'its library'} and was ended"
+    return "fail", f"{what}{_last_words(place / _SAID)}"
+
+
+def _live(place: Path, timeout: float) -> str:
+    """Let a process try, until it ends; how it did."""
     command = [*starting("validation.probe_process"), str(place / "task")]
-    with (place / "output.txt").open("wb") as output:
+    with (place / _SAID).open("wb") as output:
         process = subprocess.Popen(
             command, cwd=place, stdin=subprocess.DEVNULL, stdout=output, stderr=output, start_new_session=True
         )
         try:
-            code = process.wait(timeout)
+            return _cause(process.wait(timeout))
         except subprocess.TimeoutExpired:
-            end_process(process)
-            process.wait()
-            return "fail", f"not finished after {timeout:g} s: it was ended"
-        except BaseException:
-            end_process(process)
-            process.wait()
-            raise
-    if task.answer.is_file():
-        told = json.loads(task.answer.read_text(encoding="utf-8"))
-        return told["verdict"], told["detail"]
-    at = f" at {task.trying.read_text(encoding='utf-8')}" if task.trying.is_file() else ""
-    return "fail", f"it took its process down{at} ({_cause(code)}){_last_words(place / 'output.txt')}"
+            return f"{_HANGS} {timeout:g} s"
+        finally:
+            if process.returncode is None:
+                end_process(process)
+                process.wait()
 
 
 def _cause(code: int) -> str:

@@ -199,7 +199,7 @@ def by_hand(compile_c, tmp_path):
     """The FMU of fmi1.c or fmi3.c, with parts of its description replaced, and another library's name."""
     facts = {1: ("First", fmpy.platform), 3: ("Third", fmpy.platform_tuple)}
 
-    def pack(version, *changes, library=None, name=None):
+    def pack(version, *changes, library=None, name=None, options=()):
         identifier, platform = facts[version]
         text = (FOREIGN / f"fmi{version}.xml").read_text(encoding="utf-8")
         for old, new in changes:
@@ -207,7 +207,9 @@ def by_hand(compile_c, tmp_path):
             text = text.replace(old, new)
         files = {
             "modelDescription.xml": text,
-            f"binaries/{platform}/{library or identifier}{fmpy.sharedLibraryExtension}": compile_c(f"fmi{version}.c"),
+            f"binaries/{platform}/{library or identifier}{fmpy.sharedLibraryExtension}": compile_c(
+                f"fmi{version}.c", *options
+            ),
         }
         return write_archive(tmp_path / (name or f"{identifier.lower()}.fmu"), files)
 

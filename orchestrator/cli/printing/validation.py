@@ -20,5 +20,5 @@ def show_report(out: Console, report: Report) -> None:
     say(out, f"{report.path}: {report.interface.model}", "bold")
     out.print(made)
     found = Counter(finding.verdict for finding in report.findings)
-    told = ", ".join(f"{found[word]} {word}" for word in ("pass", "warning", "fail", "skipped") if found[word])
+    told = ", ".join(f"{found[word]} {word}" for word in ("pass", "note", "warning", "fail", "skipped") if found[word])
     say(out, f"{'valid' if report.passed else 'not valid'}: {told}", "green" if report.passed else "bold red")

@@ -45,6 +45,7 @@ _SIGNATURES: Signatures = {
     "fmi2GetDirectionalDerivative": (
         c_int, c_void_p, c_void_p, c_size_t, c_void_p, c_size_t, c_void_p, c_void_p
     ),
+    "fmi2GetRealOutputDerivatives": (c_int, c_void_p, c_void_p, c_size_t, c_void_p, c_void_p),
     "fmi2SetRealInputDerivatives": (c_int, c_void_p, c_void_p, c_size_t, c_void_p, c_void_p),
 }  # fmt: skip
 _TYPES: dict[str, tuple[str, Any]] = {

@@ -1,4 +1,4 @@
-"""An FMI 3.0 co-simulation FMU behind the face of an instance: scalar variables, no event mode."""
+"""An FMI 3.0 co-simulation FMU behind the face of an instance: scalar variables."""
 
 from __future__ import annotations
 
@@ -15,6 +15,8 @@ from fmpy import fmi3
 from .libraries import Signatures
 from .loaded import DISCARD, OK, WARNING, LoadedSlave, keep_message
 
+_MOST_UPDATES = 1000
+"""Updates of discrete states at one event, after which they count as never settling."""
 _NUMBERS = {
     "Float32": ctypes.c_float,
     "Float64": ctypes.c_double,
@@ -43,6 +45,10 @@ _SIGNATURES: Signatures = {
     "fmi3EnterInitializationMode": (c_int, c_void_p, c_bool, c_double, c_double, c_bool, c_double),
     "fmi3ExitInitializationMode": (c_int, c_void_p),
     "fmi3Terminate": (c_int, c_void_p),
+    "fmi3EnterEventMode": (c_int, c_void_p),
+    "fmi3UpdateDiscreteStates": (c_int, *[c_void_p] * 7),
+    "fmi3EnterStepMode": (c_int, c_void_p),
+    "fmi3GetOutputDerivatives": (c_int, c_void_p, c_void_p, c_size_t, c_void_p, c_void_p, c_size_t),
     "fmi3DoStep": (c_int, c_void_p, c_double, c_double, c_bool, c_void_p, c_void_p, c_void_p, c_void_p),
     **{
         f"fmi3{verb}{suffix}": (c_int, c_void_p, c_void_p, c_size_t, c_void_p, c_size_t)
@@ -86,12 +92,13 @@ class Fmi3Slave(LoadedSlave):
     def _instantiate(self, folder: Path) -> int | None:
         # What fmi3DoStep tells beside its status; the first, that an event waits to be handled, is for the event mode.
         self._told = c_bool(), c_bool(), c_bool(), c_double()
-        _, self._ends, self._is_early, self._came_to = self._told
+        self._waits, self._ends, self._is_early, self._came_to = self._told
         self._telling = tuple(ctypes.byref(each) for each in self._told)
         resources = folder / "resources"
         place = f"{resources}{os.sep}".encode() if resources.is_dir() else None
         name, token = self.name.encode(), self.interface.guid.encode()
-        options = (False, self._talks, False, False)  # visible, logging, event mode, early return
+        # Visible, logging, event mode, early return: at an event, of an FMU that can take the rest of the step.
+        options = (False, self._talks, self._events, self._events and self.interface.variable_step)
         found: int | None = self.function("fmi3InstantiateCoSimulation")(
             name, token, place, *options, None, 0, id(self), _LOGGER, None
         )
@@ -102,8 +109,25 @@ class Fmi3Slave(LoadedSlave):
         self.call("fmi3EnterInitializationMode", False, 0.0, self._span[0], *self._end())
 
     def exit_initialization(self) -> None:
-        """Leave initialization mode: without an event mode, the first step may follow."""
+        """Leave initialization mode, and the event mode it leads to: the first step may follow."""
         self.call("fmi3ExitInitializationMode")
+        if self._events:
+            self._leave_events()
+
+    def _leave_events(self) -> None:
+        """Event mode -> step mode."""
+        needed, others, until = c_bool(True), (c_bool * 3)(), c_double()
+        places = [ctypes.byref(others, k * ctypes.sizeof(c_bool)) for k in range(len(others))]
+        told = ctypes.byref(needed), ctypes.byref(self._ends), *places, ctypes.byref(until)
+        for _ in range(_MOST_UPDATES):
+            self.call("fmi3UpdateDiscreteStates", *told)
+            if self._ends.value:
+                return
+            if not needed.value:
+                break
+        else:
+            raise self.refuse(f"its discrete states do not settle in {_MOST_UPDATES} calls of fmi3UpdateDiscreteStates")
+        self.call("fmi3EnterStepMode")
 
     def _announce(self) -> None:
         pass  # entering initialization mode says it all
@@ -111,7 +135,11 @@ class Fmi3Slave(LoadedSlave):
     def _attempt(self, time: float, part: float, final: bool, *, again: bool) -> int:
         self._ends.value = self._is_early.value = False
         self._came_to.value = math.nan
-        return int(self._do_step(self.pointer, time, part, final, *self._telling))
+        status = int(self._do_step(self.pointer, time, part, final, *self._telling))
+        if self._events and status in (OK, WARNING) and self._waits.value and not self._ends.value:
+            self.call("fmi3EnterEventMode")
+            self._leave_events()
+        return status
 
     def _is_cut_short(self) -> bool:
         return self._ends.value or self._is_early.value

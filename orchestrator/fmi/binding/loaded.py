@@ -68,6 +68,7 @@ class LoadedSlave(ABC):
         interface: its interface.
         folder: where the FMU was unpacked.
         log: where what it says is kept; the last lines by default.
+        events: whether its events are handled here, in its event mode (FMI 3.0), and not by itself.
 
     Raises:
         FmuError: it cannot be loaded or instantiated.
@@ -90,12 +91,15 @@ class LoadedSlave(ABC):
     PREFIXED: ClassVar[bool] = False
     """Whether the names of its functions begin with the model identifier."""
 
-    def __init__(self, name: str, interface: Interface, folder: Path, log: deque[str] | None = None) -> None:
+    def __init__(
+        self, name: str, interface: Interface, folder: Path, log: deque[str] | None = None, *, events: bool = False
+    ) -> None:
         self.name = name
         self.interface = interface
         self.time = 0.0
         self.log: deque[str] = deque(maxlen=_LOG_LINES) if log is None else log
         self._dead = False
+        self._events = events
         self._span = (0.0, 0.0)
         self._keys: list[int | bytes] = []
         self._library = None

@@ -4,13 +4,19 @@
    of more than 0.05 s is refused; 8: the simulation shall end after half a step; 11: half of a step of more than 0.05 s is
    taken, and that is told as an early return; 12: y is not a number; 20 + s: the status of getting reals. At any time 40:
    initialization fails. Value references are ten times the place of a type below plus 0 for its input and 1 for its output;
-   Float64: 0 time, 1 u, 2 x, 3 y = x + gain * u, 4 gain, 5 der(x); Int32: 62 mode; Int64: 82 gear, 83 shown. */
+   Float64: 0 time, 1 u, 2 x, 3 y = x + gain * u, 4 gain, 5 der(x); Int32: 62 mode; Int64: 82 gear, 83 shown.
+   With -DEVENTS=1 it insists on its event mode: a step ends early at each third of a second, where an event waits whose
+   discrete states are updated twice. */
 
 #include <math.h>
 #include <stdbool.h>
 #include <stdint.h>
 #include <stdlib.h>
 #include <string.h>
+
+#ifndef EVENTS
+#define EVENTS 0
+#endif
 
 typedef void (*Logger)(void *environment, int status, const char *category, const char *text);
 typedef struct {
@@ -31,7 +37,8 @@ typedef struct {
     Values now;
     Logger logger;
     void *environment;
-    bool logging;
+    bool logging, in_events, waits;
+    int updates;
 } Third;
 
 static int tell(Third *s, int status, const char *text)
@@ -51,7 +58,7 @@ void *fmi3InstantiateCoSimulation(const char *name, const char *token, const cha
                                   bool events, bool early, const unsigned *intermediate, size_t count,
                                   void *environment, Logger logger, void *update)
 {
-    if (strcmp(token, "{3}") || events || early || count || update) {
+    if (strcmp(token, "{3}") || events != EVENTS || early != EVENTS || count || update) {
         logger(environment, 3, "third", "another token, or what was not offered, 100 %");
         return NULL;
     }
@@ -83,8 +90,34 @@ int fmi3EnterInitializationMode(void *c, bool has_tolerance, double tolerance, d
 int fmi3ExitInitializationMode(void *c)
 {
     ((Third *)c)->now.ready = true;
+    ((Third *)c)->in_events = EVENTS;
     return 0;
 }
+
+#if EVENTS
+int fmi3EnterEventMode(void *c)
+{
+    Third *s = c;
+    s->in_events = true;
+    return tell(s, s->waits ? 0 : 3, "no event waits");
+}
+
+int fmi3UpdateDiscreteStates(void *c, bool *needed, bool *ends, bool *nominals, bool *states, bool *timed, double *next)
+{
+    Third *s = c;
+    *needed = ++s->updates % 2;
+    *ends = *nominals = *states = *timed = false;
+    return tell(s, s->in_events ? 0 : 3, "no event mode");
+}
+
+int fmi3EnterStepMode(void *c)
+{
+    Third *s = c;
+    int status = tell(s, s->in_events && s->updates % 2 == 0 ? 0 : 3, "no settled event mode");
+    s->in_events = s->waits = false;
+    return status;
+}
+#endif
 
 int fmi3Terminate(void *c)
 {
@@ -152,7 +185,12 @@ int fmi3DoStep(void *c, double time, double step, bool final, bool *event, bool 
     if (!v->ready || fabs(time - v->time) > 1e-9) {
         return tell(s, 3, "a step that was not expected");
     }
-    *event = true; /* of no meaning without an event mode */
+    if (s->in_events || s->waits) {
+        return tell(s, 3, "a step without the event mode");
+    }
+    double until = (floor(3.0 * time + 1e-9) + 1.0) / 3.0 - time;
+    s->waits = EVENTS && until <= step + 1e-9;
+    *event = s->waits || !EVENTS; /* of no meaning without an event mode */
     *ends = how == 8;
     *early = how == 11 && step > 0.05;
     *reached = v->time;
@@ -164,6 +202,10 @@ int fmi3DoStep(void *c, double time, double step, bool final, bool *event, bool 
         status = 2;
     }
     step *= *ends || *early ? 0.5 : 1.0;
+    if (s->waits && until < step - 1e-9) {
+        step = until;
+        *early = true;
+    }
     v->f64[2] = v->f64[1] + (v->f64[2] - v->f64[1]) * exp(-step);
     v->f32[1] = v->f32[0];
     v->i8[1] = v->i8[0];

@@ -4,9 +4,7 @@ import shutil
 import sys
 import time
 import zipfile
-from pathlib import Path
 
-import fmpy
 import pytest
 from railcosim.fmus.build import build, native_problem
 from railcosim.fmus.references import resolve
@@ -20,41 +18,7 @@ needs_native = pytest.mark.skipif(
 )
 needs_compiler = pytest.mark.skipif(shutil.which("cc") is None, reason="there is no C compiler")
 
-HEADERS = Path(fmpy.__file__).parent / "c-code"
-PLACES = ("ON_INSTANTIATE", "ON_RESET", "ON_GET", "ON_STEP", "ON_RESTORE")
-DESCRIPTION = """<?xml version="1.0" encoding="UTF-8"?>
-<fmiModelDescription fmiVersion="2.0" modelName="Lag" guid="{1}" generationTool="a test">
-  <CoSimulation modelIdentifier="Lag" canGetAndSetFMUstate="true"/>
-  <ModelVariables>
-    <ScalarVariable name="y" valueReference="0" causality="output"><Real/></ScalarVariable>
-    <ScalarVariable name="u" valueReference="1" causality="input"><Real start="0"/></ScalarVariable>
-    <ScalarVariable name="k" valueReference="2" causality="parameter" variability="fixed">
-      <Real start="1"/>
-    </ScalarVariable>
-  </ModelVariables>
-  <ModelStructure>
-    <Outputs><Unknown index="1"/></Outputs><InitialUnknowns><Unknown index="1"/></InitialUnknowns>
-  </ModelStructure>
-</fmiModelDescription>
-"""
 CRASH = "*(volatile int *)0 = 1;"
-
-
-@pytest.fixture
-def lag(compile_c, tmp_path):
-    """A small FMU in C, with code of choice put in at some places: dy/dt = k + u - y, Euler."""
-
-    def make(description=DESCRIPTION, library="Lag", platform=fmpy.platform, **code):
-        defined = [f"-D{place}={code.get(place.lower(), '')}" for place in PLACES]
-        defined += [f"-D{name.upper()}={text}" for name, text in code.items() if name.upper() not in PLACES]
-        binary = compile_c("lag.c", f"-I{HEADERS}", *defined)
-        path = tmp_path / "lag.fmu"
-        with zipfile.ZipFile(path, "w") as archive:
-            archive.writestr("modelDescription.xml", description)
-            archive.writestr(f"binaries/{platform}/{library}{fmpy.sharedLibraryExtension}", binary)
-        return path
-
-    return make
 
 
 def verdicts(report):
@@ -68,7 +32,7 @@ def detail(report, check):
 @needs_native
 def test_our_native_fmus_pass_everything():
     report = validate(build("PointMassTrain", kind="native"))
-    assert set(verdicts(report).values()) == {"pass"}
+    assert set(verdicts(report).values()) <= {"pass", "skipped"}
     assert set(PROBES.values()) < set(verdicts(report))
     assert report.passed
 
@@ -82,7 +46,7 @@ def test_our_python_fmus_pass():
 @needs_compiler
 def test_a_good_fmu_of_another_maker_passes(lag):
     report = validate(lag())
-    assert set(verdicts(report).values()) == {"pass"}
+    assert set(verdicts(report).values()) == {"pass", "skipped"}
     assert "rules of railcosim" not in verdicts(report)
 
 
@@ -90,9 +54,9 @@ def test_a_good_fmu_of_another_maker_passes(lag):
 @pytest.mark.parametrize(
     ("code", "probe", "part"),
     [
-        ({"on_instantiate": CRASH}, "instantiate", "took its process down (SIGSEGV)"),
+        ({"on_instantiate": CRASH}, "instantiate", "took its process down at fmi2Instantiate (SIGSEGV)"),
         ({"on_instantiate": "return 0;"}, "instantiate", "cannot be instantiated"),
-        ({"on_step": CRASH}, "simulate", "took its process down (SIGSEGV)"),
+        ({"on_step": CRASH}, "simulate", "took its process down at fmi2DoStep (SIGSEGV)"),
         ({"on_step": "abort();"}, "simulate", "SIGABRT"),
         ({"on_step": "exit(0);"}, "simulate", "exit code 0"),
         ({"on_step": "if (t > 0.5) return fmi2Error;"}, "simulate", "t = 0.6 s, status error: fmi2DoStep failed"),
@@ -112,22 +76,30 @@ def test_a_good_fmu_of_another_maker_passes(lag):
         ({"on_step": "static double n; M->u = n++;"}, "reset", "other outputs after fmi2Reset"),
         ({"shared_state": "1"}, "instances", "other outputs beside a second instance"),
         ({"on_restore": "M->y = 0;"}, "state", "other outputs after fmi2SetFMUstate"),
-        ({"on_get": "if (vr[i] > 2) " + CRASH}, "order", "down at fmi2GetReal of a value reference that is not there"),
+        ({"on_step": "memset((char *)c - 8, 65, 8);"}, "simulate", "took its process down at fmi2FreeInstance"),
     ],
 )
-def test_what_is_wrong_is_found_and_takes_nothing_down(lag, code, probe, part):
-    report = validate(lag(**code))
-    assert verdicts(report)[PROBES[probe]] == "fail"
-    assert part in detail(report, PROBES[probe])
-    assert not report.passed
+def test_what_is_wrong_is_found_and_takes_nothing_down(found, code, probe, part):
+    verdict, detail = found(probe, **code)
+    assert verdict == "fail"
+    assert part in detail
 
 
 @needs_compiler
-def test_leniency_of_another_maker_is_a_warning(lag):
-    report = validate(lag(on_step="M->y += 1; return fmi2OK;"))
-    assert verdicts(report)[PROBES["order"]] == "warning"
-    assert "fmi2DoStep before initialization, fmi2DoStep with a negative step" in detail(report, PROBES["order"])
-    assert report.passed
+def test_leniency_of_another_maker_is_a_warning(found):
+    verdict, detail = found("order", on_step="M->y += 1; return fmi2OK;")
+    assert verdict == "warning"
+    assert "fmi2DoStep before initialization, fmi2DoStep with a negative step" in detail
+
+
+@needs_compiler
+def test_a_wrong_call_that_takes_the_process_down_is_named_and_the_others_are_made(found):
+    verdict, detail = found("order", on_get="if (vr[i] > 2) " + CRASH, on_step="if (h < 0) abort();")
+    assert verdict == "warning"
+    assert detail.startswith(
+        "took the process down: fmi2DoStep with a negative step (SIGABRT), "
+        "fmi2GetReal of a value reference that is not there (SIGSEGV)\n"
+    )
 
 
 @pytest.mark.long
@@ -135,19 +107,26 @@ def test_leniency_of_another_maker_is_a_warning(lag):
 def test_an_fmu_that_hangs_is_ended(lag):
     begin = time.monotonic()
     report = validate(lag(on_step="for (;;) {}"), timeout=3.0)
-    assert "not finished after 3 s" in detail(report, PROBES["simulate"])
+    assert "not finished after 3 s by fmi2DoStep and was ended" in detail(report, PROBES["simulate"])
     assert verdicts(report)[PROBES["instantiate"]] == "pass"
     assert time.monotonic() - begin < 60.0
 
 
 @needs_compiler
-def test_the_schema_and_the_validator_are_asked(lag):
-    report = validate(lag(DESCRIPTION.replace('<Real start="0"/>', '<Real begin="0" start="0"/>')))
+def test_the_schema_and_the_validator_are_asked(lag, lag_description):
+    elsewhere = {"platform": "elsewhere64"}  # where nothing is tried
+    report = validate(lag(lag_description.replace('<Real start="0"/>', '<Real begin="0" start="0"/>'), **elsewhere))
     assert verdicts(report)["schema"] == "fail"
     assert "line 6" in detail(report, "schema")
-    report = validate(lag(DESCRIPTION.replace('<InitialUnknowns><Unknown index="1"/></InitialUnknowns>', "")))
-    assert (verdicts(report)["schema"], verdicts(report)["description"]) == ("pass", "fail")
-    assert "InitialUnknowns" in detail(report, "description")
+    unknowns = '<InitialUnknowns><Unknown index="1"/></InitialUnknowns>'
+    report = validate(lag(lag_description.replace(unknowns, ""), **elsewhere))
+    assert (verdicts(report)["schema"], verdicts(report)["description"]) == ("pass", "pass")
+    assert verdicts(report)["initial unknowns"] == "note"
+    assert "InitialUnknowns" in detail(report, "initial unknowns")
+    assert report.passed
+    report = validate(lag(lag_description.replace('<Outputs><Unknown index="1"/></Outputs>', ""), **elsewhere))
+    assert "ModelStructure/Outputs" in detail(report, "description")
+    assert not report.passed
 
 
 @needs_compiler
@@ -210,7 +189,7 @@ def test_a_file_that_says_it_is_ours_is_not_believed(tmp_path, xml, index):
         ("no_description.fmu", {"readme.txt": "x"}),
         ("no_xml.fmu", {"modelDescription.xml": "<fmi"}),
         ("fmi3.fmu", {"modelDescription.xml": '<fmiModelDescription fmiVersion="3.0"/>'}),
-        ("outside.fmu", {"modelDescription.xml": DESCRIPTION, "../evil": "x"}),
+        ("outside.fmu", {"modelDescription.xml": "<fmiModelDescription/>", "../evil": "x"}),
     ],
 )
 def test_a_file_that_is_no_fmu_is_refused(tmp_path, xml, name, content, capsys):
@@ -224,8 +203,10 @@ def test_a_file_that_is_no_fmu_is_refused(tmp_path, xml, name, content, capsys):
 
 @needs_compiler
 def test_the_command_prints_a_table_and_tells_by_its_exit_code(lag, capsys):
-    assert call(["validate", str(lag())]) == 0
+    lenient = lag(on_get="if (vr[i] > 2) " + CRASH)
+    assert call(["validate", str(lenient)]) == 0  # a warning fails nothing
     good = capsys.readouterr().out
+    assert " 1 warning" in good
     assert "20 steps of 0.1 s, 1 outputs finite" in good
     assert "\nvalid: " in good
     assert call(["validate", str(lag(on_step=CRASH))]) == 1
@@ -237,6 +218,6 @@ def test_the_command_prints_a_table_and_tells_by_its_exit_code(lag, capsys):
 
 @pytest.mark.skipif(sys.platform.startswith("win"), reason="POSIX signals")
 @needs_compiler
-def test_what_an_fmu_prints_is_its_last_words(lag):
-    report = validate(lag(on_step='write(2,"all is lost",11);abort();'))
-    assert "last words: all is lost" in detail(report, PROBES["simulate"])
+def test_what_an_fmu_prints_is_its_last_words(found):
+    _, detail = found("simulate", on_step='write(2,"all is lost",11);abort();')
+    assert "last words: all is lost" in detail

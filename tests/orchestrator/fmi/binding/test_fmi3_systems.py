@@ -210,6 +210,16 @@ def test_validate(by_hand, version):
     assert found[PROBES["reset"]] == ("skipped", "tried with FMI 2.0 only")
 
 
+def test_validate_gives_an_fmu_its_event_mode(by_hand):
+    """One that insists on it: steps end at its events, which are handled before the rest is taken."""
+    path = by_hand(3, ("<CoSimulation", '<CoSimulation hasEventMode="true"'), options=["-DEVENTS=1"])
+    report = validate(path)
+    found = {finding.check: (finding.verdict, finding.detail) for finding in report.findings}
+    assert report.passed, found
+    assert found[PROBES["simulate"]] == ("pass", "20 steps of 0.25 s, 14 outputs finite")
+    assert [found[PROBES[probe]][0] for probe in ("instances", "state", "steps")] == ["pass"] * 3
+
+
 def test_validate_finds_what_is_wrong(by_hand):
     path = by_hand(3, ('variability="tunable" start="1"', 'variability="tunable" start="2"'), library="other")
     found = {finding.check: (finding.verdict, finding.detail) for finding in validate(path).findings}
