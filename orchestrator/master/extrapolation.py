@@ -17,10 +17,15 @@ _ROUNDING = 1e-6
 """Part of a step within which two times are one."""
 
 
+Points = Sequence[tuple[float, float]]
+"""Times in s and values."""
+
+
 @dataclass(frozen=True)
 class _Course:
     """The inputs of one instance that are continued, all of one feed: their places in it, and their names."""
 
+    instance: str
     feed: Feed
     members: tuple[int, ...]
     names: tuple[str, ...]
@@ -48,7 +53,7 @@ class Extrapolator:
             for feed in feeds:
                 members = tuple(k for k, target in enumerate(feed.targets) if (name, target) in smooth)
                 if members:
-                    self._courses[name] = _Course(feed, members, tuple(feed.targets[k] for k in members))
+                    self._courses[name] = _Course(name, feed, members, tuple(feed.targets[k] for k in members))
         self.past: dict[str, list[list[tuple[float, float]]]] = {}
         """For each continued input of an instance, the last values and the times they belong to, newest last."""
 
@@ -69,20 +74,35 @@ class Extrapolator:
             return
         for feed in self._exchange.feeds[name]:
             values = self._exchange.inputs(feed, time)
-            derivatives: list[float] = []
-            if feed is course.feed:
-                for past, k in zip(self.past[name], course.members, strict=True):
-                    is_end = ended or self._ended
-                    at = time + length if is_end else self._exchange.stamps[feed.sources[k]]
-                    former = [point for point in past if point[0] < at - _ROUNDING * length][-self._order :]
-                    past[:] = [*former, (at, values[k])]
-                    values[k], *slopes = polynomial(past, time, self._order)
-                    derivatives += slopes
-            feed.channel.set(values)
-            if derivatives:
-                names = [n for n in course.names for _ in range(self._order)]
-                orders = [*range(1, self._order + 1)] * len(course.names)
-                self._exchange.slaves[name].interpolate(names, orders, derivatives)
+            if feed is not course.feed:
+                feed.channel.set(values)
+                continue
+            for past, k in zip(self.past[name], course.members, strict=True):
+                is_end = ended or self._ended
+                at = time + length if is_end else self._exchange.stamps[feed.sources[k]]
+                former = [point for point in past if point[0] < at - _ROUNDING * length][-self._order :]
+                past[:] = [*former, (at, values[k])]
+            self._give(course, values, self.past[name], time)
+
+    def _give(self, course: _Course, values: list[float], past: Sequence[Points], time: float) -> None:
+        """Set the inputs of a continued feed from a time in s on, by the polynomials through the past."""
+        derivatives: list[float] = []
+        for points, k in zip(past, course.members, strict=True):
+            values[k], *slopes = polynomial(points, time, self._order)
+            derivatives += slopes
+        course.feed.channel.set(values)
+        names = [n for n in course.names for _ in range(self._order)]
+        orders = [*range(1, self._order + 1)] * len(course.names)
+        self._exchange.slaves[course.instance].interpolate(names, orders, derivatives)
+
+    def continued(self, name: str, feed: Feed) -> list[list[tuple[float, float]]] | None:
+        """What inputs of a feed are continued by now: the points of each; None where all of them are held."""
+        course = self._courses.get(name)
+        return None if course is None or feed is not course.feed else [list(points) for points in self.past[name]]
+
+    def give_again(self, name: str, values: Sequence[float], past: Sequence[Points], time: float) -> None:
+        """Set the inputs of an instance's continued feed from another time in s on, as `continued` had them."""
+        self._give(self._courses[name], list(values), past, time)
 
     def restart(self) -> None:
         """Forget the past, after something has jumped: a polynomial through a jump would overshoot."""

@@ -6,52 +6,67 @@ coupling: of second order in a step where inputs are held, of a higher one where
 
 What happens in the last half, a ball that hits the ground, neither of them sees: an input is that of a step's begin. So
 a step that would be accepted is taken whole once more, with the inputs of its end.
+
+An output that may pass inputs on at once shows those of the begin, however short the step is. It is compared with what
+its FMU gives when it is shown the same inputs (`repetition`), so that what is left of the difference is of its states.
+
+A jump cannot be stepped over within a tolerance. It is passed in one step of the shortest length, counted and told.
 """
 
 from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any
 
 from ...errors import CouplingError, FmuError, LostError, RunError, StoppedError
 from ...fmi import Interface, Variable
 from ...names import SignalName
+from ...problems import Problem
 from ...system import System
-from ...wiring import Wiring, is_direct
+from ...wiring import Wiring
 from ..coupling import Coupling
 from .algorithm import Fit, VariableStep
-from .refusals import cannot
+from .refusals import cannot, listed
+from .repetition import Repetition
 
 _SAFETY, _SMALLEST, _LARGEST = 0.9, 0.2, 5.0
 """How a step may change: of the step that the error estimate asks for, and by which factors at most."""
 _AT_END = {1: 3.0, 2: 1.8, 3: 1.9}
 """How many times their error the two halves differ from a step with the inputs of the end, by order, on a smooth
 course: polynomials through former points have the error constants 1/2, 5/12, 3/8; with the end -1/2, -1/12, -1/24."""
+_SAME_INPUTS = {1: 1.0, 2: 0.6, 3: 0.56}
+"""The same for a step with the inputs of the second half throughout: by the same polynomials, half a step apart."""
+_MOST_IN_A_ROW = 8
+"""So many jumps one shortest step after the other are none: the tolerance cannot be kept."""
 _ROUNDING = 1e-9
 """Part of a step that is not worth a step of its own."""
 _TOLERANCE = 1e-4
 """Relative tolerance of the error of a step, where the system gives none."""
+_TOLD = 100
+"""How many jumps are told one by one."""
 _SHORTEST = 2.0**-20
 """Part of the longest step that the shortest is, where nothing else is said."""
 
 
-def is_watched(interface: Interface, variable: Variable) -> bool:
-    """Whether the error of an output counts: not where it shows the inputs of the begin, however short the step is."""
-    if (variable.type, variable.variability) != ("Real", "continuous"):
-        return False
-    return variable.dependencies is None or not is_direct(interface, variable)
+def is_watched(variable: Variable) -> bool:
+    """Whether the error of an output counts."""
+    return (variable.type, variable.variability) == ("Real", "continuous")
 
 
 @dataclass
 class Tally:
-    """How the steps went: how many were ``accepted`` and ``rejected``, and the ``shortest`` and ``longest`` in s."""
+    """How the steps went.
+
+    How many were ``accepted`` and ``rejected``, the ``shortest`` and ``longest`` in s, and the ``jumps``: time, signal.
+    """
 
     accepted: int = 0
     rejected: int = 0
     shortest: float = math.inf
     longest: float = 0.0
+    jumps: list[tuple[float, str]] = field(default_factory=list)
 
 
 @dataclass(frozen=True)
@@ -77,12 +92,15 @@ class Adaptive(VariableStep):
         self.shortest = settings.stepping.min_step
         self.order = 1 + settings.stepping.extrapolation
         """Of the coupling's error over the whole run."""
-        self.watched = [
-            place
-            for (instance, name), place in exchange.places.items()
-            if is_watched(coupling.interfaces[instance], coupling.interfaces[instance].variables[name])
+        watched = [
+            (instance, name)
+            for instance, name in exchange.places
+            if is_watched(coupling.interfaces[instance].variables[name])
         ]
-        """Places of the values whose error counts."""
+        self.repetition = Repetition(coupling, watched)
+        self.plain = [exchange.places[one] for one in watched if exchange.places[one] not in self.repetition.places]
+        """Places of the values whose error counts, but for those that the repetition is for."""
+        self._in_a_row = 0
 
     @classmethod
     def fit(cls, system: System, interfaces: Mapping[str, Interface], wiring: Wiring) -> Fit:
@@ -111,6 +129,10 @@ class Adaptive(VariableStep):
                 "leave the delay out, or choose gauss-seidel",
             ),
         ]
+        fed = {link.target[0] for link in wiring.links}
+        if fed and not any(is_watched(v) for name in fed for v in interfaces[name].of("output")):
+            what = "adaptive has nothing to watch: they have no continuous Real output"
+            problems.append(Problem(listed(sorted(fed)), what, "choose gauss-seidel"))
         return Fit(problems, list(_unwatched(system, interfaces)))
 
     # ---------------------------------------------------------------- on the way
@@ -133,7 +155,11 @@ class Adaptive(VariableStep):
                     error, place = math.inf, -1
                 ideal = _SAFETY * error ** (-1.0 / (self.order + 1)) if error > 0.0 else _LARGEST
                 factor = min(_LARGEST, max(_SMALLEST, ideal))
-                if error <= 1.0:
+                if error <= 1.0 or (is_shortest and self._is_jump(end, place)):
+                    if error > 1.0:
+                        factor = _LARGEST
+                    elif length > _LARGEST * shortest:
+                        self._in_a_row = 0
                     self._accept(length)
                     # A step that was cut short to land on a point says little of how long the next may be.
                     self.length = min(longest, max(length * factor, wanted if factor >= 1.0 else shortest))
@@ -147,31 +173,58 @@ class Adaptive(VariableStep):
             for point in kept:
                 self._forget(point)
 
-    def _sweep(self, time: float, length: float, ended: bool) -> None:
+    def _sweep(self, time: float, length: float, *, ended: bool = False) -> None:
         """A step that may be taken back, with the inputs of its begin or, ``ended``, the present ones as of its end."""
         for slave in self.coupling.sequence:
             self.coupling.write(slave.name, time, length, ended=ended)
+            if not ended:
+                self.repetition.note(slave.name, time)
             slave.step(time, length, final=False)
             self.exchange.read_finite(slave, time + length)
+        if not ended and self.repetition.places:
+            self.repetition.reached = list(self.exchange.values)
         self.coupling.solve_loops(time + length)
 
     def _take(self, time: float, end: float, kept: list[_Point]) -> tuple[float, int]:
         """Take a step in two halves; its error as `_error` has it, and the place of the value that has it."""
         length, middle = end - time, 0.5 * (time + end)
-        self._sweep(time, length, False)
-        whole = self._seen()
+        values, again = self.exchange.values, self.repetition
+        self._sweep(time, length)
+        whole = list(values)
         self._go_to(kept[0])
-        self._sweep(time, middle - time, False)
-        self._sweep(middle, end - middle, False)
-        halves = self._seen()
-        found = self._error(whole, halves, 2.0**self.order - 1.0)
+        self._sweep(time, middle - time)
+        self._sweep(middle, end - middle)
+        halves = list(values)
+        found = self._error(self.plain, whole, halves, 2.0**self.order - 1.0)
         if found[0] <= 1.0:
             kept.append(self._keep())
+            if again.places:
+                self._go_to(kept[0], values=False)
+                again.repeat(time, length)
+                found = max(found, self._error(again.places, values, again.reached, _SAME_INPUTS[self.order]))
+                self._go_to(kept[0], values=False)
+                values[:] = halves
+                again.repeat(time, length, ended=True)
+                found = max(found, self._error(again.places, values, again.reached, _AT_END[self.order]))
+                values[:] = halves
             self._go_to(kept[0], values=False)
-            self._sweep(time, length, True)
-            found = max(found, self._error(self._seen(), halves, _AT_END[self.order]))
+            self._sweep(time, length, ended=True)
+            found = max(found, self._error(self.plain, values, halves, _AT_END[self.order]))
+            if not again.is_proven:
+                self._go_to(kept[0], values=False)
+                again.prove(time, length)
             self._go_to(kept[-1])
         return found
+
+    def _is_jump(self, time: float, place: int) -> bool:
+        """Note a jump before a time in s that a value made, unless it is one of too many."""
+        self._in_a_row += 1
+        if self._in_a_row > _MOST_IN_A_ROW:
+            return False
+        self.tally.jumps.append((time, self.exchange.signals[place]))
+        if self.coupling.extrapolator is not None:
+            self.coupling.extrapolator.restart()
+        return True
 
     def _keep(self) -> _Point:
         """The present point, to come back to."""
@@ -191,19 +244,20 @@ class Adaptive(VariableStep):
         for slave, state in zip(self.exchange.slaves.values(), point.states, strict=True):
             slave.forget(state)
 
-    def _seen(self) -> list[float]:
-        return [self.exchange.values[k] for k in self.watched]
-
-    def _error(self, other: Sequence[float], kept: Sequence[float], times: float) -> tuple[float, int]:
-        """The largest error of the kept values relative to its bound, and the place of the value that has it.
+    def _error(
+        self, places: Iterable[int], other: Sequence[float], kept: Sequence[float], times: float
+    ) -> tuple[float, int]:
+        """The largest error of kept values relative to its bound, and the place of the value that has it.
 
         Args:
-            other: the same values by another way.
+            places: of the values to compare.
+            other: all values by another way.
             kept: those that are kept.
             times: how many times their error the distance is.
         """
         worst, where = 0.0, -1
-        for k, coarse, fine in zip(self.watched, other, kept, strict=True):
+        for k in places:
+            coarse, fine = other[k], kept[k]
             relative, absolute = self.tolerances[k]
             bound = absolute + relative * max(abs(fine), abs(coarse)) + 1e-300
             error = abs(fine - coarse) / times / bound
@@ -229,13 +283,17 @@ class Adaptive(VariableStep):
         """Steps taken and their lengths."""
         tally = self.tally
         shortest = None if math.isinf(tally.shortest) else tally.shortest
+        count = len(tally.jumps)
+        jumps = f"; {count} jump{'s' * (count > 1)}, each passed in a shortest step" if count else ""
         return {
             "accepted": tally.accepted,
             "rejected": tally.rejected,
             "shortest_step": shortest,
             "longest_step": tally.longest,
+            "jumps": count,
+            "first_jumps": [{"time": time, "signal": signal} for time, signal in tally.jumps[:_TOLD]],
             "summary": f"{tally.accepted} steps accepted, {tally.rejected} rejected, between {shortest or 0.0:.3g} and "
-            f"{tally.longest:.3g} s long",
+            f"{tally.longest:.3g} s long{jumps}",
         }
 
 
@@ -247,8 +305,8 @@ def _unwatched(system: System, interfaces: Mapping[str, Interface]) -> Iterable[
         scalars = interface.scalars(name) if interface is not None else None
         if interface is None or scalars is None:  # told elsewhere
             continue
-        if not any(is_watched(interface, interface.variables[scalar]) for scalar in scalars):
-            yield f"the tolerance of {signal} has no effect: adaptive watches continuous outputs without feed-through"
+        if not any(is_watched(interface.variables[scalar]) for scalar in scalars):
+            yield f"the tolerance of {signal} has no effect: adaptive watches continuous outputs"
 
 
 def _is_fatal(failure: RunError) -> bool:

@@ -85,12 +85,15 @@ def test_min_step_is_for_adaptive(mine, workspace):
     assert told == "simulation.min_step is for adaptive; the algorithm is jacobi"
 
 
-def test_a_tolerance_that_has_no_effect_is_noted(mine, workspace):
-    """Of what passes on at once adaptive cannot tell an error: it is that of the values at a step's begin."""
-    it = swing(mine, tolerances={"spring.a": [0.0, 1e-9], "mass.x": [0.0, 1e-3]})
-    notes = check(it, workspace, "plain").notes
-    assert "the tolerance of spring.a has no effect: adaptive watches continuous outputs without feed-through" in notes
-    assert not any("mass.x" in note for note in notes)
+def test_a_tolerance_that_has_no_effect_is_noted(foreign, xml, workspace):
+    """Of what is no continuous number nobody can say how wrong it is."""
+    able = 'canGetAndSetFMUstate="true" canHandleVariableCommunicationStepSize="true"'
+    shown = [xml["variable"]("n", "output", variability="discrete"), xml["variable"]("y", "output")]
+    it = System(stop_time=1.0, step=0.1, algorithm="adaptive", tolerances={"a.n": [0.0, 1e-9], "a.y": [0.0, 1e-3]})
+    it.add("a", foreign(shown, simulation=able))
+    notes = check(it, workspace).notes
+    assert "the tolerance of a.n has no effect: adaptive watches continuous outputs" in notes
+    assert not any("a.y" in note for note in notes)
 
 
 # -------------------------------------------------------------------- how steps are chosen
@@ -164,6 +167,21 @@ def test_what_happens_in_the_last_half_of_a_step_is_seen(mine, at):
     result = run(it, kind="plain")
     assert result["sum.x"][-1] == pytest.approx(2.0 - at, abs=5e-3)
     assert result.coupling["adaptive"]["rejected"] > 2
+
+
+def test_a_jump_is_passed_in_a_shortest_step_and_told(mine):
+    """What no step resolves within the tolerance is not stepped at for ever, and what follows is smooth again."""
+    it = System(stop_time=4.0, step=1.0, algorithm="adaptive", tolerance=1e-9)
+    it.add("wall", mine("Wall"), at=1.3)
+    it.add("sum", mine("Integral"))
+    it.connect("wall.y", "sum.u")
+    result = run(it, kind="plain")
+    assert result["sum.x"][-1] == pytest.approx(2.7, abs=2e-6)
+    told = result.coupling["adaptive"]
+    assert told["jumps"] == 1
+    assert told["first_jumps"] == [{"time": pytest.approx(1.3, abs=2e-6), "signal": "sum.x"}]
+    assert told["summary"].endswith("; 1 jump, each passed in a shortest step")
+    assert told["accepted"] < 60
 
 
 def test_a_step_that_an_fmu_fails_in_is_tried_shorter(mine):
