@@ -24,7 +24,7 @@ class Unit:
     offset: float = 0.0
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, slots=True)
 class Variable:
     """One scalar variable of an FMU.
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 import re
 import tempfile
-from collections.abc import Iterable
+from collections.abc import Iterable, Set
 from dataclasses import replace
 from pathlib import Path
 from typing import Any, cast
@@ -60,16 +60,7 @@ def read_interface(folder: Path, name: str) -> Interface:
 
 
 def _interface(description: Any, root: Any, beside: Beside) -> Interface:
-    relative = _relative(root)
-    variables = {
-        v.name: replace(
-            v,
-            relative=v.name in relative,
-            fmi_type=beside.fmi_types.get(v.name, ""),
-            negated=v.name in beside.negated,
-        )
-        for v in _variables(description)
-    }
+    variables = _variables(description, _relative(root), beside)
     simulation = description.coSimulation
     experiment = description.defaultExperiment
     return Interface(
@@ -147,13 +138,12 @@ def _folded(faults: Iterable[str]) -> list[str]:
     return [*told, f"and {more} more kinds of faults"] if more > 0 else told
 
 
-def _variables(description: Any) -> list[Variable]:
-    outputs = {unknown.variable.name: unknown for unknown in description.outputs}
-    return [_variable(v, outputs.get(v.name)) for v in description.modelVariables]
+def _variables(description: Any, relative: Set[str], beside: Beside) -> dict[str, Variable]:
+    outputs = {unknown.variable.name: unknown.dependencies for unknown in description.outputs}
+    return {v.name: _variable(v, outputs.get(v.name), v.name in relative, beside) for v in description.modelVariables}
 
 
-def _variable(v: Any, unknown: Any) -> Variable:
-    listed = None if unknown is None else unknown.dependencies
+def _variable(v: Any, listed: Any, relative: bool, beside: Beside) -> Variable:
     unit = _typed(v, "unit")
     return Variable(
         name=v.name,
@@ -171,6 +161,9 @@ def _variable(v: Any, unknown: Any) -> Variable:
         description=v.description or "",
         dependencies=None if listed is None else frozenset(d.name for d in listed),
         derivative=None if v.derivative is None else v.derivative.name,
+        relative=relative,
+        fmi_type=beside.fmi_types.get(v.name, ""),
+        negated=v.name in beside.negated,
     )
 
 

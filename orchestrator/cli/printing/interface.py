@@ -5,11 +5,9 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 
 from rich.console import Console
-from rich.table import Table
-from rich.text import Text
 
 from ...fmi import Interface, Variable
-from .tables import table
+from .listing import show_listing
 
 
 def show_interface(out: Console, interface: Interface) -> None:
@@ -25,16 +23,16 @@ def show_interface(out: Console, interface: Interface) -> None:
     ):
         variables = interface.of(causality)
         if variables:
-            out.print(_variables(title, variables, interface))
+            _show_variables(out, title, variables, interface)
 
 
-def _variables(title: str, variables: Sequence[Variable], interface: Interface) -> Table:
+def _show_variables(out: Console, title: str, variables: Sequence[Variable], interface: Interface) -> None:
     starts = any(v.start is not None for v in variables)
     outputs = title == "Outputs"
     columns = ["name", "type", "unit", *(["start"] if starts else []), "description"]
     columns += ["depends directly on"] if outputs else []
-    made = table(title, columns, right=("start",), fold=("name", "description", "depends directly on"))
-    places = {v.name: k for k, v in enumerate(interface.of("input"))}
+    places = {v.name: k for k, v in enumerate(interface.of("input"))} if outputs else {}
+    rows = []
     for v in variables:
         cells = [v.name, v.fmi_type or v.type, v.unit or ""]
         cells += ["" if v.start is None else _start(v.start)] if starts else []
@@ -45,8 +43,8 @@ def _variables(title: str, variables: Sequence[Variable], interface: Interface) 
         cells += [f"{v.description} ({hint})".strip() if hint else v.description]
         if outputs:
             cells.append(_dependencies(v, places))
-        made.add_row(*map(Text, cells))
-    return made
+        rows.append(cells)
+    show_listing(out, title, columns, rows, right=("start",), fold=("name", "description", "depends directly on"))
 
 
 def _dependencies(output: Variable, inputs: Mapping[str, int]) -> str:
