@@ -3,11 +3,14 @@
 from __future__ import annotations
 
 import re
+from collections.abc import Iterable, Iterator
 from typing import NamedTuple
 
+INDEX = r"(-?\d{1,9})(?!\d)"
+"""The number in an index as a pattern; Python does not convert numbers of thousands of digits."""
 _NUMBERED = re.compile(r"(.*)\[(\d{1,9})\]", re.DOTALL)
-_INDICES = re.compile(r"\[(\d{1,9}(?:,\s*\d{1,9})*)\]")
-_ELEMENT = re.compile(r"(.*)\[(\d{1,9}(?:,\s*\d{1,9})*)\]", re.DOTALL)
+_INDICES = re.compile(r"\[( *-?\d{1,9} *(?:, *-?\d{1,9} *)*)\]")
+_NAME_OR_INDICES = re.compile(rf"'(?:[^'\\]|\\.)*'|{_INDICES.pattern}", re.DOTALL)
 
 
 class SignalName(NamedTuple):
@@ -47,20 +50,18 @@ class SignalName(NamedTuple):
     @property
     def array(self) -> str:
         """``"force"``: the variable without the indices at its end."""
-        match = _ELEMENT.fullmatch(self.variable)
-        return match[1] if match else self.variable
+        groups = _at_end(self.variable)
+        return self.variable[: groups[0].start()] if groups else self.variable
 
     @property
     def element(self) -> tuple[int, ...]:
         """``(3,)``: the indices at the variable's end; empty where there are none."""
-        match = _ELEMENT.fullmatch(self.variable)
-        return tuple(map(int, match[2].split(","))) if match else ()
+        return _numbers(_at_end(self.variable))
 
     @property
     def indices(self) -> tuple[int, ...]:
         """``(2, 3)``: all indices in the name, wherever they stand, the instance's first."""
-        groups = _INDICES.findall(f"{self.instance}.{self.variable}")
-        return tuple(int(number) for group in groups for number in group.split(","))
+        return _numbers(_INDICES.finditer(f"{self.instance}.{self.variable}"))
 
     @property
     def family(self) -> SignalName:
@@ -73,3 +74,38 @@ class SignalName(NamedTuple):
         return self.instance in (other.instance, other.group) and (
             other.variable == self.variable or other.variable.startswith(f"{self.variable}[")
         )
+
+
+def arrays_of(variable: str) -> Iterator[tuple[str, tuple[int, ...]]]:
+    """The arrays that a variable belongs to, by its name without the last of its indices, and its place in them.
+
+    ``n[1][2]`` belongs to ``n`` at (1, 2) and to ``n[1]`` at (2,); ``cell[3].t`` to ``cell.t`` at (3,). What stands in
+    a quoted name of Modelica (``'a[1]'``) is no index.
+    """
+    if "[" not in variable:
+        return
+    groups = [match for match in _NAME_OR_INDICES.finditer(variable) if match[1] is not None]
+    for k, first in enumerate(groups):
+        ends = [*(group.start() for group in groups[k + 1 :]), len(variable)]
+        rest = (variable[group.end() : end] for group, end in zip(groups[k:], ends, strict=True))
+        yield variable[: first.start()] + "".join(rest), _numbers(groups[k:])
+
+
+def plainly(variable: str) -> str:
+    """A variable's name without blanks in its indices, and with those of one array in one pair of brackets."""
+    return re.sub(r"\[[^\[\]]*\]", lambda match: match[0].replace(" ", ""), variable).replace("][", ",")
+
+
+def _at_end(variable: str) -> list[re.Match[str]]:
+    """The groups of indices that a name ends with."""
+    groups: list[re.Match[str]] = []
+    if variable.endswith("]"):
+        for match in reversed(list(_INDICES.finditer(variable))):
+            if match.end() != (groups[0].start() if groups else len(variable)):
+                break
+            groups.insert(0, match)
+    return groups
+
+
+def _numbers(groups: Iterable[re.Match[str]]) -> tuple[int, ...]:
+    return tuple(int(number) for group in groups for number in group[1].split(","))

@@ -57,6 +57,8 @@ class Connection:
         target: ``"train[1].force"``.
         delay: how many communication points older the value is than it would be without.
         scale: 1 where it is not given; one that is given also says that units which do not convert are taken care of.
+        optional: whether it stands for nothing where one of its ends has no such variable: an element that a pattern
+            may or may not mean.
         origin: where it was written, for messages.
     """
 
@@ -65,6 +67,7 @@ class Connection:
     delay: int = 0
     scale: float | None = None
     offset: float = 0.0
+    optional: bool = False
     origin: str = field(default="", compare=False)
 
 

@@ -1,6 +1,7 @@
 """The value of an expression: its names looked up in a scope, its nodes calculated.
 
-Indices are 1-based and slices include both ends.
+Slices include both ends, and take the indices that there are: instances are numbered from 1, elements of other makers'
+arrays from anywhere.
 """
 
 import re
@@ -12,13 +13,11 @@ from typing import Any
 import numpy as np
 
 from ..errors import ExpressionError
+from ..names import INDEX
 from ..problems import Problem, suggestion
 from .functions import ARITHMETIC, LOGIC, Function, Value, call_problem, logical, where
 from .signals import Signals
 from .syntax import Call, Group, Name, Node, Number, Operation, Reference, Span
-
-INDEX = r"(\d{1,9})(?!\d)"
-"""The number in an index as a pattern; Python does not convert numbers of thousands of digits."""
 
 
 @dataclass(frozen=True)
@@ -73,30 +72,34 @@ class Scope:
 
     def resolve(self, reference: Reference) -> list[str]:
         """The full names a reference stands for, in the order of their indices; empty when there are none."""
-        names: list[str] = []
+        full = ""
         spans: list[tuple[float, float]] = []
         for name, indices in reference.parts:
             texts = []
             for index in indices:
                 if isinstance(index, Span):
                     first, last = (self.integer(end) if end else None for end in (index.first, index.last))
-                    spans.append((1 if first is None else first, np.inf if last is None else last))
+                    spans.append((-np.inf if first is None else first, np.inf if last is None else last))
                 texts.append(":" if isinstance(index, Span) else str(self.integer(index)))
-            names.append(name + (f"[{','.join(texts)}]" if texts else ""))
-        full = ".".join(names)
-        if not spans:
-            return [full] if full in self.names else []
-        pattern = re.compile(re.escape(full).replace(":", INDEX))
+            full += ("." if full and name else "") + name + (f"[{','.join(texts)}]" if texts else "")
+        if not spans and full in self.names:
+            return [full]
+        if not spans and not reference.indices:
+            return []
+        written = (
+            re.escape(full).replace(",", ", *").replace(r"\[", r"\[ *").replace(r"\]", r" *\]")
+        )  # blanks are no matter
+        pattern = re.compile(written.replace(":", INDEX))
         found = [(tuple(map(int, match.groups())), match[0]) for match in map(pattern.fullmatch, self.names) if match]
         return [n for ks, n in sorted(found) if all(a <= k <= b for k, (a, b) in zip(ks, spans, strict=True))]
 
 
 def unknown_signal(reference: Reference, names: Collection[str]) -> Problem:
     """What to say about a reference that stands for nothing."""
-    family = re.escape(re.sub(r"\[[^\]]*\]", "[:]", reference.text)).replace(r":\]", r"[\d,]+\]")
+    family = re.escape(re.sub(r"\[[^\]]*\]", "[:]", reference.text)).replace(r":\]", r"[-\d, ]+\]")
     near = [name for name in names if re.fullmatch(family, name)]
     if near:
-        near.sort(key=lambda name: [(len(k), k) for k in re.findall(r"\d+", name)])
+        near.sort(key=lambda name: [(len(k), k) for k in re.findall(r"-?\d+", name)])
         return Problem("", f"there is no '{reference.text}'", f"there are '{near[0]}' to '{near[-1]}'")
     written = re.findall(r"\[[^\]]*\]", reference.text)
 

@@ -4,7 +4,7 @@ The syntax stands in `syntax`, what the parts mean in `functions` and `calculati
 """
 
 import re
-from collections.abc import Callable, Collection, Mapping
+from collections.abc import Callable, Collection, Iterable, Iterator, Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
 from typing import Any, TypeVar
@@ -12,9 +12,9 @@ from typing import Any, TypeVar
 import numpy as np
 
 from ..errors import ExpressionError, WindowError
-from ..names import SignalName
+from ..names import INDEX, SignalName
 from ..problems import Problem, suggestion
-from .calculation import INDEX, Scope, evaluate, unknown_signal
+from .calculation import Scope, evaluate, unknown_signal
 from .functions import CONSTANTS, ELEMENTWISE, Function, Value, call_problem
 from .signals import Rehearsal, Signals
 from .syntax import Call, Group, Name, Node, Number, Operation, Reference, read, walk
@@ -57,19 +57,25 @@ class Expression:
         return any(isinstance(node, Call) and node.name == name for node in walk(self.tree))
 
     def count(self, names: Collection[str]) -> int:
-        """The number of instances of the first array it mentions: what `count` stands for."""
+        """The number of the last instance, or element, of the first array it mentions: what `count` stands for."""
         array = next((reference.array for reference in self.references if reference.array), "")
-        numbers = (re.match(rf"{re.escape(array)}\[{INDEX}", name) for name in names)
-        return max((int(match[1]) for match in numbers if match), default=0)
+        matches = (re.match(rf"{re.escape(array)}\[ *{INDEX}", name) for name in names)
+        return max((int(match[1]) for match in matches if match), default=0)
 
     def indices(self, names: Collection[str]) -> tuple[int, ...]:
-        """Every i >= 1 for which all references exist; () when the expression has no free index."""
+        """Every i for which all references exist; () when the expression has no free index.
+
+        Instances are numbered from 1; where `i` stands in elements alone, it begins where they do.
+        """
         if not self.uses_index or not any(reference.uses_index for reference in self.references):
             return ()
-        largest = max((int(k) for name in names for k in re.findall(rf"\[{INDEX}", name)), default=0)
-        last = min(2 * largest + 1, _MAX_INDEX + len(names))
+        last = min(2 * max(_numbers(names), default=0) + 1, _MAX_INDEX + len(names))
+        first = 1
+        if not any(reference.counts_instances for reference in self.references):
+            begins = tuple(f"{reference.array}[" for reference in self.references if reference.uses_index)
+            first = max(min(_numbers(name for name in names if name.startswith(begins)), default=1), -_MAX_INDEX)
         rehearsal, count = Rehearsal(names), self.count(names)
-        scopes = ((i, self._scope(rehearsal, {"i": i, "count": count})) for i in range(1, last + 1))
+        scopes = ((i, self._scope(rehearsal, {"i": i, "count": count})) for i in range(min(first, 1), last + 1))
         return tuple(i for i, scope in scopes if all(scope.resolve(reference) for reference in self.references))
 
     def instances(self, names: Collection[str]) -> tuple[int | None, ...]:
@@ -161,6 +167,11 @@ class Expression:
         """
         value = self.apply(evaluate, signals, index, **constants)
         return value.item() if value.ndim == 0 else value
+
+
+def _numbers(names: Iterable[str]) -> Iterator[int]:
+    """The numbers in brackets."""
+    return (int(number) for name in names for number in re.findall(rf"[\[,] *{INDEX}", name))
 
 
 def evaluate_constant(text: str, **constants: float | bool) -> float | bool:

@@ -43,7 +43,10 @@ class Span:
 
 @dataclass(frozen=True)
 class Reference:
-    """A signal, or a family of signals: `parts` are its dotted names, each with the indices that follow it."""
+    """A signal, or a family of signals: `parts` are its dotted names, each with the indices that follow it.
+
+    A second pair of brackets (`n[1][2]`) is a part without a name.
+    """
 
     text: str
     column: int
@@ -62,14 +65,23 @@ class Reference:
     @property
     def uses_index(self) -> bool:
         """Whether the free index `i` occurs in an index."""
-        nodes = [end for x in self.indices for end in ((x.first, x.last) if isinstance(x, Span) else (x,)) if end]
-        return any(isinstance(n, Name) and n.name == "i" for node in nodes for n in walk(node))
+        return _says_i(self.indices)
+
+    @property
+    def counts_instances(self) -> bool:
+        """Whether `i` occurs in the index of the instance."""
+        return _says_i(self.parts[0][1])
 
     @property
     def array(self) -> str:
         """The name before its first index, or nothing: `train` of `train[i].speed`."""
         names = [name for name, _ in self.parts]
         return next((".".join(names[: k + 1]) for k, part in enumerate(self.parts) if part[1]), "")
+
+
+def _says_i(indices: "tuple[Node | Span, ...]") -> bool:
+    nodes = [end for x in indices for end in ((x.first, x.last) if isinstance(x, Span) else (x,)) if end]
+    return any(isinstance(n, Name) and n.name == "i" for node in nodes for n in walk(node))
 
 
 @dataclass(frozen=True)
@@ -203,13 +215,15 @@ class _Reader:
         text, indices, inner = "", tuple[Node | Span, ...](), node
         while True:  # from the last name to the first
             match inner:
-                case ast.Subscript(value=value, slice=index) if not indices:
+                case ast.Subscript(value=value, slice=index):
+                    if indices:
+                        parts.insert(0, ("", indices))
                     indices = self.indices(index, depth)
                     text, inner = f"[{ast.unparse(index).replace(' ', '')}]{text}", value
                 case ast.Attribute(value=value, attr=name):
                     parts.insert(0, (name, indices))
                     text, indices, inner = f".{name}{text}", (), value
-                case ast.Name(id=name):
+                case ast.Name(id=name) if not (parts and not parts[0][0]):  # an instance has one index
                     return Reference(f"{name}{text}", self.column(node), ((name, indices), *parts))
                 case _:
                     raise self.error(node, "a signal is written like train[i].speed or consist[1].force[2]")

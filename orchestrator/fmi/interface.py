@@ -10,6 +10,7 @@ from typing import Any, Literal
 
 from ...fmus.annotation import Annotation
 from ...fmus.kinds import FmuKind
+from ..names import INDEX, plainly
 
 Type = Literal["Real", "Integer", "Boolean", "String", "Enumeration"]
 
@@ -144,17 +145,33 @@ class Interface:
         return tuple(v for v in self.variables.values() if v.causality in causalities)
 
     def scalars(self, name: str) -> tuple[str, ...] | None:
-        """The scalar names behind a name: itself, an array's elements, or None where there is no such name."""
+        """The scalar names behind a name: itself, an array's elements or a part of them (``a[1,:]``), or None.
+
+        An index may be written with blanks or without, and those of one array in one pair of brackets or in several.
+        """
         if name in self.variables:
             return (name,)
-        spaced = self._spaced.get(name)
-        return self.arrays.get(name) if spaced is None else (spaced,)
+        if name in self.arrays:
+            return self.arrays[name]
+        if ":" in name:
+            return self._slice(name)
+        written = self._plainly.get(plainly(name))
+        return None if written is None else (written,)
 
     @cached_property
-    def _spaced(self) -> Mapping[str, str]:
-        """Names with spaces between brackets, by what they are without: so a scenario writes them."""
-        names = (name for name in self.variables if " " in name and "[" in name)
-        return {re.sub(r"\[[^\[\]]*\]", lambda match: match[0].replace(" ", ""), name): name for name in names}
+    def _plainly(self) -> Mapping[str, str]:
+        """Names of elements by how a scenario may write them."""
+        return {plainly(name): name for name in reversed(self.variables) if "[" in name}
+
+    def _slice(self, name: str) -> tuple[str, ...] | None:
+        """The scalars of ``a[1,:]`` or ``cell[:].t``, in the order of their indices."""
+        pattern = re.compile(re.escape(plainly(name)).replace(":", INDEX))
+        found = [
+            (tuple(map(int, match.groups())), self._plainly[match[0]])
+            for match in map(pattern.fullmatch, self._plainly)
+            if match
+        ]
+        return tuple(scalar for _, scalar in sorted(found)) or None
 
     def why_left_out(self, name: str) -> str:
         """A clause to append to an error about a name that is no variable: the FMU may have it all the same."""

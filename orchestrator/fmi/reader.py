@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 import re
 import tempfile
-from collections.abc import Iterable, Set
+from collections.abc import Iterable, Mapping, Set
 from dataclasses import replace
 from pathlib import Path
 from typing import Any, cast
@@ -15,12 +15,12 @@ from lxml import etree
 
 from ...fmus.annotation import read as read_annotation
 from ..errors import FmuFileError
+from ..names import arrays_of
 from .interface import Interface, Type, Unit, Variable
 from .repair import repair
 from .translation import VERSIONS, Beside, is_for_co_simulation, is_pedantry, other_kind, standard, translate
 
 _EXPONENTS = ("kg", "m", "s", "A", "K", "mol", "cd", "rad")
-_ELEMENT = re.compile(r"^(?P<array>.*)\[(?P<index>\d+(?:,\s*\d+)*)\]$")
 _MOST_WARNINGS = 12
 """Kinds of faults that are told of one file."""
 
@@ -216,12 +216,10 @@ def _unit(unit: Any) -> Unit:
     return Unit(unit.name, tuple(getattr(base, e) for e in _EXPONENTS), factor, offset)
 
 
-def _arrays(variables: dict[str, Variable]) -> dict[str, tuple[str, ...]]:
+def _arrays(variables: Mapping[str, Variable]) -> dict[str, tuple[str, ...]]:
     found: dict[str, list[tuple[tuple[int, ...], str]]] = {}
     for name in variables:
-        match = _ELEMENT.match(name)
-        if match:
-            index = tuple(int(k) for k in match["index"].split(","))
-            found.setdefault(match["array"], []).append((index, name))
+        for array, place in arrays_of(name):
+            found.setdefault(array, []).append((place, name))
     # By index, because a file may list the elements in any order.
     return {array: tuple(n for _, n in sorted(elements)) for array, elements in found.items() if array not in variables}

@@ -19,8 +19,9 @@ from ..system import Connection
 NAME = r"[A-Za-z_][A-Za-z0-9_]*"
 # Blanks are taken possessively: a key of nothing but blanks would otherwise be tried in every possible division.
 _REFERENCE = re.compile(rf"({NAME})\s*+(?:\[([^\[\]]*)\]\s*+)?(?:\.\s*+(.+))?", re.DOTALL)
-_INDEX = re.compile(r"\s*+(?:(\d{1,9})|i\s*+(?:([+-])\s*+(\d{1,9}))?)\s*+")
-_BRACKETS = re.compile(r"\[([^\[\]]*)\]")
+_INDEX = re.compile(r"\s*+(?:(-?\d{1,9})|i\s*+(?:([+-])\s*+(\d{1,9}))?)\s*+")
+# What stands in a quoted name of Modelica is part of the name.
+_BRACKETS = re.compile(r"'(?:[^'\\]|\\.)*'|\[([^\[\]]*)\]", re.DOTALL)
 
 
 Counts = Mapping[str, int | None]  # instances by name with their count; None for one without a count
@@ -73,13 +74,15 @@ class Endpoint:
             return range(0)
         return range(max(1, 1 - self.index.offset), (counts[self.instance] or 0) - self.index.offset + 1)
 
-    def at(self, i: int) -> str | None:
-        """The full name for one `i`; None where an element's number would be below 1."""
-        parts = [part if isinstance(part, str) else part.at(i) for part in self.elements]
-        if any(isinstance(part, int) and part < 1 for part in parts):
-            return None
+    def at(self, i: int) -> str:
+        """The full name for one `i`."""
+        parts = [part if isinstance(part, str) else str(part.at(i)) for part in self.elements]
         place = "" if self.index is None else f"[{self.index.at(i)}]"
-        return f"{self.instance}{place}.{''.join(map(str, parts))}"
+        return f"{self.instance}{place}.{''.join(parts)}"
+
+    def may_lack(self, i: int) -> bool:
+        """Whether an element's number is below 1 for one `i`: arrays of other makers begin anywhere."""
+        return any(part.at(i) < 1 for part in self.elements if isinstance(part, Index))
 
 
 @dataclass(frozen=True)
@@ -155,7 +158,8 @@ def read_signal(text: str, counts: Counts) -> SignalName:
     instance, index, variable = read_reference(text, counts, "train[4].speed or train.speed")
     parts = _elements(variable)
     if any(isinstance(part, Index) for part in parts):
-        whole = f"{instance}{'' if index is None else f'[{index}]'}.{_BRACKETS.sub('', variable)}"
+        bare = "".join(part for part in parts if isinstance(part, str)).replace("[]", "")
+        whole = f"{instance}{'' if index is None else f'[{index}]'}.{bare}"
         remedy = f"write {whole} for the whole array or {whole}[1] for one"
         raise ScenarioError(Problem(f"'{text}'", "i has no meaning here", remedy))
     name = "".join(map(str, parts))
@@ -203,6 +207,8 @@ def _elements(variable: str) -> tuple[str | Index, ...]:
     parts: list[str | Index] = [""]
     end = 0
     for match in _BRACKETS.finditer(variable):
+        if match[1] is None:
+            continue
         parts += [variable[end : match.start()], "["]
         for k, item in enumerate(match[1].split(",")):
             index = Index.read(item)
@@ -229,10 +235,15 @@ def expand(rule: Rule, counts: Counts) -> list[Connection]:
     Raises:
         ScenarioError: `i` has no range, the input would be driven several times, or nothing exists at both ends.
     """
+    ends = (rule.source, rule.target)
     return [
-        replace(rule.options, source=source, target=target)
+        replace(
+            rule.options,
+            source=rule.source.at(i),
+            target=rule.target.at(i),
+            optional=rule.options.optional or any(end.may_lack(i) for end in ends),
+        )
         for i in _range(rule, counts)
-        if (source := rule.source.at(i)) and (target := rule.target.at(i))
     ]
 
 
@@ -245,11 +256,9 @@ def _range(rule: Rule, counts: Counts) -> range:
         raise ScenarioError(Problem("", message, "write i there too, or a number here"))
     bounded = [end.indices(counts) for end in ends if end.index and end.index.free]
     if not bounded:
-        remedy = "whole arrays connect by their bare names"
+        remedy = "arrays connect by their bare names, or with [:] for i"
         raise ScenarioError(Problem("", "i has no range, because no instance carries it", remedy))
     common = range(max(r.start for r in bounded), min(r.stop for r in bounded))
-    shifts = [part.offset for end in ends for part in end.elements if isinstance(part, Index)]
-    common = range(max([common.start, *(1 - shift for shift in shifts)]), common.stop)
     if not common:
         known = ", ".join(
             f"{name} {count}" for name in dict.fromkeys(e.instance for e in ends) if (count := counts[name])

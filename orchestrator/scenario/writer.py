@@ -79,8 +79,8 @@ def _instance(instance: Instance) -> Iterator[str]:
 
 
 def _options(connection: Connection) -> str | dict[str, Any]:
-    options = {"delay": connection.delay, "scale": connection.scale, "offset": connection.offset}
-    given = {key: value for key, value in options.items() if value != getattr(Connection, key)}
+    keys = ("delay", "scale", "offset", "optional")
+    given = {key: value for key in keys if (value := getattr(connection, key)) != getattr(Connection, key)}
     return {"from": connection.source, **given} if given else connection.source
 
 

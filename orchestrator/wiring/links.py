@@ -70,6 +70,8 @@ def find_links(connection: Connection, interfaces: Mapping[str, Interface], wiri
         ScenarioError: with everything that is wrong with it.
     """
     source, target = SignalName.parse(connection.source), SignalName.parse(connection.target)
+    if connection.optional and not (_is_there(source, interfaces) and _is_there(target, interfaces)):
+        return []
     problems: list[Problem] = []
     sources = _end(source, "output", interfaces, wiring, problems)
     targets = _end(target, "input", interfaces, wiring, problems)
@@ -100,6 +102,11 @@ def described(connection: Connection) -> str:
     """A connection as messages call it, with where it was written."""
     text = f"{connection.target!r} = {connection.source!r}"
     return f"{connection.origin}: {text}" if connection.origin else text
+
+
+def _is_there(signal: SignalName, interfaces: Mapping[str, Interface]) -> bool:
+    interface = interfaces.get(signal.instance)
+    return interface is not None and interface.scalars(signal.variable) is not None
 
 
 def _end(
@@ -135,6 +142,9 @@ def _near(interface: Interface, name: str, direction: str, wiring: Wiring) -> st
         return ""
     valid = [v.name for v in interface.of("input" if direction == "input" else "output")]
     listed = valid if len(valid) <= 12 else [*valid[:12], "..."]
+    elements = interface.arrays.get(SignalName("", name).array, ())
+    if elements:
+        return f"there are {elements[0]!r} to {elements[-1]!r}" if len(elements) > 1 else f"there is {elements[0]!r}"
     near = wiring.near(name, [*valid, *interface.arrays])
     return near or f"its {direction}s are {', '.join(listed) or 'none'}"
 

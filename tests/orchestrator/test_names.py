@@ -3,7 +3,7 @@
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from railcosim.orchestrator.names import SignalName
+from railcosim.orchestrator.names import SignalName, arrays_of, plainly
 
 
 @pytest.mark.parametrize(
@@ -17,6 +17,10 @@ from railcosim.orchestrator.names import SignalName
         ("box.a.b.c[3].d", ("box", "a.b.c[3].d"), ("box", None), ("a.b.c[3].d", ()), (3,)),
         ("box.a[3].d[4]", ("box", "a[3].d[4]"), ("box", None), ("a[3].d", (4,)), (3, 4)),
         ("box.der(x[1])", ("box", "der(x[1])"), ("box", None), ("der(x[1])", ()), (1,)),
+        ("box.n[1][2]", ("box", "n[1][2]"), ("box", None), ("n", (1, 2)), (1, 2)),
+        ("box.a[0]", ("box", "a[0]"), ("box", None), ("a", (0,)), (0,)),
+        ("box.a[-1, 2 ]", ("box", "a[-1, 2 ]"), ("box", None), ("a", (-1, 2)), (-1, 2)),
+        ("box.a[1]b[2]", ("box", "a[1]b[2]"), ("box", None), ("a[1]b", (2,)), (1, 2)),
         ("box.a b[x]", ("box", "a b[x]"), ("box", None), ("a b[x]", ()), ()),
         ("box.a\n[1]", ("box", "a\n[1]"), ("box", None), ("a\n", (1,)), (1,)),
         ("box[x].y", ("box[x]", "y"), ("box[x]", None), ("y", ()), ()),
@@ -76,3 +80,31 @@ def test_family(text, family):
 )
 def test_a_group_covers_its_members_and_an_array_its_elements(one, other, expected):
     assert SignalName.parse(one).covers(SignalName.parse(other)) is expected
+
+
+@pytest.mark.parametrize(
+    ("name", "arrays"),
+    [
+        ("a", []),
+        ("a[3]", [("a", (3,))]),
+        ("a[-1]", [("a", (-1,))]),
+        ("m[1,2]", [("m", (1, 2))]),
+        ("n[1][2]", [("n", (1, 2)), ("n[1]", (2,))]),
+        ("cell[0].t", [("cell.t", (0,))]),
+        ("cell[3].t[4]", [("cell.t", (3, 4)), ("cell[3].t", (4,))]),
+        ("a[x]", []),
+        ("'a[1]'", []),
+        ("'a[1]'[2]", [("'a[1]'", (2,))]),
+        ("o'neil[2]", [("o'neil", (2,))]),
+    ],
+)
+def test_the_arrays_that_a_variable_belongs_to(name, arrays):
+    assert list(arrays_of(name)) == arrays
+
+
+@pytest.mark.parametrize(
+    ("name", "plain"),
+    [("a[1, 2]", "a[1,2]"), ("n[1][2]", "n[1,2]"), ("a b[ 1 ].c d", "a b[1].c d"), ("x y", "x y")],
+)
+def test_an_index_without_blanks_in_one_pair_of_brackets(name, plain):
+    assert plainly(name) == plain

@@ -53,12 +53,26 @@ def test_indices(text, index):
         ("consist[i].force[2]", "gust.a", [("consist[1].force[2]", "gust.a"), ("consist[2].force[2]", "gust.a")]),
         ("observer.x[i]", "consist[i].x", [("observer.x[1]", "consist[1].x"), ("observer.x[2]", "consist[2].x")]),
         ("observer.x[i,3]", "consist[i].x", [("observer.x[1,3]", "consist[1].x"), ("observer.x[2,3]", "consist[2].x")]),
-        ("observer.gap[i-1]", "consist[i].x", [("observer.gap[1]", "consist[2].x")]),
+        (
+            "observer.gap[i-1]",
+            "consist[i].x",
+            [("observer.gap[0]", "consist[1].x"), ("observer.gap[1]", "consist[2].x")],
+        ),
+        ("observer.x[-1]", "gust.a[ 0 , 2 ]", [("observer.x[-1]", "gust.a[0,2]")]),
+        ("consist[i].'a[i]'", "gust.a", [("consist[1].'a[i]'", "gust.a"), ("consist[2].'a[i]'", "gust.a")]),
+        ("observer.x[:]", "gust.m[:, 1]", [("observer.x[:]", "gust.m[:,1]")]),
         ("observer.der(x[1]).y", "gust.a b", [("observer.der(x[1]).y", "gust.a b")]),
     ],
 )
 def test_expansion(target, source, made):
     assert pairs(target, source) == made
+
+
+def test_an_element_below_1_that_a_pattern_makes_may_be_missing():
+    """Our arrays begin at 1, other makers' anywhere: which it is shows when the model is known."""
+    assert [c.optional for c in expand(rule("observer.gap[i-1]", "consist[i].x"), COUNTS)] == [True, False]
+    assert [c.optional for c in expand(rule("consist[i].x", "observer.gap[i-2]"), COUNTS)] == [True, True]
+    assert [c.optional for c in expand(rule("observer.gap[0]", "gust.x"), COUNTS)] == [False]
 
 
 @given(st.integers(-6, 6), st.integers(-6, 6))
@@ -96,7 +110,7 @@ def test_a_pattern_stands_for_every_i_for_which_both_ends_exist(a, b):
         (
             "train[1].x[i]",
             "gust.a[i]",
-            "i has no range, because no instance carries it; whole arrays connect by their bare names",
+            "i has no range, because no instance carries it; arrays connect by their bare names, or with [:] for i",
         ),
         ("cruise[i].x", "train[i+7].y", "there is no i for which both ends exist; counts are: cruise 4, train 4"),
     ],
