@@ -92,8 +92,8 @@ def arrays_of(variable: str) -> Iterator[tuple[str, tuple[int, ...]]]:
 
 
 def plainly(variable: str) -> str:
-    """A variable's name without blanks in its indices, and with those of one array in one pair of brackets."""
-    return re.sub(r"\[[^\[\]]*\]", lambda match: match[0].replace(" ", ""), variable).replace("][", ",")
+    """A name without blanks around it and in its indices, and with those of one array in one pair of brackets."""
+    return re.sub(r"\[[^\[\]]*\]", lambda match: match[0].replace(" ", ""), variable.strip()).replace("][", ",")
 
 
 def _at_end(variable: str) -> list[re.Match[str]]:

@@ -7,13 +7,13 @@ arrays from anywhere.
 import re
 from collections.abc import Collection, Mapping
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cached_property, lru_cache
 from typing import Any
 
 import numpy as np
 
 from ..errors import ExpressionError
-from ..names import INDEX
+from ..names import INDEX, plainly
 from ..problems import Problem, suggestion
 from .functions import ARITHMETIC, LOGIC, Function, Value, call_problem, logical, where
 from .signals import Signals
@@ -82,16 +82,21 @@ class Scope:
                     spans.append((-np.inf if first is None else first, np.inf if last is None else last))
                 texts.append(":" if isinstance(index, Span) else str(self.integer(index)))
             full += ("." if full and name else "") + name + (f"[{','.join(texts)}]" if texts else "")
-        if not spans and full in self.names:
-            return [full]
-        if not spans and not reference.indices:
-            return []
+        if not spans:
+            name = full if full in self.names else _otherwise_written(self.names).get(plainly(full), "")
+            return [name] if name else []
         written = (
             re.escape(full).replace(",", ", *").replace(r"\[", r"\[ *").replace(r"\]", r" *\]")
         )  # blanks are no matter
         pattern = re.compile(written.replace(":", INDEX))
         found = [(tuple(map(int, match.groups())), match[0]) for match in map(pattern.fullmatch, self.names) if match]
         return [n for ks, n in sorted(found) if all(a <= k <= b for k, (a, b) in zip(ks, spans, strict=True))]
+
+
+@lru_cache(maxsize=4)
+def _otherwise_written(names: frozenset[str]) -> dict[str, str]:
+    """Names of elements with blanks or with several pairs of brackets, by how else they may be written."""
+    return {plainly(name): name for name in names if "[" in name and (" " in name or "][" in name)}
 
 
 def unknown_signal(reference: Reference, names: Collection[str]) -> Problem:

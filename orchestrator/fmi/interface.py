@@ -10,7 +10,7 @@ from typing import Any, Literal
 
 from ...fmus.annotation import Annotation
 from ...fmus.kinds import FmuKind
-from ..names import INDEX, plainly
+from ..names import INDEX, SignalName, plainly
 
 Type = Literal["Real", "Integer", "Boolean", "String", "Enumeration"]
 
@@ -161,7 +161,7 @@ class Interface:
     @cached_property
     def _plainly(self) -> Mapping[str, str]:
         """Names of elements by how a scenario may write them."""
-        return {plainly(name): name for name in reversed(self.variables) if "[" in name}
+        return {plainly(name): name for name in reversed(list(self.variables)) if "[" in name or " " in name}
 
     def _slice(self, name: str) -> tuple[str, ...] | None:
         """The scalars of ``a[1,:]`` or ``cell[:].t``, in the order of their indices."""
@@ -172,6 +172,13 @@ class Interface:
             if match
         ]
         return tuple(scalar for _, scalar in sorted(found)) or None
+
+    def elements_beside(self, name: str) -> str:
+        """A remedy for an element that is not there: which there are; empty where it is an element of no array."""
+        there = self.arrays.get(SignalName("", name).array, ())
+        if not there:
+            return ""
+        return f"there are {there[0]!r} to {there[-1]!r}" if len(there) > 1 else f"there is {there[0]!r}"
 
     def why_left_out(self, name: str) -> str:
         """A clause to append to an error about a name that is no variable: the FMU may have it all the same."""

@@ -69,7 +69,7 @@ def _interface(description: Any, root: Any, beside: Beside) -> Interface:
         guid=description.guid or "",
         variables=variables,
         units={unit.name: unit for unit in map(_unit, description.unitDefinitions)},
-        arrays=_arrays(variables),
+        arrays=find_arrays(variables),
         description=description.description or "",
         generator=description.generationTool or "",
         default_step=_number(experiment.stepSize) if experiment else None,
@@ -216,7 +216,8 @@ def _unit(unit: Any) -> Unit:
     return Unit(unit.name, tuple(getattr(base, e) for e in _EXPONENTS), factor, offset)
 
 
-def _arrays(variables: Mapping[str, Variable]) -> dict[str, tuple[str, ...]]:
+def find_arrays(variables: Mapping[str, Variable]) -> dict[str, tuple[str, ...]]:
+    """The scalars of each array by the array's name, in the order of their indices."""
     found: dict[str, list[tuple[tuple[int, ...], str]]] = {}
     for name in variables:
         for array, place in arrays_of(name):

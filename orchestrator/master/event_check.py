@@ -42,7 +42,7 @@ def _problems(
     if scalars is None:
         valid = [v.name for v in interface.of("input", "output", "parameter")]
         why = interface.why_left_out(name)
-        near = "" if why else suggestion(name, [*valid, *interface.arrays])
+        near = "" if why else interface.elements_beside(name) or suggestion(name, [*valid, *interface.arrays])
         yield Problem("", f"{interface.model} has no variable {name!r}{why}", near)
         return
     for scalar in scalars:

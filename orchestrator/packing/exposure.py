@@ -92,7 +92,7 @@ def _variables(
         return
     scalars = interface.scalars(name)
     if scalars is None:
-        near = suggestion(name, [*interface.variables, *interface.arrays])
+        near = interface.elements_beside(name) or suggestion(name, [*interface.variables, *interface.arrays])
         raise ScenarioError(Problem("", f"{interface.model} ({instance}) has no variable {name!r}", near))
     for variable in (interface.variables[scalar] for scalar in scalars):
         signal = SignalName(instance, variable.name)

@@ -26,6 +26,8 @@ from numpy.typing import NDArray
 
 CSV_FILE, ROWS_FILE, _NEW = "results.csv", "results.bin", ".new"
 _FLOAT = np.dtype("<f8")
+_QUOTE = '"'
+_TO_QUOTE = frozenset(f",{_QUOTE}\r\n")
 
 
 class Writer:
@@ -159,8 +161,13 @@ def _write_text(directory: Path, columns: Sequence[str], whole: Sequence[int], b
 
 def write_csv(stream: IO[str], columns: Sequence[str], whole: Sequence[int], blocks: Iterable[NDArray[Any]]) -> None:
     """Header and rows as text."""
-    csv.writer(stream, lineterminator="\n").writerow(columns)
+    stream.write(_line(columns))
     _write_rows(stream, whole, blocks)
+
+
+def _line(cells: Sequence[str]) -> str:
+    """A line of CSV. Python's own writer leaves a carriage return without quotes, which ends a line for its reader."""
+    return ",".join(f'"{cell.replace(_QUOTE, 2 * _QUOTE)}"' if _TO_QUOTE & set(cell) else cell for cell in cells) + "\n"
 
 
 def _write_rows(stream: IO[str], whole: Sequence[int], blocks: Iterable[NDArray[Any]]) -> None:
@@ -170,8 +177,6 @@ def _write_rows(stream: IO[str], whole: Sequence[int], blocks: Iterable[NDArray[
             for k in whole:
                 cells[k] = int(cells[k])
             if block.dtype == object:
-                csv.writer(stream, lineterminator="\n").writerow(
-                    [cell if isinstance(cell, str) else repr(cell) for cell in cells]
-                )
+                stream.write(_line([cell if isinstance(cell, str) else repr(cell) for cell in cells]))
             else:
                 stream.write(",".join(map(repr, cells)) + "\n")

@@ -142,10 +142,7 @@ def _near(interface: Interface, name: str, direction: str, wiring: Wiring) -> st
         return ""
     valid = [v.name for v in interface.of("input" if direction == "input" else "output")]
     listed = valid if len(valid) <= 12 else [*valid[:12], "..."]
-    elements = interface.arrays.get(SignalName("", name).array, ())
-    if elements:
-        return f"there are {elements[0]!r} to {elements[-1]!r}" if len(elements) > 1 else f"there is {elements[0]!r}"
-    near = wiring.near(name, [*valid, *interface.arrays])
+    near = interface.elements_beside(name) or wiring.near(name, [*valid, *interface.arrays])
     return near or f"its {direction}s are {', '.join(listed) or 'none'}"
 
 

@@ -31,7 +31,7 @@ def find_starts(system: System, instance: Instance, interface: Interface, wiring
         elif scalars is None:
             why = interface.why_left_out(name)
             valid = (v.name for v in interface.variables.values() if v.settable)
-            near = "" if why else wiring.near(name, chain(valid, interface.arrays))
+            near = "" if why else interface.elements_beside(name) or wiring.near(name, chain(valid, interface.arrays))
             problem = Problem(str(signal), f"{interface.model} has no such variable{why}", near, (signal,))
             wiring.problems.append(problem.at(origin))
         else:

@@ -33,6 +33,23 @@ class Run:
         return self.columns[name]
 
 
+FOREIGN = frozenset(
+    [
+        *(f"a.x[{k}]" for k in range(3)),
+        "a.g[-1]",
+        "a.g[2]",
+        "a.g[5]",
+        "a.m[1, 1]",
+        "a.m[1, 2]",
+        "a.n[1][2]",
+        "a.n[2][2]",
+        "a.cell[0].t",
+        "a.cell[1].t",
+        "b[1].x[0]",
+        "b[2].x[0]",
+        "a.'my, var'",
+    ]
+)
 RUN = Run()
 NAMES = [*RUN.names(), *RUN.parameters]
 
@@ -252,6 +269,45 @@ def test_an_index_of_thousands_of_digits_is_no_index():
     assert parse("count").evaluate(RUN) == 0
     assert parse("foreign.x[count]").resolve(names) == [["foreign.x[2]"]]
     assert "there are 'foreign.x[2]' to" in parse("foreign.x[3]").check(names)[0].remedy
+
+
+@pytest.mark.parametrize(
+    ("text", "found"),
+    [
+        ("a.x[:]", ["a.x[0]", "a.x[1]", "a.x[2]"]),
+        ("a.x[1:]", ["a.x[1]", "a.x[2]"]),
+        ("a.x[:1]", ["a.x[0]", "a.x[1]"]),
+        ("a.g[:]", ["a.g[-1]", "a.g[2]", "a.g[5]"]),
+        ("a.g[-1]", ["a.g[-1]"]),
+        ("a.m[1,:]", ["a.m[1, 1]", "a.m[1, 2]"]),
+        ("a.m[1,2]", ["a.m[1, 2]"]),
+        ("a.n[1][2]", ["a.n[1][2]"]),
+        ("a.n[1,2]", ["a.n[1][2]"]),
+        ("a.n[:][2]", ["a.n[1][2]", "a.n[2][2]"]),
+        ("a.cell[:].t", ["a.cell[0].t", "a.cell[1].t"]),
+        ("a.x[count]", ["a.x[2]"]),
+        ("signal(\"a.'my, var'\")", ["a.'my, var'"]),
+    ],
+)
+def test_the_arrays_of_other_makers_begin_anywhere(text, found):
+    assert parse(text).resolve(FOREIGN) == [found]
+    assert not parse(text).check(FOREIGN)
+
+
+@pytest.mark.parametrize(
+    ("text", "indices"),
+    [
+        ("a.x[i]", (0, 1, 2)),
+        ("a.x[i+1] - a.x[i]", (0, 1)),
+        ("a.g[i]", (-1, 2, 5)),
+        ("a.cell[i].t", (0, 1)),
+        ("b[i].x[0]", (1, 2)),
+        ("b[i].x[i-1]", (1,)),
+        ("b[i+1].x[0]", (1,)),  # instances are numbered from 1
+    ],
+)
+def test_the_free_index_takes_what_is_there(text, indices):
+    assert parse(text).instances(FOREIGN) == indices
 
 
 def test_an_index_that_overflows_warns_nobody(recwarn):

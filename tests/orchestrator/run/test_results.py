@@ -68,7 +68,7 @@ def test_any_number_survives(tmp_path_factory, values):
     assert list(Results.load(directory)["x"]) == values
 
 
-TEXTS = ["plain", "12", "", 'say "no", twice', "two\nlines", "3.5e7", "naïve", "nan"]
+TEXTS = ["plain", "12", "", 'say "no", twice', "two\nlines", "3.5e7", "naïve", "nan", '"q"', "a\rb\r\n", " x "]
 
 
 def test_texts_survive_even_where_they_look_like_numbers(tmp_path):
@@ -103,6 +103,16 @@ def test_elements_of_a_matrix(tmp_path):
     saved(tmp_path, ["m[1,2]"], [(0.0, 5.0)])
     assert list(Results.load(tmp_path)["m[1,2]"]) == [5.0]
     assert list(pd.read_csv(tmp_path / "results.csv").columns) == ["time", "m[1,2]"]
+
+
+@given(st.lists(st.text("ab'\"[],.;= \t\r\n\\", min_size=1, max_size=8), min_size=1, max_size=5, unique=True))
+def test_any_name_survives(tmp_path_factory, names):
+    directory = tmp_path_factory.mktemp("names")
+    names = [f"a.{name}" for name in names]
+    saved(directory, names, [(0.0, *range(len(names)))])
+    loaded = Results.load(directory)
+    assert list(loaded.names()) == names
+    assert [loaded[name][0] for name in names] == list(range(len(names)))
 
 
 @pytest.mark.parametrize("cut", [1, 5, 12, 18])

@@ -2,7 +2,7 @@
 
 import pytest
 from railcosim.orchestrator.fmi.models import load_models
-from railcosim.orchestrator.system import System
+from railcosim.orchestrator.system import Connection, System
 from railcosim.orchestrator.wiring import is_direct
 
 METRES_TO_TRACK = '<Unit name="km"><BaseUnit m="1" factor="1000"/></Unit><Unit name="m"><BaseUnit m="1"/></Unit>'
@@ -241,3 +241,16 @@ def test_feed_through_of_another_maker_s_fmu(workspace, foreign, xml, listed, di
     system.add("a", path)
     interface = load_models(system, workspace)["a"].interface
     assert is_direct(interface, interface.variables["y"]) is direct
+
+
+@pytest.mark.parametrize("optional", [True, False])
+def test_an_optional_connection_stands_for_nothing_where_an_end_is_missing(resolve, foreign, xml, optional):
+    path = foreign([xml["variable"]("x[0]", "input", start=0.0), xml["variable"]("y[1]", "output")])
+    system = System(stop_time=1.0)
+    system.add("a", path)
+    system.add("b", path)
+    system.connections.append(Connection("a.y[0]", "b.x[0]", optional=optional))
+    wiring = resolve(system)
+    assert [str(problem) for problem in wiring.problems] == (
+        [] if optional else ["'b.x[0]' = 'a.y[0]': Foreign (a) has no variable 'y[0]'; there is 'y[1]'"]
+    )
