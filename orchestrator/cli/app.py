@@ -16,6 +16,7 @@ from . import analysis, models, runs, scenarios
 from .options import FMU_FAILED, OK, WRONG_INPUT
 from .printing import Log, folded, tell
 from .streams import flush_streams, secure_streams
+from .supervision import supervised
 
 app = typer.Typer(
     no_args_is_help=True,
@@ -30,10 +31,14 @@ def main() -> None:
     """Entry point: every expected error becomes one message and an exit code."""
     secure_streams()
     logging.getLogger().addHandler(Log(logging.WARNING))
+    # pythonfmu 0.7 frees its interpreter state twice when C++ is torn down, and some exits crash: leave before that.
+    os._exit(supervised(_command))
+
+
+def _command() -> int:
     code = call()
     flush_streams()
-    # pythonfmu 0.7 frees its interpreter state twice when C++ is torn down, and some exits crash: leave before that.
-    os._exit(code)
+    return code
 
 
 def call(arguments: Sequence[str] | None = None) -> int:
