@@ -26,6 +26,7 @@ from railcosim.orchestrator.fmi.binding.libraries import forget_paths
 from railcosim.orchestrator.master.loop import Master, Rows
 from railcosim.orchestrator.run.checking import Checked, check
 from railcosim.orchestrator.run.results import Recorder
+from railcosim.orchestrator.system import Judged
 
 GOALS = {
     "ten trips": 2.0,
@@ -44,7 +45,7 @@ def ten_trips() -> System:
     for name in system.instances.keys() - KEPT:
         del system.instances[name]
     system.connections = [c for c in system.connections if c.target.split(".")[0] in KEPT]
-    system.judged.requirements, system.judged.metrics, system.judged.published, system.judged.figures = {}, {}, [], []
+    system.judged = Judged()
     system.add("line", "Line")
     system.connect("train.position", "line.position")
     system.connect("line.line_resistance", "train.line_resistance")

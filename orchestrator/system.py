@@ -133,11 +133,12 @@ class Stepping:
 
 @dataclass
 class Judged:
-    """What is made of what is recorded: requirements and metrics by name, published values and figures as tables."""
+    """What is made of what is recorded: requirements and metrics by name, known values and figures as tables."""
 
     requirements: dict[str, str] = field(default_factory=dict)
     metrics: dict[str, str] = field(default_factory=dict)
     published: list[dict[str, Any]] = field(default_factory=list)
+    references: list[dict[str, Any]] = field(default_factory=list)
     figures: list[dict[str, Any]] = field(default_factory=list)
 
 
@@ -147,15 +148,16 @@ class Provenance:
 
     Attributes:
         name, path: of the scenario file. text: the scenario as read, for the record of the run.
-        title, source, description: what it says of itself.
+        title, source: what it says of itself. description: the same, of the preset in force.
         preset: the preset in force (``default_preset`` for the file as it stands); None where that has no name.
-        presets: every name a preset may be asked for by. default_preset: the one that means the file as it stands.
-        modified: whether anything was changed beyond file and preset, so that published values are not judged.
+        presets: every name a preset may be asked for by. preset_descriptions: what they say of themselves, by name.
+        default_preset: the one that means the file as it stands.
+        modified: whether anything was changed beyond file and preset, so that known values are not judged.
         rescaled_from: the step in s before `--step` changed it: every sample time equal to it follows the step.
         origins: where things were written, for messages: by ``"train[1]"``, ``"train[1].speed"`` (a start value),
             ``"instances.train[1].step"`` (an option of an instance), ``"simulation.step"``,
             ``"simulation.tolerances.train[1].speed"``, ``"events[1]"``, ``"require.comfort"``, ``"metrics.settling"``,
-            ``"published[1]"``, ``"figures[1]"``.
+            ``"published[1]"``, ``"references[1]"``, ``"figures[1]"``.
     """
 
     title: str = ""
@@ -163,6 +165,7 @@ class Provenance:
     description: str = ""
     preset: str | None = None
     presets: tuple[str, ...] = field(default=(), compare=False)
+    preset_descriptions: dict[str, str] = field(default_factory=dict, compare=False, repr=False)
     default_preset: str | None = field(default=None, compare=False)
     modified: bool = field(default=False, compare=False)
     rescaled_from: float | None = field(default=None, compare=False)

@@ -20,9 +20,10 @@ def list_all() -> None:
     say(out, "Scenarios (orchestrate run NAME)", "bold")
     for name, title in shipped():
         say(out, f"  {name}: {title}")
-        presets = load(name).provenance.presets
-        if presets:
-            say(out, f"      presets: {', '.join(presets)}", "dim")
+        origin = load(name).provenance
+        for preset in origin.presets:
+            what = origin.preset_descriptions.get(preset) or ("as it stands" if preset == origin.default_preset else "")
+            say(out, f"      --preset {preset}" + (f": {what}" if what else ""), "dim")
     say(out, "Components (orchestrate describe NAME)", "bold")
     for name, component in CATALOGUE.items():
         say(out, f"  {name}: {summary(component)}")

@@ -19,7 +19,7 @@ class Case:
 
 
 def published_cases(paper: str | None = None) -> list[Case]:
-    """The cases that carry published values; those of one paper if asked for.
+    """The cases that carry published values or references; those of one paper if asked for.
 
     Args:
         paper: a scenario's name, the beginning of one, or a word of its source ("Wang").
@@ -31,9 +31,10 @@ def published_cases(paper: str | None = None) -> list[Case]:
     found = []
     for name in names:
         base = load(name)
-        if not base.judged.published or (paper is not None and not _matches(paper, name, base.provenance.source)):
+        entries = [*base.judged.published, *base.judged.references]
+        if not entries or (paper is not None and not _matches(paper, name, base.provenance.source)):
             continue
-        presets = dict.fromkeys(entry.get("preset", base.provenance.default_preset) for entry in base.judged.published)
+        presets = dict.fromkeys(entry.get("preset", base.provenance.default_preset) for entry in entries)
         for preset in presets:
             plain = preset is None or preset == base.provenance.default_preset
             command = f"orchestrate run {name}" + ("" if plain else f" --preset {preset}")

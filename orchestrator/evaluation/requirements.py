@@ -2,7 +2,7 @@
 
 A verdict is pass, fail or inconclusive, with a signed margin: the smallest slack over time and index, negative where
 the condition is violated. Only recorded points are seen. What NaN touches fails, and an unfinished run never passes.
-The grammar and its meaning stand in `docs/metrics.md`.
+Numbers that differ by rounding are equal: their margin is 0. The grammar and its meaning stand in `docs/metrics.md`.
 """
 
 import re
@@ -20,13 +20,15 @@ from .calculation import Scope, evaluate
 from .expressions import Expression, evaluate_constant, parse
 from .functions import CONSTANTS
 from .metrics import EVERY_STEP, FUNCTIONS
-from .signals import Signals
+from .signals import Rehearsal, Signals
 from .syntax import Call, Name, Node, Number, Operation, Reference, walk
-from .time_windows import select
+from .time_windows import scalar, select
 
 QUANTIFIERS = ("always", "eventually", "finally")
 CLAUSES = ("from", "until", "outside")
 COMPARISONS = ("<", "<=", ">", ">=", "==", "!=")
+ROUNDING = 4 * float(np.finfo(np.float64).eps)
+"""Numbers that differ by less than this share of what they are made of are equal: a start on a bound is on it."""
 _MISSING = "write always, eventually or finally, then a condition: always abs(train[i].acceleration) <= 1.0"
 
 
@@ -88,42 +90,96 @@ def slack_of(node: Node, scope: Scope) -> Slack:
             slack = np.where(np.isnan(choice), np.nan, np.where(choice, yes.slack, no.slack))
             return Slack(np.where(choice, yes.holds, no.holds) & ~np.isnan(slack), slack)
         case Operation(operator=operator, operands=(left, right)) if operator in COMPARISONS:
-            return _compare(operator, evaluate(left, scope), evaluate(right, scope))
+            rounding = ROUNDING * np.maximum(_size(left, scope), _size(right, scope))
+            return _compare(operator, evaluate(left, scope), evaluate(right, scope), rounding)
     value = np.asarray(evaluate(node, scope), dtype=np.float64)
     slack = np.where(np.isnan(value), np.nan, np.where(value, np.inf, -np.inf))
     return Slack(slack > 0, slack)
 
 
-def _compare(operator: str, left: NDArray[Any], right: NDArray[Any]) -> Slack:
+def _size(node: Node, scope: Scope) -> NDArray[np.float64]:
+    """How large the numbers are that a value is made of: the rounding of a gap is that of the two positions."""
+    match node:
+        case Operation(operator="+" | "-" | "negative" | "positive", operands=operands):
+            parts = [_size(operand, scope) for operand in operands]
+        case Call(name="abs" | "minimum" | "maximum", arguments=arguments):
+            parts = [_size(argument, scope) for argument in arguments]
+        case _:
+            return np.abs(np.asarray(evaluate(node, scope), dtype=np.float64))
+    return np.asarray(np.maximum.reduce(np.broadcast_arrays(*parts)))
+
+
+def _compare(operator: str, left: NDArray[Any], right: NDArray[Any], rounding: NDArray[np.float64]) -> Slack:
     a, b = np.asarray(left, dtype=np.float64), np.asarray(right, dtype=np.float64)
-    equal = a == b  # inf - inf would be NaN
-    difference = np.where(equal, 0.0, b - a)
+    equal = (a == b) | (np.abs(b - a) <= np.where(np.isfinite(rounding), rounding, 0.0))
+    difference = np.where(equal, 0.0, b - a)  # inf - inf would be NaN
     slack, holds = {
-        "<": (difference, a < b),
-        "<=": (difference, a <= b),
-        ">": (-difference, a > b),
-        ">=": (-difference, a >= b),
+        "<": (difference, (a < b) & ~equal),
+        "<=": (difference, (a <= b) | equal),
+        ">": (-difference, (a > b) & ~equal),
+        ">=": (-difference, (a >= b) | equal),
         "==": (-np.abs(difference), equal),
         "!=": (np.abs(difference), ~equal & ~np.isnan(difference)),
     }[operator]
     return Slack(np.asarray(holds), np.asarray(slack))
 
 
+class _Times(NamedTuple):
+    """The window of a requirement in one run [s]."""
+
+    start: float | None
+    end: float | None
+    outside: list[tuple[float, float]]
+
+
 @dataclass(frozen=True)
 class Requirement:
-    """A parsed requirement; times in seconds."""
+    """A parsed requirement; the times of its window [s] are expressions over numbers and parameters."""
 
     name: str
     text: str
     quantifier: str
     condition: Expression
-    start: float | None = None
-    end: float | None = None
-    outside: tuple[tuple[float, float], ...] = ()
+    start: Expression | None = None
+    end: Expression | None = None
+    outside: tuple[tuple[Expression, Expression], ...] = ()
 
-    def check(self, names: Collection[str]) -> list[Problem]:
+    @property
+    def moments(self) -> list[Expression]:
+        """The times of its window."""
+        every = (self.start, self.end, *(end for pair in self.outside for end in pair))
+        return [moment for moment in every if moment is not None]
+
+    def times(self, signals: Signals) -> _Times:
+        """The window in a run.
+
+        Raises:
+            ExpressionError: a time varies, or the window ends before it starts.
+        """
+        start, end = (None if x is None else _moment(x, signals) for x in (self.start, self.end))
+        outside = [(_moment(first, signals), _moment(last, signals)) for first, last in self.outside]
+        if start is not None and end is not None and start > end:
+            raise ExpressionError(Problem("", f"'from {start:g} until {end:g}' ends before it starts", "swap the two"))
+        for first, last in outside:
+            if first > last:
+                backwards = f"'outside [{first:g}, {last:g}]' ends before it starts"
+                raise ExpressionError(Problem("", backwards, "swap the two"))
+        return _Times(start, end, outside)
+
+    def check(self, names: Collection[str], parameters: Collection[str] | None = None) -> list[Problem]:
         """Every problem that can be found before a run; `names` are the signals to be recorded and the parameters."""
         problems = self.condition.check(names)
+        for moment in self.moments:
+            found = moment.check(names)
+            if moment.uses_index:
+                found = [
+                    Problem(
+                        f"'{moment.text}'", "a time is one for all i", "write a number, or one instance's parameter"
+                    )
+                ]
+            elif not found and parameters is not None and not _is_constant(moment, names, parameters):
+                found = [Problem(f"'{moment.text}'", "a time is a number or a parameter, not a signal")]
+            problems += found
         shapeless = [node for node in _conditions(self.condition.tree) if not _can_be_true(node)]
         if shapeless and not problems:
             number = f"'{self.condition.text}' is a number, not a condition"
@@ -136,7 +192,11 @@ class Requirement:
         Raises:
             ExpressionError: for what `check` would have told.
         """
-        points = select(signals, self.start, self.end, self.outside)
+        try:
+            times = self.times(signals)
+        except ExpressionError as error:
+            return Verdict(self.name, self.text, "inconclusive", reason=str(error))
+        points = select(signals, times.start, times.end, times.outside)
         indices = self.condition.instances([*signals.names(), *signals.parameters])
         if not points.any() or not indices:
             reason = "no signal has such an index" if points.any() else "no recorded point lies in its window"
@@ -145,15 +205,17 @@ class Requirement:
             worst = min((self._worst(signals, points, index) for index in indices), key=_badness)
         except WindowError as error:
             return Verdict(self.name, self.text, "inconclusive", reason=str(error))
-        verdict, reason = self._verdict(worst, signals)
+        verdict, reason = self._verdict(worst, signals, times.end)
         margin = None if np.isinf(worst.slack) else worst.slack
         judged = 1 if self.quantifier == "finally" else int(points.sum())
         return Verdict(self.name, self.text, verdict, margin, worst.time, worst.index, judged, reason)
 
-    def _verdict(self, worst: _Worst, signals: Signals) -> tuple[Literal["pass", "fail", "inconclusive"], str]:
+    def _verdict(
+        self, worst: _Worst, signals: Signals, end: float | None
+    ) -> tuple[Literal["pass", "fail", "inconclusive"], str]:
         """The verdict and the reason for it, where it needs one."""
         last = float(signals.time[-1])
-        reached = signals.completed if self.end is None else self.end <= last + 1e-6 * signals.step
+        reached = signals.completed if end is None else end <= last + 1e-6 * signals.step
         # A number over the whole run (final, settling_time, ...) is not final before the run is.
         reducers = (isinstance(x, Call) and self.condition.functions[x.name].reduces for x in walk(self.condition.tree))
         provisional = not signals.completed and any(reducers)
@@ -162,7 +224,7 @@ class Requirement:
         if not signals.completed:
             return "inconclusive", f"the run ended at {last:g} s, before its stop time {signals.stop_time:g} s"
         if not reached:
-            return "inconclusive", f"its window lasts until {self.end:g} s, the run only until {last:g} s"
+            return "inconclusive", f"its window lasts until {end:g} s, the run only until {last:g} s"
         return "pass", ""
 
     def _worst(self, signals: Signals, points: NDArray[np.bool_], index: int | None) -> _Worst:
@@ -244,20 +306,28 @@ def _clauses(text: str) -> list[tuple[str, str]]:
     return parts
 
 
-def _time(word: str, text: str) -> float:
+def _moment(expression: Expression, signals: Signals) -> float:
+    return scalar(expression.evaluate(signals), f"'{expression.text}', a time of a window,")
+
+
+def _is_constant(expression: Expression, names: Collection[str], parameters: Collection[str]) -> bool:
+    return all(name in parameters for found in expression.resolve(names) for name in found)
+
+
+def _time(word: str, text: str) -> Expression:
     if not text:
         raise ExpressionError(f"'{word}' needs a time in seconds, as in {word} 210")
-    return float(evaluate_constant(text))
+    expression = parse(text)
+    if not expression.references:
+        evaluate_constant(text)
+    return expression
 
 
-def _window(text: str) -> tuple[float, float]:
+def _window(text: str) -> tuple[Expression, Expression]:
     match = re.fullmatch(r"\[([^,]+),([^,]+)\]", text)
     if not match:
         raise ExpressionError(Problem("", f"'outside {text}' is not a time window", "write outside [210, 240]"))
-    first, last = _time("outside", match[1]), _time("outside", match[2])
-    if first > last:
-        raise ExpressionError(Problem("", f"'outside {text}' ends before it starts", "swap the two"))
-    return first, last
+    return _time("outside", match[1].strip()), _time("outside", match[2].strip())
 
 
 def parse_requirement(name: str, text: str) -> Requirement:
@@ -272,8 +342,8 @@ def parse_requirement(name: str, text: str) -> Requirement:
         nearest = suggestion(quantifier, QUANTIFIERS) or _MISSING
         raise ExpressionError(Problem("", f"'{text}' does not say when", nearest))
     (_, condition), *clauses = _clauses(rest)
-    times: dict[str, float] = {}
-    outside: list[tuple[float, float]] = []
+    times: dict[str, Expression] = {}
+    outside: list[tuple[Expression, Expression]] = []
     problems: list[Problem] = []
     for word, argument in clauses:
         try:
@@ -285,19 +355,21 @@ def parse_requirement(name: str, text: str) -> Requirement:
                 times[word] = _time(word, argument)
         except ExpressionError as error:
             problems += error.problems
-    start, end = times.get("from"), times.get("until")
-    if start is not None and end is not None and start > end:
-        problems.append(Problem("", f"'from {start:g} until {end:g}' ends before it starts", "swap the two"))
     try:
         expression = parse(condition, FUNCTIONS)
     except ExpressionError as error:
         problems += error.problems
     if problems:
         raise ExpressionError(problems)
-    return Requirement(name, text, quantifier, expression, start, end, tuple(outside))
+    made = Requirement(name, text, quantifier, expression, times.get("from"), times.get("until"), tuple(outside))
+    if not any(moment.references for moment in made.moments):
+        made.times(Rehearsal(()))
+    return made
 
 
-def check_requirements(table: Mapping[str, str], names: Collection[str], every_step: bool = True) -> list[Problem]:
+def check_requirements(
+    table: Mapping[str, str], names: Collection[str], every_step: bool = True, parameters: Collection[str] | None = None
+) -> list[Problem]:
     """Every problem of a [require] table that can be found before a run, as `metrics.check_metrics` does it."""
     problems: list[Problem] = []
     for name, text in table.items():
@@ -307,7 +379,7 @@ def check_requirements(table: Mapping[str, str], names: Collection[str], every_s
         except ExpressionError as error:
             problems += error.at(place)
             continue
-        problems += [problem.at(place) for problem in requirement.check(names)]
+        problems += [problem.at(place) for problem in requirement.check(names, parameters)]
         if requirement.condition.calls("at_sample") and not every_step:
             problems.append(EVERY_STEP.at(place))
     return problems

@@ -104,7 +104,7 @@ def linearize(
             f"the time to linearize at, {at:g} s, is no communication point: take a whole number of steps of "
             f"{system.stepping.step:g} s from {system.stepping.start_time:g} s on"
         )
-    nothing: dict[str, Any] = {"metrics": {}, "requirements": {}, "published": [], "figures": []}
+    nothing: dict[str, Any] = {"metrics": {}, "requirements": {}, "published": [], "references": [], "figures": []}
     # The step that is differentiated may end after the scenario's own stop time.
     stop = max(system.stepping.stop_time, system.stepping.start_time + (round(steps) + 2) * system.stepping.step)
     system = system.changed(**nothing, stop_time=stop, record=None)

@@ -5,9 +5,11 @@ from .checking import Checked, check, describe_stepping
 from .checkpoint import CHECKPOINT_FILE, read_checkpoint
 from .execution import at_half_the_step, execute, go_on, resume, run
 from .outcome import Run
+from .record import add_step_check
 from .results import Results
 from .rows import ROWS_FILE, recover_rows
 from .session import Progress
+from .step_check import StepChange, StepCheck, check_step
 
 __all__ = [
     "CHECKPOINT_FILE",
@@ -16,9 +18,13 @@ __all__ = [
     "Progress",
     "Results",
     "Run",
+    "StepChange",
+    "StepCheck",
+    "add_step_check",
     "assembled",
     "at_half_the_step",
     "check",
+    "check_step",
     "describe_stepping",
     "execute",
     "go_on",

@@ -8,7 +8,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 
 from ..errors import ScenarioError
-from ..evaluation import check_metrics, check_published, check_requirements, metric_indices, split_metric
+from ..evaluation import check_metrics, check_requirements, check_values, metric_indices, split_metric
 from ..figures import check_figures
 from ..fmi import Interface, Kind, Model, Workspace, load_models
 from ..isolation import check_isolation, check_once_per_process, isolation_notes
@@ -65,13 +65,14 @@ def check(system: System, workspace: Workspace, kind: Kind = "auto") -> Checked:
     system, left_out = _without_the_missing(system, interfaces, names, every_step)
     problems += check_events(system, interfaces, wiring)
     problems += check_coupling(system, interfaces, wiring)
-    problems += check_requirements(system.judged.requirements, names, every_step)
+    parameters = {f"{name}.{v.name}" for name, interface in interfaces.items() for v in interface.of("parameter")}
+    problems += check_requirements(system.judged.requirements, names, every_step, parameters)
     found = check_metrics(system.judged.metrics, names, every_step)
     problems += found
     if not found:
-        problems += check_published(
-            system.judged.published, metric_indices(system.judged.metrics, names), system.provenance.presets
-        )
+        indices = metric_indices(system.judged.metrics, names)
+        judged = system.judged
+        problems += check_values(judged.published, judged.references, indices, system.provenance.presets)
     problems += check_figures(system.judged.figures, names, every_step)
     if problems:
         raise ScenarioError(problems)
@@ -93,7 +94,10 @@ def _without_the_missing(
     }
     metrics = {k: v for k, v in system.judged.metrics.items() if not check_metrics({k: v}, names, every_step)}
     figures = [figure for figure in system.judged.figures if not check_figures([figure], names, every_step)]
-    published = [entry for entry in system.judged.published if split_metric(str(entry.get("metric")))[0] in metrics]
+    published, references = (
+        [entry for entry in entries if split_metric(str(entry.get("metric")))[0] in metrics]
+        for entries in (system.judged.published, system.judged.references)
+    )
     lost = {event.signal for event in system.events} | set(system.stepping.tolerances)
     lost -= {signal for signal in lost if _is_there(signal, interfaces)}
     gone = [f"requirement {name!r}" for name in system.judged.requirements if name not in requirements]
@@ -106,6 +110,7 @@ def _without_the_missing(
         metrics=metrics,
         figures=figures,
         published=published,
+        references=references,
         events=[event for event in system.events if event.signal not in lost],
         tolerances={signal: value for signal, value in system.stepping.tolerances.items() if signal not in lost},
     )

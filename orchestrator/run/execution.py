@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from ..errors import RailcosimError, ScenarioError
-from ..evaluation import evaluate_metrics, judge_published, judge_requirements
+from ..evaluation import evaluate_metrics, judge_requirements, judge_values
 from ..figures import draw
 from ..fmi import Kind, Workspace
 from ..fmi.binding import forget_paths
@@ -197,19 +197,23 @@ def _tell_divergence(outcome: Run) -> None:
 
 
 def evaluate(outcome: Run) -> None:
-    """Fill in metrics, verdicts and published values from what was recorded."""
+    """Fill in metrics, verdicts and known values from what was recorded."""
     system, results = outcome.system, outcome.results
     if not len(results):
         return
     outcome.metrics = evaluate_metrics(system.judged.metrics, results)
     outcome.requirements = judge_requirements(system.judged.requirements, results)
-    outcome.published = judge_published(
-        system.judged.published,
-        outcome.metrics,
-        system.provenance.preset,
-        system.provenance.modified,
-        default_preset=system.provenance.default_preset,
-        completed=outcome.status == "completed",
+    came = system.provenance
+    outcome.published, outcome.references = (
+        judge_values(
+            entries,
+            outcome.metrics,
+            came.preset,
+            came.modified,
+            default_preset=came.default_preset,
+            completed=outcome.status == "completed",
+        )
+        for entries in (system.judged.published, system.judged.references)
     )
 
 

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import RunError
-from ..evaluation import Metric, PublishedRow, Verdict
+from ..evaluation import BAD, ComparedValue, Metric, Verdict
 from ..system import System
 from .checking import Checked
 from .results import Results
@@ -24,7 +24,8 @@ class Run:
     """What came out of a run; ``run["train[1].speed"]`` is a recorded signal over ``run.time``.
 
     Attributes:
-        results: recorded signals. metrics, requirements, published: evaluated tables.
+        results: recorded signals. metrics, requirements: evaluated tables.
+        published: what a source printed, beside what was measured. references: the same for values of one's own.
         status: ``"completed"``, ``"terminated"`` (an FMU asked for the end), ``"interrupted"`` or ``"failed"``; error:
             why it failed or ended early.
         checked: models, wiring, order, and the notes a user should read.
@@ -40,7 +41,8 @@ class Run:
     checked: Checked
     metrics: list[Metric] = field(default_factory=list)
     requirements: list[Verdict] = field(default_factory=list)
-    published: list[PublishedRow] = field(default_factory=list)
+    published: list[ComparedValue] = field(default_factory=list)
+    references: list[ComparedValue] = field(default_factory=list)
     figures: list[Path] = field(default_factory=list)
     error: RunError | None = None
     coupling: dict[str, Any] = field(default_factory=dict)
@@ -62,5 +64,6 @@ class Run:
 
     @property
     def failed(self) -> bool:
-        """Whether a requirement failed or a published value was missed."""
-        return any(v.verdict == "fail" for v in self.requirements) or any(p.verdict == "missed" for p in self.published)
+        """Whether a requirement failed, a known value was missed, or one that departs has come to hold."""
+        values = [*self.published, *self.references]
+        return any(v.verdict == "fail" for v in self.requirements) or any(row.verdict in BAD for row in values)

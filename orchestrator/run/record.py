@@ -11,6 +11,7 @@ import platform
 from pathlib import Path
 from typing import Any
 
+from ..evaluation import count_values
 from ..isolation import is_isolated
 from ..master import ALGORITHMS
 from ..system import System
@@ -18,6 +19,7 @@ from . import rows
 from .checking import Checked
 from .checkpoint import CHECKPOINT_FILE
 from .outcome import Run
+from .step_check import StepCheck
 
 _PACKAGES = ("railcosim", "fmpy", "pythonfmu", "numpy", "scipy")
 
@@ -53,6 +55,7 @@ def finish(directory: Path, outcome: Run, kind: str) -> None:
     record["seconds"] = outcome.seconds
     record["coupling"] = outcome.coupling
     record["notes"] += outcome.notes
+    record["values"] = count_values([*outcome.published, *outcome.references])
     record["figures"] = [path.name for path in outcome.figures]
     _dump(directory / "run.json", record)
     _dump(
@@ -73,8 +76,16 @@ def finish(directory: Path, outcome: Run, kind: str) -> None:
             },
             "requirements": [dataclasses.asdict(verdict) for verdict in outcome.requirements],
             "published": [dataclasses.asdict(row) for row in outcome.published],
+            "references": [dataclasses.asdict(row) for row in outcome.references],
         },
     )
+
+
+def add_step_check(directory: Path, found: StepCheck) -> None:
+    """Add to the record of a run what a second one at half its step showed."""
+    path = directory / "run.json"
+    record = json.loads(path.read_text(encoding="utf-8"))
+    _dump(path, record | {"step_check": dataclasses.asdict(found)})
 
 
 def _describe(system: System, checked: Checked, kind: str) -> dict[str, Any]:
@@ -127,6 +138,7 @@ def _describe(system: System, checked: Checked, kind: str) -> dict[str, Any]:
         "requirements": system.judged.requirements,
         "metrics": system.judged.metrics,
         "published": system.judged.published,
+        "references": system.judged.references,
         "figures_wanted": system.judged.figures,
         "scenario_text": system.provenance.text,
     }

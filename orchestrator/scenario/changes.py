@@ -116,6 +116,20 @@ def _change_instance(target: Target, entry: Entry, folder: str, problems: list[P
         group.set_start(name, entry, target.index)
 
 
+def preset_descriptions(source: Source, problems: list[Problem]) -> dict[str, str]:
+    """What each preset says of itself; nothing where it does not, for the scenario's own would be untrue of it."""
+    presets = source.data.get("presets", {})
+    found = {}
+    for name, table in presets.items() if isinstance(presets, dict) else ():
+        text = table.get("description", "") if isinstance(table, dict) else ""
+        if not isinstance(text, str):
+            path = ("presets", name, "description")
+            entry = Entry(text, source.origin(*path), place_of(path))
+            problems.append(entry.problem(f"takes a text, not {shown(text)}"))
+        found[name] = str(text)
+    return found
+
+
 def apply_preset(draft: Draft, source: Source, name: str, folder: str, problems: list[Problem]) -> None:
     """Apply a preset of the file: models first, so that what else it says is meant for them."""
     table = source.data["presets"][name]
@@ -123,7 +137,7 @@ def apply_preset(draft: Draft, source: Source, name: str, folder: str, problems:
         entry = Entry(table, source.origin("presets", name), place_of(("presets", name)))
         problems.append(entry.problem(f"is a table, not {shown(table)}"))
         return
-    lines = list(_preset_lines(table))
+    lines = [line for line in _preset_lines(table) if line[0] != ("description",)]
     lines.sort(key=lambda line: ".".join(line[0]).rpartition(".")[2] not in ("component", "fmu", "count"))
     for keys, value in lines:
         path = ("presets", name, *keys)

@@ -21,7 +21,8 @@ from .patterns import NAME, Rule, member
 
 MAX_COUNT = 10_000
 RESERVED = frozenset(
-    {"simulation", "instances", "connections", "events", "presets", "require", "metrics", "published", "figures"}
+    {"simulation", "instances", "connections", "events", "presets"}
+    | {"require", "metrics", "published", "references", "figures"}
 )
 OPTION_KEYS = ("step", "isolate", "step_timeout", "memory_limit")
 _PYTHON_CLASS = re.compile(rf"(.*\.py):({NAME})", re.DOTALL)

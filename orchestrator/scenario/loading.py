@@ -22,7 +22,7 @@ from ..errors import ScenarioError
 from ..fmi import is_fmu_name
 from ..problems import Problem, suggestion
 from ..system import Instance, System
-from .changes import apply_preset, apply_settings, apply_step, apply_swaps
+from .changes import apply_preset, apply_settings, apply_step, apply_swaps, preset_descriptions
 from .events import expand_events, read_events
 from .groups import Draft, Entry, expand_group
 from .patterns import connect
@@ -191,10 +191,12 @@ class _Scenario:
             self.reader.problem(both, "default_preset", remedy="rename one of the two")
         self.names = tuple(dict.fromkeys([*([self.default] if self.default else []), *presets]))
         self.preset: str | None = self.default
+        self.descriptions = preset_descriptions(source, self.problems)
         self.events = read_events(self.reader)
         self.metrics = self.reader.texts("metrics")
         self.requirements = self.reader.texts("require")
-        self.published = self.reader.published(self.metrics, self.names)
+        self.published = self.reader.values("published", self.metrics, self.names)
+        self.references = self.reader.values("references", self.metrics, self.names)
         self.figures = self.reader.figures()
 
     def base(self, preset: str | None) -> Draft:
@@ -248,7 +250,9 @@ class _Scenario:
         return System(
             title=data.get("title", ""),
             source=data.get("source", ""),
-            description=data.get("description", ""),
+            description=data.get("description", "")
+            if self.preset == self.default
+            else self.descriptions.get(self.preset or "", ""),
             **simulation,
             events=events,
             instances=instances,
@@ -256,9 +260,11 @@ class _Scenario:
             requirements=dict(self.requirements),
             metrics=dict(self.metrics),
             published=copy.deepcopy(self.published),
+            references=copy.deepcopy(self.references),
             figures=copy.deepcopy(self.figures),
             preset=self.preset,
             presets=self.names,
+            preset_descriptions=self.descriptions,
             default_preset=self.default,
             name=self.path.stem.encode(errors="replace").decode(),  # the bytes of a file name need not be letters
             path=str(self.path),
@@ -270,7 +276,8 @@ class _Scenario:
         origins: dict[str, str] = {}
         for section, texts in (("require", self.requirements), ("metrics", self.metrics)):
             origins |= {f"{section}.{name}": self.source.origin(section, name) for name in texts}
-        for section, entries in (("events", self.events), ("published", self.published), ("figures", self.figures)):
+        known = (("published", self.published), ("references", self.references))
+        for section, entries in (("events", self.events), *known, ("figures", self.figures)):
             origins |= {f"{section}[{k + 1}]": self.source.origin(section, k) for k in range(len(entries))}
         return origins
 

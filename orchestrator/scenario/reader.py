@@ -8,7 +8,7 @@ from collections.abc import Collection, Iterator, Mapping
 from typing import Any
 
 from ..errors import ExpressionError, ScenarioError
-from ..evaluation import FUNCTIONS, PUBLISHED_KEYS, check_entry, parse, parse_requirement
+from ..evaluation import FUNCTIONS, check_entry, parse, parse_requirement
 from ..figures import PANEL_KEYS
 from ..names import SignalName
 from ..problems import Problem, suggestion
@@ -43,6 +43,7 @@ TOP_KEYS = (
     "require",
     "metrics",
     "published",
+    "references",
     "figures",
 )
 INSTANCE_KEYS = ("component", "fmu", "count", *OPTION_KEYS, "swapped", "build", "start")
@@ -57,6 +58,7 @@ class Reader:
         self.folder = folder
         self.problems: list[Problem] = []
         self.draft = Draft()
+        self.strange: set[str] = set()  # a preset misspelt at the top would otherwise be told for every value
 
     def read(self) -> Draft:
         """The draft; what is wrong with the file stands in `problems` afterwards."""
@@ -110,27 +112,25 @@ class Reader:
         return found
 
     def tables(self, section: str) -> list[dict[str, Any]]:
-        """The tables of `[[events]]`, `[[published]]` or `[[figures]]`."""
+        """The tables of `[[events]]`, `[[published]]`, `[[references]]` or `[[figures]]`."""
         found = self.source.data.get(section, [])
         if isinstance(found, list) and all(isinstance(entry, dict) for entry in found):
             return found
         self.problem("is a list of tables", section, remedy=f"each begins with [[{section}]]")
         return []
 
-    def published(self, metrics: Collection[str], presets: Collection[str]) -> list[dict[str, Any]]:
-        """The published values; whether a metric has such an index is known only with the interfaces."""
-        found = self.tables("published")
-        strange: set[Any] = set()  # a preset that is misspelt at the top would otherwise be told for every entry
+    def values(self, section: str, metrics: Collection[str], presets: Collection[str]) -> list[dict[str, Any]]:
+        """`[[published]]` or `[[references]]`; whether a metric has such an index is known with the interfaces only."""
+        found = self.tables(section)
         for k, entry in enumerate(found):
-            self.check_keys(entry, PUBLISHED_KEYS, "published", k)
-            known = {key: value for key, value in entry.items() if key in PUBLISHED_KEYS}
-            preset = known.get("preset")
+            told = dict(entry)
+            preset = told.get("preset")
             if isinstance(preset, str) and preset not in presets:
-                if preset in strange:
-                    del known["preset"]
-                strange.add(preset)
-            for key, problem in check_entry(known, {name: _AnyIndex() for name in metrics}, presets):
-                place = ("published", k, key) if key in known else ("published", k)
+                if preset in self.strange:
+                    del told["preset"]
+                self.strange.add(preset)
+            for key, problem in check_entry(told, section, {name: _AnyIndex() for name in metrics}, presets):
+                place = (section, k, key) if key in told else (section, k)
                 self.problems.append(problem.at(self.entry(None, *place).where))
         return found
 

@@ -19,7 +19,7 @@ from .simulation import SIMULATION_KEYS
 def dump(system: System) -> str:
     """A scenario that loads to an equal system: counts, patterns and the preset in force are written out.
 
-    Published values of other presets are left out, as are all of them where the system was modified: a scenario of its
+    Known values of other presets are left out, as are all of them where the system was modified: a scenario of its
     own does not owe them.
 
     Raises:
@@ -55,8 +55,11 @@ def _lines(system: System) -> Iterator[str]:
             yield from ("", f"[{section}]", *_assignments(table))
     for event in system.events:
         yield from ("", "[[events]]", *_assignments({key: getattr(event, key) for key in EVENT_KEYS}))
-    owed = [] if system.provenance.modified else [entry for entry in system.judged.published if _applies(entry, system)]
-    for section, tables in (("published", owed), ("figures", system.judged.figures)):
+    owed, own = (
+        [entry for entry in entries if _applies(entry, system)]
+        for entries in (system.judged.published, system.judged.references)
+    )
+    for section, tables in (("published", owed), ("references", own), ("figures", system.judged.figures)):
         for entry in tables:
             yield from ("", f"[[{section}]]", *_assignments(entry))
 
@@ -66,7 +69,8 @@ def _assignments(table: Mapping[str, Any]) -> Iterator[str]:
 
 
 def _applies(entry: Mapping[str, Any], system: System) -> bool:
-    return bool(entry.get("preset", system.provenance.default_preset) == system.provenance.preset)
+    came = system.provenance
+    return not came.modified and bool(entry.get("preset", came.default_preset) == came.preset)
 
 
 def _instance(instance: Instance) -> Iterator[str]:

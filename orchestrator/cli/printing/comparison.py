@@ -10,7 +10,7 @@ from rich.text import Text
 
 from ...comparison import Comparison
 from .console import and_figures, open_console, say, show_notes
-from .tables import fits, number, table, verdict
+from .tables import fits, number, prefixed, table, verdict
 
 _BEST = "bold green"
 
@@ -58,10 +58,12 @@ def _show_tables(out: Console, comparison: Comparison) -> None:
 def _metrics(comparison: Comparison, heads: Sequence[str]) -> Table:
     made = table("Metrics", ("metric", *heads, "unit", "better", "winner"), right=heads, fold=("metric",))
     for row in comparison.rows:
-        cells = [Text(number(x, row.unit), style=_BEST if k in row.winners else "") for k, x in enumerate(row.values)]
+        scale, unit = prefixed(row.unit, row.values)
+        texts = [number(value, row.unit, scale) for value in row.values]
+        cells = [Text(text, style=_BEST if k in row.winners else "") for k, text in enumerate(texts)]
         direction = "" if row.better == "none" else row.better
         best = ", ".join(heads[k] for k in row.winners)
-        made.add_row(Text(row.name), *cells, Text(row.unit), direction, Text(best, style="green"))
+        made.add_row(Text(row.name), *cells, Text(unit), direction, Text(best, style="green"))
     return made
 
 

@@ -11,7 +11,7 @@ from rich.text import Text
 
 from ...evaluation import COMFORT_TITLE, Metric, MetricChange, comfort_levels
 from .console import say
-from .tables import SIDE_BY_SIDE, fits, number, show_reasons, table
+from .tables import SIDE_BY_SIDE, fits, number, prefixed, show_reasons, table
 
 
 def show_metrics(out: Console, metrics: Sequence[Metric], comparisons: Sequence[MetricChange] = ()) -> None:
@@ -32,10 +32,10 @@ def show_metrics(out: Console, metrics: Sequence[Metric], comparisons: Sequence[
     )
 
 
-def _number(value: float, metric: Metric) -> str:
+def _number(value: float, metric: Metric, scale: float) -> str:
     if metric.comfort and math.isfinite(value):
         return f"{value:.3f} ({', '.join(map(str, comfort_levels(value)))})"
-    return number(value, metric.unit)
+    return number(value, metric.unit, scale)
 
 
 def _long_table(metrics: Sequence[Metric], comparisons: Sequence[MetricChange]) -> Table:
@@ -44,13 +44,15 @@ def _long_table(metrics: Sequence[Metric], comparisons: Sequence[MetricChange]) 
     made = table("Metrics", ("metric", "value", *more, "unit"), right=("value", *more), fold=("metric",))
     halved = {(c.name, c.index): c for c in comparisons}
     for metric in metrics:
+        scale, unit = prefixed(metric.unit, metric.values.values())
         for index, value in metric.values.items():
             name = metric.name if index is None else f"{metric.name}[{index}]"
-            row = [name, _number(value, metric)]
+            row = [name, _number(value, metric, scale)]
             if comparisons:
                 other = halved.get((metric.name, index))
-                row += ["", ""] if other is None else [_number(other.other, metric), f"{other.difference:+.3g}"]
-            made.add_row(*map(Text, [*row, metric.unit]))
+                halves = other and [_number(other.other, metric, scale), f"{other.difference / scale:+.3g}"]
+                row += halves or ["", ""]
+            made.add_row(*map(Text, [*row, unit]))
     return made
 
 
@@ -59,6 +61,7 @@ def _wide_table(metrics: Sequence[Metric]) -> Table:
     names = [f"[{index}]" for index in indices]
     made = table("Metrics by index", ("metric", *names, "unit"), right=names)
     for metric in metrics:
-        cells = [_number(metric.values[i], metric) if i in metric.values else "" for i in indices]
-        made.add_row(*map(Text, [metric.name, *cells, metric.unit]))
+        scale, unit = prefixed(metric.unit, metric.values.values())
+        cells = [_number(metric.values[i], metric, scale) if i in metric.values else "" for i in indices]
+        made.add_row(*map(Text, [metric.name, *cells, unit]))
     return made

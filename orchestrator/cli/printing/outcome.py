@@ -8,24 +8,30 @@ from typing import Any
 from rich.console import Console
 
 from ...evaluation import compare_metrics
-from ...run import CHECKPOINT_FILE, Run
+from ...run import CHECKPOINT_FILE, Run, StepChange, StepCheck
 from .console import and_figures, counted, open_console, say, show_notes
 from .metrics import show_metrics
-from .verdicts import by_source, show_published, show_requirements, summary
+from .tables import prefixed
+from .verdicts import by_source, not_judged_at_all, show_requirements, show_values, summary
+
+_OWN = "References (our own integrations)"
+_SHOWN = 3
+"""How many values beyond their bounds are named."""
 
 
-def show_run(outcome: Run, second: Run | None, quiet: bool) -> None:
-    """The end of a run, verdicts and files last; when quiet, only what went wrong, on stderr."""
+def show_run(outcome: Run, second: Run | None, step: StepCheck | None, quiet: bool) -> None:
+    """The end of a run, verdicts and files last; when quiet, only what went wrong, on stderr.
+
+    Args:
+        outcome: the run.
+        second: the same at half the step, where that was asked for.
+        step: what it shows, where it completed.
+        quiet: whether to say only what went wrong.
+    """
     system, out = outcome.system, open_console(stderr=quiet)
     if not quiet:
         _show_head(out, outcome)
-        if outcome.status != "failed":
-            other = second.metrics if second is not None and second.status == "completed" else None
-            show_metrics(out, outcome.metrics, () if other is None else compare_metrics(outcome.metrics, other))
-            if outcome.requirements:
-                show_requirements(out, outcome.requirements)
-        if outcome.published and outcome.status == "completed":
-            show_published(out, by_source(outcome.published))
+        _show_tables(out, outcome, second if step is not None else None)
         out.print()
     for note in outcome.notes:
         say(out, f"note: {note}", "bold red")
@@ -36,14 +42,48 @@ def show_run(outcome: Run, second: Run | None, quiet: bool) -> None:
         if outcome.directory is not None and (outcome.directory / CHECKPOINT_FILE).is_file():
             say(out, f"to go on from the last checkpoint: orchestrate run --resume {outcome.directory}", whole=True)
     else:
-        for line, bad in summary(outcome.requirements, outcome.published):
+        for line, bad in summary(outcome.requirements, [*outcome.published, *outcome.references]):
             if bad or not quiet:
                 say(out, line, "bold red" if bad else "green")
-    if second is not None and second.status != "completed":
+    if step is not None and (step.verdict != "fine" or not quiet):
+        say(out, _step_line(step), "green" if step.verdict == "fine" else "bold red")
+    elif second is not None and step is None:
         say(out, f"the run at half the step was {second.status}: nothing is compared", "bold red")
     if not quiet:
         files = f"results.csv, units.json, metrics.json, run.json{and_figures(len(outcome.figures))}"
         say(out, f"Files in {outcome.directory}: {files}", whole=True)
+
+
+def _show_tables(out: Console, outcome: Run, second: Run | None) -> None:
+    """Metrics, requirements, and values known before."""
+    if outcome.status != "failed":
+        compared = () if second is None else compare_metrics(outcome.metrics, second.metrics)
+        show_metrics(out, outcome.metrics, compared)
+        if outcome.requirements:
+            show_requirements(out, outcome.requirements)
+    for title, rows in (("Published values", outcome.published), (_OWN, outcome.references)):
+        if rows and outcome.status == "completed" and not not_judged_at_all(rows):
+            show_values(out, title, by_source(rows))
+
+
+def _step_line(found: StepCheck) -> str:
+    """The verdict on the step, with what decides it."""
+    line = f"the step of {found.step:g} s is {found.verdict}"
+    beyond = found.beyond
+    if not beyond and not found.requirements:
+        worst = next(iter(found.changes), None)
+        if worst is None:
+            return f"{line}: half of it changes no requirement's verdict, and there are no metrics"
+        return f"{line}: half of it changes {worst.name} most, by {_of_allowed(worst)}"
+    told = [f"{change.name} by {_of_allowed(change)}" for change in beyond[:_SHOWN]]
+    told += [f"the verdict of requirement {name}" for name in found.requirements]
+    more = f", and {len(beyond) - _SHOWN} more values" if len(beyond) > _SHOWN else ""
+    return f"{line}: half of it changes {', '.join(told)}{more}"
+
+
+def _of_allowed(change: StepChange) -> str:
+    scale, unit = prefixed(change.unit, [change.change, change.allowed])
+    return f"{abs(change.change) / scale:.2g} of {change.allowed / scale:.2g} {unit}".rstrip() + " allowed"
 
 
 def _coupling(how: Mapping[str, Any]) -> Iterator[str]:
@@ -75,8 +115,9 @@ def _show_head(out: Console, outcome: Run) -> None:
     say(out, "; ".join(facts), "dim")
     for line in _coupling(outcome.coupling):
         say(out, line, "dim")
-    if system.provenance.description:
-        say(out, system.provenance.description, "yellow" if "WARNING" in system.provenance.description else "")
+    if text := system.provenance.description:
+        before = "before the changes: " if system.provenance.modified else ""
+        say(out, before + text, "yellow" if "WARNING" in text else "")
     show_notes(out, outcome.checked.notes)
 
 

@@ -85,6 +85,22 @@ class _Teller(logging.Handler):
             self._show(printable(record.getMessage()))
 
 
+@contextmanager
+def show_cases(count: int, quiet: bool) -> Iterator[Callable[[str], None]]:
+    """One bar over many runs, on a terminal only; to be told what runs next. What is compiled is told as elsewhere."""
+    if quiet:
+        yield lambda _: None
+    elif sys.stderr.isatty():
+        columns = (BarColumn(), TextColumn("{task.completed} of {task.total}"), TextColumn("{task.description}"))
+        with Progress(*columns, TimeElapsedColumn(), console=open_console(stderr=True), transient=True) as bar:
+            task = bar.add_task("", total=count, completed=-1)
+            with _compilations(lambda what: bar.update(task, description=what)):
+                yield lambda title: bar.update(task, advance=1, description=title)
+    else:
+        with _compilations(tell):
+            yield lambda _: None
+
+
 def _lines(title: str, start: float, reached: float) -> OnProgress:
     told = 0
 

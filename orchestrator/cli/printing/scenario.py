@@ -9,7 +9,7 @@ from rich.console import Console
 from rich.text import Text
 
 from ...names import SignalName
-from ...system import Connection, Event, Instance, System
+from ...system import Connection, Event, Instance, Provenance, System
 from .console import counted, say
 from .tables import table
 
@@ -22,7 +22,6 @@ def show_system(out: Console, system: System) -> None:
         "": origin.description,
         "source": origin.source,
         "file": origin.path,
-        "presets": ", ".join(_default_marked(origin.presets, origin.default_preset)),
         "steps": f"{stepping.algorithm}, every {stepping.step:g} s from {stepping.start_time:g} to "
         f"{stepping.stop_time:g} s",
         "seed": f"{system.seed}",
@@ -30,14 +29,17 @@ def show_system(out: Console, system: System) -> None:
     for label, fact in facts.items():
         if fact:
             say(out, f"{label}: {fact}" if label else fact)
+    _show_rows(out, "Presets", ("name", "what it is"), _presets(origin))
     _show_rows(out, "Instances", ("name", "count", "model", "build arguments"), _instances(system.instances.values()))
     _show_rows(out, "Connections (input = output)", ("input", "output", "how"), _connections(system.connections))
     _show_rows(out, "Events", ("at", "signal", "what"), map(_event, system.events))
     _show_rows(out, "Requirements", ("name", "condition"), judged.requirements.items())
     _show_rows(out, "Metrics", ("name", "expression"), judged.metrics.items())
-    statuses = Counter(str(entry.get("status", "")) for entry in judged.published)
-    if statuses:
-        say(out, f"\nPublished values: {', '.join(f'{count} {status}' for status, count in statuses.items())}")
+    origins = Counter(str(entry["origin"]) for entry in judged.published)
+    if origins:
+        say(out, f"\nPublished values: {', '.join(f'{count} {origin}' for origin, count in origins.items())}")
+    if judged.references:
+        say(out, f"\nReferences (our own integrations): {len(judged.references)}")
     if judged.figures:
         say(out, "\nFigures", "bold")
         for figure in judged.figures:
@@ -55,8 +57,9 @@ def _show_rows(out: Console, title: str, columns: Sequence[str], rows: Iterable[
         out.print(made)
 
 
-def _default_marked(presets: Sequence[str], default: str | None) -> list[str]:
-    return [f"{name} (as it stands)" if name == default else name for name in presets]
+def _presets(origin: Provenance) -> list[tuple[str, str]]:
+    texts = origin.preset_descriptions
+    return [(name, "as it stands" if name == origin.default_preset else texts.get(name, "")) for name in origin.presets]
 
 
 def _instances(instances: Iterable[Instance]) -> list[tuple[str, str, str, str]]:

@@ -20,10 +20,15 @@ _COLOURS = {
     "inconclusive": "yellow",
     "reproduced": "green",
     "missed": "bold red",
+    "departs": "yellow",
+    "departs no more": "bold red",
     "not judged": "dim",
     "warning": "yellow",
     "skipped": "dim",
 }
+_PREFIXES = ((1e12, "T"), (1e9, "G"), (1e6, "M"), (1e3, "k"))
+_PREFIXED = {**dict.fromkeys(("J", "N", "W", "Pa", "V", "A", "Hz"), 1e3), "m": 1e6}
+"""The units that take a prefix, each with the size from which on it does."""
 PLAIN: Any = {"box": None, "pad_edge": False, "padding": (0, 2, 0, 0), "header_style": "underline"}
 SIDE_BY_SIDE = 8
 """How many columns, or names in a line, a reader still takes in."""
@@ -60,11 +65,20 @@ def verdict(word: str) -> Text:
     return Text(word, style=_COLOURS.get(word, ""))
 
 
-def number(value: float, unit: str) -> str:
-    """A metric's value; no time is ``never``, and no value a dash."""
+def prefixed(unit: str, values: Iterable[float]) -> tuple[float, str]:
+    """What to divide by so that the largest of some values needs no exponent, and the unit that goes with it."""
+    smallest = _PREFIXED.get(unit, math.inf)
+    size = max((abs(value) for value in values if math.isfinite(value)), default=0.0)
+    if size < smallest:
+        return 1.0, unit
+    return next((scale, prefix + unit) for scale, prefix in _PREFIXES if size >= scale)
+
+
+def number(value: float, unit: str, scale: float = 1.0) -> str:
+    """A metric's value, divided by `scale`; no time is ``never``, and no value a dash."""
     if math.isnan(value):
         return "-"
-    return "never" if math.isinf(value) and unit == "s" else f"{value:.6g}"
+    return "never" if math.isinf(value) and unit == "s" else f"{value / scale:.6g}"
 
 
 def show_reasons(out: Console, word: str, reasons: Iterable[tuple[str, str]]) -> None:

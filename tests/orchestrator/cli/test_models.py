@@ -51,6 +51,7 @@ component = "Gust"
 "train[3].disturbance" = "wind.acceleration"
 "train[1].disturbance" = { from = "wind.acceleration", scale = 2.0, delay = 1 }
 [presets.fast]
+description = "twice as fast"
 "train.speed" = 20.0
 [[events]]
 at = 3.0
@@ -64,7 +65,7 @@ slowest = "min(train[:].speed)"
 [[published]]
 metric = "slowest"
 value = 10.0
-status = "misprint"
+origin = "misprint"
 [[figures]]
 title = "Speed of all"
 y = ["train[:].speed"]
@@ -79,8 +80,10 @@ def test_describe_tells_what_a_scenario_holds(tmp_path, capsys, monkeypatch):
     wanted = [
         "Three trains",
         "source: nobody",
-        "presets: calm (as it stands), fast",
         "steps: gauss-seidel, every 0.5 s from 0 to 20 s",
+        "Presets",
+        "calm as it stands",
+        "fast twice as fast",
         "train 3 PointMassTrain",
         "train[i].disturbance wind.acceleration 2 times",
         "train[1].disturbance wind.acceleration times 2, 1 point later",

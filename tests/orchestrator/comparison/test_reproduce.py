@@ -31,14 +31,18 @@ start = "initial(train.speed)"
 metric = "start"
 value = 10.0
 tolerance = 0.5
-status = "stated"
+origin = "stated"
+[[references]]
+metric = "start"
+value = {own}
+tolerance = 0.5
 [[published]]
 metric = "start"
 preset = "fast"
 value = {fast}
 tolerance = 0.5
 claim = "a preset starts faster"
-status = "stated"
+origin = "stated"
 """
 
 
@@ -54,12 +58,12 @@ def a_pipe_of_the_usual_width() -> Iterator[None]:
 def shelf(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     """A folder in the place of the shipped scenarios, with one that reproduces."""
     monkeypatch.setattr(scenario, "MODELS", tmp_path)
-    (tmp_path / "one.toml").write_text(SCENARIO.format(fast=20.0))
+    (tmp_path / "one.toml").write_text(SCENARIO.format(fast=20.0, own=10.0))
     return tmp_path
 
 
 def test_a_case_is_a_scenario_with_a_preset_that_has_published_values(shelf: Path) -> None:
-    (shelf / "plain.toml").write_text(SCENARIO.partition("[[published]]")[0].format(fast=0))
+    (shelf / "plain.toml").write_text(SCENARIO.partition("[[published]]")[0].format(fast=0, own=0))
     assert [case.command for case in published_cases()] == ["orchestrate run one", "orchestrate run one --preset fast"]
     assert [case.system.provenance.preset for case in published_cases()] == ["calm", "fast"]
 
@@ -84,26 +88,50 @@ def test_the_command_of_every_shipped_case_loads_the_same_system() -> None:
         assert not again.provenance.modified
 
 
-def test_one_table_with_claim_published_measured_tolerance_and_verdict_under_the_command(
+def test_published_values_under_the_command_and_references_counted(
     shelf: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    assert call(["reproduce", "--quiet"]) == 0
+    assert call(["reproduce"]) == 0
     said = capsys.readouterr()
-    assert said.err == ""
+    assert said.err == ""  # progress is for a terminal
     lines = [line.rstrip() for line in said.out.splitlines() if line.strip()]
     assert lines[0] == "Published values"
-    assert lines[1].split() == ["claim", "published", "measured", "tolerance", "unit", "verdict"]
+    assert lines[1].split() == ["claim", "known", "measured", "tolerance", "unit", "verdict"]
     assert lines[2] == "orchestrate run one"
     assert lines[3].split() == ["start", "10", "10", "0.5", "m/s", "reproduced"]
     assert lines[4] == "orchestrate run one --preset fast"
     assert re.fullmatch(r"start: a preset starts faster +20 +20 +0\.5 +m/s +reproduced", lines[5])
-    assert lines[6:] == ["2 of 2 published values reproduced"]
+    assert lines[6:] == ["2 of 2 stated values reproduced", "1 of 1 reference values (our own) reproduced"]
+
+
+def test_quiet_is_one_line(shelf: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert call(["reproduce", "--quiet"]) == 0
+    assert capsys.readouterr().out == "reproduced: stated 2 of 2, reference 1 of 1\n"
 
 
 def test_a_missed_value_is_named_and_ends_with_1(shelf: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    (shelf / "one.toml").write_text(SCENARIO.format(fast=25.0))
+    (shelf / "one.toml").write_text(SCENARIO.format(fast=25.0, own=10.0))
     assert call(["reproduce"]) == 1
     said = capsys.readouterr()
     assert re.search(r"start: a preset starts faster +25 +20 +0\.5 +m/s +missed", said.out)
-    assert said.out.rstrip().endswith("1 of 2 published values reproduced; missed: start")
-    assert "one --preset fast: 100 % of 1 s" in said.err
+    assert "1 of 2 stated values reproduced; missed: start" in said.out
+
+
+def test_a_missed_reference_is_shown_though_the_others_are_not(shelf: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    (shelf / "one.toml").write_text(SCENARIO.format(fast=20.0, own=11.0))
+    for arguments, title in ((["reproduce"], "References that are missed"), (["reproduce", "-q"], "Missed")):
+        assert call(arguments) == 1
+        said = capsys.readouterr().out
+        assert title in said
+        assert re.search(r"^start +11 +10 +0\.5 +m/s +missed", said, re.MULTILINE)
+    assert said.rstrip().endswith("reproduced: stated 2 of 2, reference 0 of 1 (1 missed)")
+
+
+def test_what_departs_costs_nothing_until_it_holds(shelf: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    departs = SCENARIO.replace("value = {fast}", 'value = {fast}\ndeparts = "a typing error"')
+    (shelf / "one.toml").write_text(departs.format(fast=25.0, own=10.0))
+    assert call(["reproduce"]) == 0
+    assert "1 of 2 stated values reproduced; 1 departs as known" in capsys.readouterr().out
+    (shelf / "one.toml").write_text(departs.format(fast=20.0, own=10.0))
+    assert call(["reproduce"]) == 1
+    assert "departs no more: start" in capsys.readouterr().out

@@ -204,7 +204,6 @@ def test_times_may_be_computed():
         ("always", "an expression is empty"),
         ("always a[1].x <", "invalid syntax"),
         ("always a[1].x < 3 until", "'until' needs a time in seconds, as in until 210"),
-        ("always a[1].x < 3 from a[1].x", "a signal such as 'a[1].x' has no value before the run"),
         ("always a[1].x < 3 from 1 from 2", "'from' stands twice; keep one"),
         ("always a[1].x < 3 from 5 until 4", "'from 5 until 4' ends before it starts; swap the two"),
         ("always a[1].x < 3 outside 3", "'outside 3' is not a time window; write outside [210, 240]"),
@@ -217,6 +216,59 @@ def test_refused_with_the_remedy(text, message):
         parse_requirement("comfort", text)
     assert message in str(caught.value)
     assert check_requirements({"comfort": text}, ["a[1].x"]) == caught.value.at("requirement 'comfort'")
+
+
+def test_bounds_and_windows_are_read_from_parameters():
+    late = {"gust.start_time": 60.0, "gust.stop_time": 100.0, "law[1].limit": 60.0, "law[2].limit": 30.0}
+    text = "always a[i].x < law[i].limit outside [gust.start_time, gust.stop_time]"
+    verdict = judge(text, run(parameters=late))
+    assert (verdict.verdict, verdict.margin, verdict.time, verdict.index) == ("pass", 0.5, 59.5, 1)
+    assert judge(text, run(parameters={**late, "gust.start_time": 70.0})).verdict == "fail"
+    assert judge(text, run(parameters={**late, "law[2].limit": 10.0})).index == 2
+    rows = judge("always a[1:2].x < law[1:2].limit until gust.start_time / 2", run(parameters=late))
+    assert (rows.verdict, rows.margin, rows.index) == ("pass", 25.0, 2)
+    assert judge("always a[1].x < 200 from gust.start_time until 60", run(parameters=late)).points == 1
+
+
+def test_a_window_is_of_times_that_stand_still():
+    names, parameters = ["a[1].x", "a[2].x", "gust.start_time", "gust.stop_time"], ["gust.start_time", "gust.stop_time"]
+
+    def problems(text):
+        return [str(problem) for problem in check_requirements({"r": text}, names, True, parameters)]
+
+    assert problems("always a[1].x < 3 outside [gust.start_time, gust.stop_time + 1]") == []
+    place = "requirement 'r': 'a[1].x': "
+    assert problems("always a[1].x < 3 from a[1].x") == [f"{place}a time is a number or a parameter, not a signal"]
+    (near,) = problems("always a[1].x < 3 until gust.start_tim")
+    assert "did you mean 'gust.start_time'?" in near
+    (one,) = problems("always a[i].x < 3 until a[i].x")
+    assert "a time is one for all i" in one
+    backwards = run(parameters={"gust.start_time": 9.0, "gust.stop_time": 3.0})
+    verdict = judge("always a[1].x < 200 outside [gust.start_time, gust.stop_time]", backwards)
+    assert (verdict.verdict, verdict.reason) == ("inconclusive", "'outside [9, 3]' ends before it starts; swap the two")
+
+
+@pytest.mark.parametrize(
+    ("text", "verdict"),
+    [
+        ("always x.bit <= 0.3", "pass"),  # 0.1 + 0.2
+        ("always x.bit < 0.3", "fail"),
+        ("always 0.3 >= x.bit", "pass"),
+        ("always x.bit == 0.3", "pass"),
+        ("always x.bit != 0.3", "fail"),
+        ("always not x.bit > 0.3", "pass"),
+        ("always abs(x.far - x.near) <= 1000.1", "pass"),  # 50000.1 + 1000.1 - 50000.1, an ulp of 50 km beyond
+        ("always x.near - x.far + 1000.1 >= 0", "pass"),
+        ("always minimum(x.far - x.near, 1e9) <= 1000.1", "pass"),
+        ("always x.bit <= 0.3 - 1e-14", "fail"),  # that is more than rounding
+        ("always abs(x.far - x.near) <= 1000.1 - 1e-9", "fail"),
+    ],
+)
+def test_numbers_that_differ_by_rounding_are_equal(text, verdict):
+    signals = run().put("x.bit", 0.1 + 0.2).put("x.near", 50000.1).put("x.far", 50000.1 + 1000.1)
+    found = judge(text, signals)
+    assert found.verdict == verdict
+    assert found.margin == 0.0 or found.margin < -1e-15
 
 
 def test_all_problems_of_one_text_are_told():

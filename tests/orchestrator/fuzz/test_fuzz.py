@@ -81,7 +81,12 @@ metric = "n"
 preset = "b"
 value = 1.0
 tolerance = 0.5
-status = "stated"
+origin = "stated"
+
+[[references]]
+metric = "n"
+value = 1
+tolerance = { rounding = 0.5, sampling = 0.1 }
 
 [[figures]]
 title = "f"
@@ -298,7 +303,8 @@ def try_text(watched, tmp_path):
         if system is None:
             return
         again = loads(dump(system), path)
-        again.judged.published = system.judged.published  # those of other presets are left out
+        # those of other presets are left out
+        again.judged.published, again.judged.references = system.judged.published, system.judged.references
         assert comparable(again) == comparable(system)
         if checked:
             with Workspace() as place, contextlib.suppress(RailcosimError), watched(place.folder):

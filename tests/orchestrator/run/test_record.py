@@ -25,7 +25,7 @@ def files(tmp_path):
     system.judged.requirements["slow"] = "always train.speed <= 30"
     system.judged.metrics["end"] = "final(train.speed)"
     system.judged.published.append(
-        {"metric": "end", "value": 20.0, "tolerance": 5.0, "where": "here", "status": "stated"}
+        {"metric": "end", "value": 20.0, "tolerance": 5.0, "where": "here", "origin": "stated"}
     )
     result = run(system, kind="python", output=tmp_path)
     return result, *(json.loads((tmp_path / f"{name}.json").read_text()) for name in ("run", "metrics", "units"))
@@ -88,7 +88,10 @@ def test_metrics_verdicts_and_published_values(files):
     assert metrics["metrics"]["end"]["values"] == {"": result["train.speed"][-1]}
     assert [row["verdict"] for row in metrics["requirements"]] == ["pass"]
     assert metrics["status"] == "completed"
-    assert len(metrics["published"]) == 1
+    assert [(row["origin"], row["value"], row["verdict"]) for row in metrics["published"]] == [
+        ("stated", 20.0, "reproduced")
+    ]
+    assert metrics["references"] == []
 
 
 def test_no_part_file_is_left(files):

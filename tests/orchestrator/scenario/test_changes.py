@@ -4,7 +4,7 @@ from pathlib import Path
 
 import pytest
 from railcosim.orchestrator.errors import ScenarioError
-from railcosim.orchestrator.scenario.loading import loads
+from railcosim.orchestrator.scenario.loading import dump, loads
 
 EXAMPLE = Path(__file__).with_name("two_trains.toml").read_text(encoding="utf-8")
 
@@ -244,3 +244,16 @@ def test_a_profile_may_be_a_table():
     assert loads(text, preset="mixed").instances["target"].build == {"points": 1, "profile": {"a": [1, 2]}}
     made = loads(EXAMPLE, builds=["target.profile={ a = 1 }"])
     assert made.instances["target"].build == {"points": 2, "profile": {"a": 1}}
+
+
+def test_a_preset_says_what_it_is():
+    text = 'description = "two trains"\n' + EXAMPLE.replace(
+        "[presets.gentle]", '[presets.gentle]\ndescription = "gentler gains"'
+    )
+    for preset, said in ((None, "two trains"), ("nominal", "two trains"), ("gentle", "gentler gains"), ("mixed", "")):
+        system = loads(text, preset=preset)
+        assert system.provenance.description == said
+        assert system.provenance.preset_descriptions == {"gentle": "gentler gains", "mixed": ""}
+        assert loads(dump(system)).provenance.description == said
+    with pytest.raises(ScenarioError, match=r"presets.gentle.description: takes a text, not 3"):
+        loads(text.replace('"gentler gains"', "3"))

@@ -70,7 +70,8 @@ def test_the_whole_of_a_scenario():
     assert not system.provenance.modified
     assert system.provenance.text == EXAMPLE
     assert system.judged.requirements.keys() | system.judged.metrics.keys() == {"comfort", "settling", "gap"}
-    assert [entry["metric"] for entry in system.judged.published] == ["settling", "gap[2]"]
+    assert [entry["metric"] for entry in system.judged.published] == ["gap[2]"]
+    assert [entry["metric"] for entry in system.judged.references] == ["settling"]
     assert system.judged.figures[0]["title"] == "Speed"
     assert [(event.signal, event.action, event.at, event.every) for event in system.events] == [
         ("cruise[1].ahead_speed", "bias", 30.0, 20.0),
@@ -91,7 +92,7 @@ def test_origins_for_messages_of_later_checks():
     assert origins["simulation.step"] == "two.toml:6"
     assert origins["require.comfort"] == "two.toml:43"
     assert origins["metrics.gap"] == "two.toml:47"
-    assert origins["published[2]"] == "two.toml:56"
+    assert (origins["references[1]"], origins["published[1]"]) == ("two.toml:49", "two.toml:56")
     assert origins["figures[1]"] == "two.toml:62"
     assert (origins["events[1]"], origins["events[2]"]) == ("two.toml:66", "two.toml:74")
     assert origins["simulation.tolerances.train[1].speed"] == "two.toml:81"
@@ -184,13 +185,11 @@ def test_shipped_scenarios_open_with_source_and_expectation_and_load_under_every
         system = load(name, preset=preset)
         assert system.provenance.preset == preset
         assert not system.provenance.modified
-        owed = [
-            entry
-            for entry in system.judged.published
-            if entry.get("preset", system.provenance.default_preset) == preset
-        ]
         again = loads(dump(system))
-        system.judged.published = owed
+        system.judged.published, system.judged.references = (
+            [entry for entry in entries if entry.get("preset", system.provenance.default_preset) == preset]
+            for entries in (system.judged.published, system.judged.references)
+        )
         assert again == system
 
 

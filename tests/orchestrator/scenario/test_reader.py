@@ -292,19 +292,29 @@ MISTAKES = [
     (
         "tolerance = 1",
         "tolerence = 1",
-        "two.toml:53: published[1].tolerence: unknown key 'tolerence'; did you mean 'tolerance'?",
+        "two.toml:53: references[1].tolerence: unknown key 'tolerence'; did you mean 'tolerance'?",
     ),
     (
         '\npreset = "nominal"',
         '\npreset = "nominall"',
-        "two.toml:51: published[1].preset: unknown preset 'nominall'; did you mean 'nominal'?",
+        "two.toml:51: references[1].preset: unknown preset 'nominall'; did you mean 'nominal'?",
     ),
     (
         'metric = "gap[2]"',
         'metric = "gp[2]"',
-        "two.toml:57: published[2].metric: unknown metric 'gp'; did you mean 'gap'?",
+        "two.toml:57: published[1].metric: unknown metric 'gp'; did you mean 'gap'?",
     ),
-    ('status = "stated"', 'status = "sated"', "two.toml:60: published[2].status: status must be one of stated,"),
+    ('origin = "stated"', 'origin = "sated"', "two.toml:60: published[1].origin: origin must be one of stated,"),
+    (
+        'origin = "stated"',
+        'origin = "stated"\nstatus = "measured"',
+        "two.toml:61: published[1].status: unknown key 'status'; origin = one of stated, fitted, ",
+    ),
+    (
+        'where = "own integration"',
+        'origin = "reference"',
+        "two.toml:54: references[1].origin: unknown key 'origin'; a value of one's own has none",
+    ),
     ('y = ["train', 'z = ["train', "two.toml:64: figures[1].z: unknown key 'z'; valid here: title, y, x, label, "),
     ('"target.value"]', '"target.value +"]', "two.toml:64: figures[1].y: 'target.value +', column 1: invalid syntax"),
     ('"target.value"]', "3]", "two.toml:64: figures[1].y: takes expressions, texts, not 3"),
@@ -333,7 +343,7 @@ def test_all_problems_are_told_at_once_and_each_only_once():
 
 def test_a_preset_nobody_defined_is_told_once_for_all_published_values():
     text = edited(('default_preset = "nominal"\n', ""))
-    text += '\n[[published]]\nmetric = "settling"\npreset = "nominal"\nclaim = "x"\nstatus = "stated"\n'
+    text += '\n[[published]]\nmetric = "settling"\npreset = "nominal"\nclaim = "x"\norigin = "stated"\n'
     assert len([p for p in problems(text) if "nominal" in p]) == 1
 
 

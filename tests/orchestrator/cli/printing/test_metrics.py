@@ -53,3 +53,20 @@ def test_a_comparison_stands_beside_each_value(shown):
     lines = shown(show_metrics, [GAPS], [MetricChange("gap", 2, 17.3125, 17.3, "m")])
     assert ["gap[2]", "17.3125", "17.3", "-0.0125", "m"] in [line.split() for line in lines]
     assert ["gap[3]", "16.646", "m"] in [line.split() for line in lines]
+
+
+def test_large_energies_and_forces_take_a_prefix(shown):
+    energy = Metric("energy", "e(x)", {1: 14.117e9, 2: 990.0}, "J")
+    changes = [MetricChange("energy", 1, 14.117e9, 14.118e9, "J")]
+    rows = [line.split() for line in shown(show_metrics, [energy], changes)]
+    assert ["energy[1]", "14.117", "14.118", "+0.001", "GJ"] in rows
+    assert ["energy[2]", "9.9e-07", "GJ"] in rows
+    units = {"J": "990", "m": "990000", "kg": "400000"}
+    for unit, value in units.items():
+        assert ["x", value, unit] in [
+            line.split() for line in shown(show_metrics, [Metric("x", "", {None: float(value)}, unit)])
+        ]
+    assert ["x", "1.2", "kN"] in [line.split() for line in shown(show_metrics, [Metric("x", "", {None: 1200.0}, "N")])]
+    assert ["x", "never", "s"] in [
+        line.split() for line in shown(show_metrics, [Metric("x", "", {None: math.inf}, "s")])
+    ]

@@ -7,7 +7,7 @@ from functools import partial
 
 import pytest
 from railcosim.fmus import toolchain
-from railcosim.orchestrator.cli.printing import show_compilations, show_progress
+from railcosim.orchestrator.cli.printing import show_cases, show_compilations, show_progress
 
 
 class Terminal(io.StringIO):
@@ -56,3 +56,21 @@ def test_on_a_terminal_a_compilation_shows_its_time(monkeypatch):
         compile_something()
     assert "compiling for win64" in terminal.getvalue()
     assert "0:00:0" in terminal.getvalue()
+
+
+def test_the_bar_over_many_cases_is_for_a_terminal(capsys):
+    with show_cases(2, False) as tell:
+        tell("first")
+        compile_something()
+        tell("second")
+    assert capsys.readouterr() == ("", "Gust\\x1b[2J: compiling for win64\n")
+
+
+def test_on_a_terminal_the_bar_names_what_runs(monkeypatch):
+    terminal = Terminal()
+    monkeypatch.setattr(sys, "stderr", terminal)
+    with show_cases(2, False) as tell:
+        tell("first")
+        tell("second")
+    assert "1 of 2" in terminal.getvalue()
+    assert "second" in terminal.getvalue()

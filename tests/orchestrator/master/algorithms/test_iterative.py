@@ -17,7 +17,7 @@ from railcosim.orchestrator.master.coupling import Coupling
 from railcosim.orchestrator.master.settings import DEFAULT
 from railcosim.orchestrator.names import SignalName
 from railcosim.orchestrator.run.execution import execute, run
-from railcosim.orchestrator.system import Connection, System
+from railcosim.orchestrator.system import Connection, Judged, System
 from railcosim.orchestrator.wiring import Link
 
 # -------------------------------------------------------------------- from what was tried to what is tried next
@@ -221,7 +221,7 @@ def test_a_platoon_of_sampled_controllers_is_that_of_gauss_seidel():
     for algorithm in ("gauss-seidel", "iterative"):
         it = load("fault_tolerant_cruise")
         it.stepping.algorithm, it.stepping.stop_time = algorithm, 1.0
-        it.judged.requirements, it.judged.metrics, it.judged.published, it.judged.figures = {}, {}, [], []
+        it.judged = Judged()
         runs.append(run(it, kind="plain"))
     a, b = runs
     assert a.checked.order.late == ()
