@@ -62,13 +62,21 @@ def structure(component: Component) -> Structure:
         computed, initial = initial_dependencies(component)
         rates = rate_dependencies(component)
         started = {**computed, **initial}
-        return Structure(dependencies(component), rates, started, frozenset(computed), used_inputs(component))
+        return Structure(dependencies(component), rates, started, frozenset(computed), _used(component))
     except TracingError:
         if not component.requires:
             raise
         returned = evaluated(component, "initial")
         names = frozenset(n for s in component.of(State, Memory) if s.name in returned for n in s.scalars)
         return Structure(None, None, None, names, None)
+
+
+def _used(component: Component) -> Names | None:
+    """The inputs that are used; None where ``update`` or ``keep`` reads values as plain numbers, as it may."""
+    try:
+        return used_inputs(component)
+    except TracingError:
+        return None
 
 
 def write(component: Component, kind: FmuKind, digest: str) -> bytes:
