@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Any
 
 import typer
 
@@ -14,6 +14,8 @@ from .options import (
     FMU_FAILED,
     INTERRUPTED,
     OK,
+    Dpi,
+    FigureFormat,
     Kind,
     KindName,
     Preset,
@@ -24,6 +26,7 @@ from .options import (
     Stop,
     Swap,
     With,
+    draw_as,
     load_system,
 )
 from .printing import and_figures, open_console, say, show_comparison, show_progress
@@ -56,6 +59,8 @@ def compare(
         Path | None, typer.Option("--output", "-o", help="Directory; results/compare-<scenarios> by default.")
     ] = None,
     no_figures: Annotated[bool, typer.Option("--no-figures", help="Draw nothing.")] = False,
+    figure_format: FigureFormat = None,
+    dpi: Dpi = None,
     quiet: Quiet = False,
 ) -> None:
     """Run variants side by side: one table of metrics, a winner per row, overlaid figures.
@@ -73,6 +78,8 @@ def compare(
         stop_time=stop,
         step=step,
     )
+    for system in systems.values():
+        draw_as(system, figure_format, dpi)
     names = dict.fromkeys(system.provenance.name for system in systems.values())
     metrics = {name: text for system in systems.values() for name, text in system.judged.metrics.items()}
     directory = output or Path("results") / "-".join(["compare", *names])
@@ -119,6 +126,8 @@ def linearize(
         Path | None, typer.Option("--output", "-o", help="Directory; results/<scenario>-linear by default.")
     ] = None,
     no_figures: Annotated[bool, typer.Option("--no-figures", help="Draw nothing.")] = False,
+    figure_format: FigureFormat = None,
+    dpi: Dpi = None,
     quiet: Quiet = False,
 ) -> None:
     """Linearize the closed loop at a time of a run: eigenvalues, stability, step and Bode figures, string stability.
@@ -152,7 +161,8 @@ def linearize(
     directory = output or Path("results") / "-".join(filter(None, (system.provenance.name, preset, "linear")))
     directory.mkdir(parents=True, exist_ok=True)
     write_linear(directory, model, found, passings)
-    figures = [] if no_figures else draw_linear(model, found, passings, directory, duration=duration)
+    drawn: Any = {"duration": duration, "dpi": dpi} | ({"format": figure_format.value} if figure_format else {})
+    figures = [] if no_figures else draw_linear(model, found, passings, directory, **drawn)
     if not quiet:
         out = open_console()
         show_linear(out, model, found, passings)

@@ -8,6 +8,7 @@ from typing import Annotated, Any
 import typer
 
 from ..errors import ScenarioError
+from ..figures import written_as
 from ..master import ALGORITHMS
 from ..scenario import load, parse_value
 from ..system import System
@@ -65,6 +66,23 @@ Isolate = Annotated[
         "than the run.",
     ),
 ]
+
+
+class FormatName(StrEnum):
+    """`figures.FORMATS`, as the command line needs them."""
+
+    png = "png"
+    svg = "svg"
+    pdf = "pdf"
+
+
+FigureFormat = Annotated[
+    FormatName | None, typer.Option(help="How figures are written; as the scenario says, or png, by default.")
+]
+Dpi = Annotated[
+    float | None,
+    typer.Option(min=20, max=1200, help="Dots per inch of figures; as the scenario says, or 100, by default."),
+]
 Quiet = Annotated[bool, typer.Option("--quiet", "-q", help="Print nothing but errors.")]
 
 
@@ -101,3 +119,8 @@ def load_system(
         step=step,
         algorithm=algorithm,
     )
+
+
+def draw_as(system: System, format: FormatName | None, dpi: float | None) -> None:
+    """Let the figures of a system be written as the options say."""
+    system.judged.figures = written_as(system.judged.figures, format and format.value, dpi)

@@ -10,7 +10,7 @@ import typer
 from ..comparison import published_cases
 from ..errors import ScenarioError
 from ..evaluation import BAD, ComparedValue
-from ..figures import check_figures, draw
+from ..figures import check_figures, draw, written_as
 from ..isolation import isolate
 from ..run import (
     ROWS_FILE,
@@ -30,6 +30,8 @@ from .options import (
     INTERRUPTED,
     OK,
     Algorithm,
+    Dpi,
+    FigureFormat,
     Isolate,
     Kind,
     KindName,
@@ -40,6 +42,7 @@ from .options import (
     Stop,
     Swap,
     With,
+    draw_as,
     load_system,
 )
 from .printing import in_one_line, open_console, say, show_cases, show_progress, show_run, show_values, summary
@@ -82,6 +85,8 @@ def run(
         Path | None, typer.Option("--output", "-o", help="Directory for the results; results/<scenario> by default.")
     ] = None,
     no_figures: Annotated[bool, typer.Option("--no-figures", help="Draw nothing.")] = False,
+    figure_format: FigureFormat = None,
+    dpi: Dpi = None,
     quiet: Quiet = False,
 ) -> None:
     """Run a scenario: results, metrics, verdicts, figures.
@@ -93,7 +98,7 @@ def run(
     how: Any = {"figures": not no_figures, "threads": threads, "checkpoint_every": checkpoint_every}
     if resume_from is not None:
         given = (scenario, preset, settings or None, builds or None, swaps or None, step, algorithm, isolated or None)
-        if any(x is not None for x in (*given, output)) or kind is not KindName.auto or verify_step:
+        if any(x is not None for x in (*given, output, figure_format, dpi)) or kind is not KindName.auto or verify_step:
             raise ScenarioError(
                 "--resume takes the run as its directory has it: give no scenario and no change but --stop; --threads, "
                 "--checkpoint-every, --no-figures and --quiet may stand with it"
@@ -108,6 +113,7 @@ def run(
             raise ScenarioError("name a scenario (see 'orchestrate list'), or a run to go on with by --resume DIR")
         system = load_system(scenario, preset, settings, builds, swaps, stop=stop, step=step, algorithm=algorithm)
         system = isolate(system, isolated or ())
+        draw_as(system, figure_format, dpi)
         directory = output or Path("results") / "-".join(filter(None, (system.provenance.name, preset)))
         with show_progress(system.provenance.name, quiet, system.stepping.start_time) as progress:
             outcome = execute(system, kind=kind.value, output=directory, progress=progress, **how)
@@ -194,6 +200,8 @@ def plot(
         typer.Argument(help="Expressions such as 'train[:].speed'; without, the run's figures."),
     ] = None,
     output: Annotated[Path | None, typer.Option("--output", "-o", help="Where to draw; RESULTS by default.")] = None,
+    figure_format: FigureFormat = None,
+    dpi: Dpi = None,
 ) -> None:
     """Draw a run's figures again, or chosen signals.
 
@@ -209,5 +217,5 @@ def plot(
     figures = [{"title": ", ".join(signals), "y": signals}] if signals else loaded.figures
     directory = output or results
     directory.mkdir(parents=True, exist_ok=True)
-    for path in draw(figures, loaded, directory):
+    for path in draw(written_as(figures, figure_format and figure_format.value, dpi), loaded, directory):
         print(path)

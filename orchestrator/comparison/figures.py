@@ -15,16 +15,19 @@ import numpy as np
 
 from ..errors import ScenarioError
 from ..figures import (
+    COLOURS,
     DASHES,
     Curve,
-    colour,
+    Palette,
     colour_and_dashes,
     curves_of,
     draw_curves,
     file_name,
     legend,
+    member_colour,
     page,
     panels_of,
+    ranks,
     share_x,
     texts_of,
 )
@@ -33,7 +36,7 @@ from ..run import Results
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-_WIDTHS = (1.9, 1.5, 1.7, 1.4)
+_WIDTHS = (2.4, 1.9, 1.6, 1.3)
 
 
 @dataclass(frozen=True)
@@ -54,19 +57,40 @@ def draw_compared(figures: Sequence[Mapping[str, Any]], runs: Mapping[str, Resul
         The files.
     """
     paths: list[Path] = []
-    for figure in figures:
-        path = directory / file_name("", figure["title"], paths)
+    wanted = [(figure, [_lines(panel, runs) for panel in panels_of(figure)]) for figure in figures]
+    wanted = [(figure, found) for figure, found in wanted if any(found)]
+    palette = Palette(map(_curves, (found for _, found in wanted)))
+    for figure, found in wanted:
+        path = directory / file_name("", figure, paths)
         panels = panels_of(figure)
         shared = share_x(panels)
-        found = [_lines(panel, runs) for panel in panels]
-        if not any(found):
-            continue
         height = 4.4 if len(panels) == 1 else 0.7 + 2.6 * len(panels)
-        with page(figure["title"], len(panels), path, size=(9.0, height), share_x=shared) as axes:
+        size, dpi, colours = (9.0, height), figure.get("dpi"), _colours(_curves(found), palette)
+        with page(figure["title"], len(panels), path, size=size, share_x=shared, dpi=dpi) as axes:
+            above: list[Any] = []
             for ax, panel, lines in zip(axes, panels, found, strict=True):
-                _draw_panel(ax, panel, lines, runs, not shared or ax is axes[-1])
+                x_label = not shared or ax is axes[-1]
+                above = _draw_panel(ax, panel, lines, runs, x_label=x_label, colours=colours, above=above)
         paths.append(path)
     return paths
+
+
+def _curves(figure: Sequence[Sequence[_Line]]) -> list[list[Curve]]:
+    return [[line.curve for line in panel] for panel in figure]
+
+
+def _colours(figure: Sequence[Sequence[Curve]], palette: Palette) -> dict[Any, Any]:
+    """The colour of each thing in a figure; what is alone beside families is grey, as in the figures of a run."""
+    found = ranks(figure)
+    colours: dict[Any, Any] = {}
+    for panel in figure:
+        families = any(not curve.alone for curve in panel)
+        for c in panel:
+            if isinstance(c.thing, tuple):
+                colours[c.thing] = member_colour(c, found)
+            else:
+                colours.setdefault(c.thing, "#444444" if families else COLOURS[palette.place(c.thing) % len(COLOURS)])
+    return colours
 
 
 def _lines(panel: Mapping[str, Any], runs: Mapping[str, Results]) -> list[_Line]:
@@ -81,38 +105,48 @@ def _lines(panel: Mapping[str, Any], runs: Mapping[str, Results]) -> list[_Line]
 
 
 def _draw_panel(
-    ax: Axes, panel: Mapping[str, Any], lines: Sequence[_Line], runs: Mapping[str, Results], x_label: bool
-) -> None:
+    ax: Axes,
+    panel: Mapping[str, Any],
+    lines: Sequence[_Line],
+    runs: Mapping[str, Results],
+    *,
+    x_label: bool,
+    colours: Mapping[Any, Any],
+    above: list[Any],
+) -> list[Any]:
+    """Draw one panel; its legend is left out where the one above says the same. Returns what has been said."""
     if not lines:
         ax.set_visible(False)
-        return
+        return above
     names = list(runs)
-    labels = list(dict.fromkeys(line.curve.label for line in lines))
+    labels = {line.curve.label: colours[line.curve.thing] for line in lines}
     by_variant = len(labels) == 1 or len(names) > len(DASHES)
-    styled = [
-        (line.curve, _style(line.variant, labels.index(line.curve.label), len(labels), by_variant)) for line in lines
-    ]
+    styled = [(line.curve, _style(line.variant, labels[line.curve.label], by_variant)) for line in lines]
     draw_curves(ax, panel, styled, next(iter(runs.values())), x_label=x_label)
-    _legend(ax, labels, names, {line.variant for line in lines}, by_variant)
+    drawn = {line.variant for line in lines}
+    said = [labels, drawn, by_variant]
+    if said != above:
+        _legend(ax, labels, names, drawn, by_variant)
+    return said
 
 
-def _style(variant: int, label: int, labels: int, by_variant: bool) -> dict[str, Any]:
+def _style(variant: int, colour: Any, by_variant: bool) -> dict[str, Any]:
+    """First variants are widest: where lines hide each other, all show through the gaps of the next."""
     if by_variant:
-        return colour_and_dashes(variant)
-    return {"color": colour(label, labels), "linestyle": DASHES[variant % 4], "linewidth": _WIDTHS[variant % 4]}
+        return {**colour_and_dashes(variant), "linestyle": DASHES[variant % 4], "linewidth": _WIDTHS[variant % 4]}
+    return {"color": colour, "linestyle": DASHES[variant % 4], "linewidth": _WIDTHS[variant % 4]}
 
 
-def _legend(ax: Axes, labels: Sequence[str], names: Sequence[str], drawn: set[int], by_variant: bool) -> None:
+def _legend(ax: Axes, labels: Mapping[str, Any], names: Sequence[str], drawn: set[int], by_variant: bool) -> None:
     """Curves by colour, then variants by dashes; variants by colour where there is one curve each."""
     from matplotlib.lines import Line2D  # noqa: PLC0415
 
     handles = []
     if not by_variant:
-        handles += [Line2D([], [], color=colour(k, len(labels)), label=x) for k, x in enumerate(labels)]
+        handles += [Line2D([], [], color=colour, label=label) for label, colour in labels.items()]
     for k, name in enumerate(names):
         if k in drawn:
-            style = _style(k, 0, 1, by_variant) | ({} if by_variant else {"color": "#444444"})
-            handles.append(Line2D([], [], label=name, **style))
+            handles.append(Line2D([], [], label=name, **_style(k, "#444444", by_variant)))
     legend(ax, len(handles), handles=handles, handlelength=2.6)
 
 

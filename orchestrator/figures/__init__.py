@@ -3,14 +3,18 @@
 from .checking import check_figures
 from .curves import Curve, bracketed, curves_of
 from .drawing import draw, draw_curves, file_name
-from .panels import PANEL_KEYS, panels_of, share_x, texts_of
+from .palette import Palette, member_colour, ranks
+from .panels import FIGURE_KEYS, FORMATS, PANEL_KEYS, panels_of, share_x, texts_of, written_as
 from .style import COLOURS, DASHES, colour, colour_and_dashes, legend, page
 
 __all__ = [
     "COLOURS",
     "DASHES",
+    "FIGURE_KEYS",
+    "FORMATS",
     "PANEL_KEYS",
     "Curve",
+    "Palette",
     "bracketed",
     "check_figures",
     "colour",
@@ -20,8 +24,11 @@ __all__ = [
     "draw_curves",
     "file_name",
     "legend",
+    "member_colour",
     "page",
     "panels_of",
+    "ranks",
     "share_x",
     "texts_of",
+    "written_as",
 ]

@@ -8,10 +8,12 @@ import numpy as np
 from ..errors import ExpressionError
 from ..evaluation import FUNCTIONS, parse
 from ..problems import Problem, suggestion
-from .panels import PANEL_KEYS, bands_of, panels_of, texts_of
+from .marks import mark_problems, mark_texts
+from .panels import FIGURE_KEYS, FORMATS, PANEL_KEYS, X_KEYS, bands_of, numbers_in, panels_of, texts_of
 
 _FUNCTION_KEYS = ("name", "from", "to", "points")
 _MAX_POINTS = 100_000
+_LEAST_DPI, _MOST_DPI = 20, 1200
 
 
 def check_figures(
@@ -26,6 +28,7 @@ def check_figures(
         place = f"[[figures]] entry {number} ({figure.get('title', 'no title')})"
         if not isinstance(figure.get("title"), str) or not figure["title"].strip():
             problems.append(Problem(place, "title is missing", "it also names the file"))
+        problems += [problem.at(place) for problem in _file_problems(figure)]
         panels = figure.get("panels")
         if panels is None:
             problems += [problem.at(place) for problem in _panel_problems(figure, names, every_step)]
@@ -33,7 +36,7 @@ def check_figures(
         if not isinstance(panels, list) or not panels or not all(isinstance(panel, Mapping) for panel in panels):
             problems.append(Problem(place, "panels must be a list of tables, each with y"))
             continue
-        strange = [key for key in figure if key not in ("title", "x", "x_label", "x_range", "panels")]
+        strange = [key for key in figure if key not in ("title", *X_KEYS, *FIGURE_KEYS, "panels")]
         problems += [Problem(place, f"'{key}' belongs into the panels") for key in strange]
         for which, panel in enumerate(panels_of(figure), 1):
             inner = f"{place}, panel {which}"
@@ -41,8 +44,17 @@ def check_figures(
     return problems
 
 
+def _file_problems(figure: Mapping[str, Any]) -> Iterator[Problem]:
+    """How the figure is to be written."""
+    if figure.get("format", "png") not in FORMATS:
+        yield Problem("", f"format must be one of {', '.join(FORMATS)}, not {figure['format']!r}")
+    dpi = figure.get("dpi", 100)
+    if not (_is_number(dpi) and _LEAST_DPI <= dpi <= _MOST_DPI):
+        yield Problem("", f"dpi must be a number from {_LEAST_DPI} to {_MOST_DPI}, not {dpi!r}")
+
+
 def _panel_problems(panel: Mapping[str, Any], names: Collection[str], every_step: bool) -> Iterator[Problem]:
-    valid = (*PANEL_KEYS, "panels")
+    valid = (*PANEL_KEYS, "panels", *FIGURE_KEYS)
     for key in panel:
         if key not in valid:
             near = suggestion(key, valid) or f"there are {', '.join(valid)}"
@@ -52,6 +64,8 @@ def _panel_problems(panel: Mapping[str, Any], names: Collection[str], every_step
     variable = (str(function.get("name")),) if isinstance(function, Mapping) else ()
     texts = [*texts_of(panel.get("y")), *texts_of(function)]
     texts += [end for band in bands_of(panel) for end in band if isinstance(end, str)]
+    texts += [*mark_texts(panel), *numbers_in(str(panel.get("title", "")))]
+    yield from mark_problems(panel)
     for text in texts:
         try:
             expression = parse(text, FUNCTIONS)
@@ -74,9 +88,7 @@ def _shape_problems(panel: Mapping[str, Any]) -> Iterator[Problem]:
     for key in ("x_label", "y_label", "title"):
         if key in panel and not isinstance(panel[key], str):
             yield Problem("", f"{key} must be text")
-    for key in ("x_range", "y_range"):
-        if key in panel and not _is_range(panel[key]):
-            yield Problem("", f"{key} must be two rising numbers, as in {key} = [0, 90]")
+    yield from _axis_problems(panel)
     if "scale" in panel and not (_is_number(panel["scale"]) and panel["scale"] != 0):
         yield Problem("", "scale must be a number other than 0")
     elif "scale" in panel and "y_label" not in panel:
@@ -90,6 +102,18 @@ def _shape_problems(panel: Mapping[str, Any]) -> Iterator[Problem]:
     elif x is not None and not isinstance(x, str):
         function = '{ name = "d", from = 0, to = 1, points = 400 }'
         yield Problem("", f"x must be an expression, or {function} for a function plot")
+
+
+def _axis_problems(panel: Mapping[str, Any]) -> Iterator[Problem]:
+    for axis in ("x", "y"):
+        range_key, log_key = f"{axis}_range", f"{axis}_log"
+        logarithmic = panel.get(log_key, False)
+        if not isinstance(logarithmic, bool):
+            yield Problem("", f"{log_key} must be true or false")
+        if range_key in panel and not _is_range(panel[range_key]):
+            yield Problem("", f"{range_key} must be two rising numbers, as in {range_key} = [0, 90]")
+        elif logarithmic is True and range_key in panel and panel[range_key][0] <= 0:
+            yield Problem("", f"{range_key} must be positive on a logarithmic axis")
 
 
 def _function_problems(x: Mapping[str, Any]) -> Iterator[Problem]:

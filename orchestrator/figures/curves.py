@@ -21,15 +21,26 @@ Array = NDArray[np.float64]
 
 @dataclass(frozen=True)
 class Curve:
-    """One line: x and y of shape (T,), its label, which entry of `y` it comes from and which of its lines it is."""
+    """One line.
+
+    Attributes:
+        x, y: of shape (T,).
+        label: what the legend says of it. family: what it says where it has no room for each line of an entry.
+        entry: which entry of `y` it comes from. member: which of its lines it is. alone: the only one.
+        unit: of y.
+        thing: whom it is of, whatever it shows: the numbers of the train, of a gap those of the train behind it; of a
+            line that is alone its label.
+    """
 
     x: Array
     y: Array
     label: str
     entry: int
     member: int
-    alone: bool  # the only line of its entry
+    alone: bool
     unit: str
+    family: str = ""
+    thing: str | tuple[int, ...] = ""
 
 
 def curves_of(panel: Mapping[str, Any], signals: Signals) -> list[Curve]:
@@ -63,11 +74,18 @@ def _entry(x: Any, text: str, label: str, entry: int, signals: Signals) -> list[
         drawn += [
             (across[row], y[row], _label(expression, resolved, index, row, len(y)), unit) for row in range(len(y))
         ]
-    alone = len(drawn) == 1
+    alone, family = len(drawn) == 1, re.sub(r"\W*\{i\}", "", label) or _short(text)
     return [
-        Curve(abscissa, y, _named(label, own, alone, member), entry, member, alone, unit)
+        Curve(abscissa, y, named, entry, member, alone, unit, family, named if alone else _thing(own, member))
         for member, (abscissa, y, own, unit) in enumerate(drawn)
+        for named in (_named(label, own, alone, member),)
     ]
+
+
+def _thing(own: str, member: int) -> tuple[int, ...]:
+    """The numbers in a line's own label; of a range of them the last, as the gap belongs to the train behind."""
+    numbers = tuple(int(found.split("–")[-1].split(",")[-1]) for found in re.findall(r"\d+(?:[–,]\d+)*", own))
+    return numbers or (member + 1,)
 
 
 def _across(x: Any, signals: Signals, index: int | None, constants: Mapping[str, Any]) -> Array:

@@ -1,4 +1,4 @@
-"""The figures of a scenario (`[[figures]]`) as PNG files."""
+"""The figures of a scenario (`[[figures]]`) as files."""
 
 import itertools
 import re
@@ -10,14 +10,19 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ..errors import ExpressionError, ScenarioError
-from ..evaluation import FUNCTIONS, Signals, parse
+from ..evaluation import Signals
 from ..problems import Problem
 from .curves import Curve, curves_of, x_label_of, y_label_of
-from .panels import bands_of, panels_of, share_x
-from .style import DASHES, colour, colour_and_dashes, legend, page
+from .marks import draw_marks, number
+from .palette import Palette, member_colour, ranks
+from .panels import FORMATS, bands_of, numbers_in, panels_of, share_x
+from .style import DASHES, colour_and_dashes, legend, page, room
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
+
+_HIDDEN = 0.25
+"""Which part of a line must be hidden by another before they get dashes and widths."""
 
 
 def draw(figures: Sequence[Mapping[str, Any]], signals: Signals, directory: Path, prefix: str = "") -> list[Path]:
@@ -30,53 +35,66 @@ def draw(figures: Sequence[Mapping[str, Any]], signals: Signals, directory: Path
         ScenarioError: some figures could not be drawn; the others were.
     """
     paths: list[Path] = []
-    problems: list[Problem] = []
-    for figure in figures:
-        path = directory / file_name(prefix, figure["title"], paths)
+    problems: dict[int, list[Problem]] = {}
+    found: dict[int, list[list[Curve]]] = {}
+    for k, figure in enumerate(figures):
         try:
-            _draw_one(figure, signals, path)
+            found[k] = [curves_of(panel, signals) for panel in panels_of(figure)]
         except ExpressionError as error:
-            problems += error.at(f"figure '{figure['title']}' was not drawn")
+            problems[k] = error.at(_not_drawn(figure))
+    palette = Palette(found.values())
+    for k, curves in found.items():
+        path = directory / file_name(prefix, figures[k], paths)
+        try:
+            _draw_one(figures[k], curves, signals, palette, path)
+        except ExpressionError as error:
+            problems[k] = error.at(_not_drawn(figures[k]))
         except ValueError as error:  # mathematics in a label that matplotlib cannot set
-            problems.append(Problem(f"figure '{figure['title']}' was not drawn", str(error)))
+            problems[k] = [Problem(_not_drawn(figures[k]), str(error))]
         else:
             paths.append(path)
     if problems:
-        raise ScenarioError(problems)
+        raise ScenarioError([problem for k in sorted(problems) for problem in problems[k]])
     return paths
 
 
-def file_name(prefix: str, title: str, taken: Sequence[Path]) -> str:
-    """A plain ASCII name out of a title; numbered where two titles give the same."""
-    plain = unicodedata.normalize("NFKD", title).encode("ascii", "ignore").decode().lower()
+def _not_drawn(figure: Mapping[str, Any]) -> str:
+    return f"figure '{figure['title']}' was not drawn"
+
+
+def file_name(prefix: str, figure: Mapping[str, Any], taken: Sequence[Path]) -> str:
+    """A plain ASCII name out of a figure's title, in its format; numbered where two titles give the same."""
+    plain = unicodedata.normalize("NFKD", figure["title"]).encode("ascii", "ignore").decode().lower()
     stem = prefix + (re.sub(r"[^a-z0-9]+", "-", plain).strip("-")[:80] or "figure")
-    names = {path.name for path in taken}
+    names = {path.stem for path in taken}
     tries = itertools.chain([stem], (f"{stem}-{number}" for number in itertools.count(2)))
-    return next(f"{name}.png" for name in tries if f"{name}.png" not in names)
+    return f"{next(name for name in tries if name not in names)}.{figure.get('format', FORMATS[0])}"
 
 
-def _draw_one(figure: Mapping[str, Any], signals: Signals, path: Path) -> None:
+def _draw_one(
+    figure: Mapping[str, Any], curves: Sequence[Sequence[Curve]], signals: Signals, palette: Palette, path: Path
+) -> None:
     panels = panels_of(figure)
     shared = share_x(panels)
     height = 4.0 if len(panels) == 1 else 0.7 + 2.3 * len(panels)
-    with page(figure["title"], len(panels), path, size=(8.5, height), share_x=shared) as axes:
+    size, dpi = (8.5, height), figure.get("dpi")
+    styles = _styles(curves, palette, room(len(panels), height))
+    with page(figure["title"], len(panels), path, size=size, share_x=shared, dpi=dpi) as axes:
         above: dict[str, Any] = {}
-        for ax, panel in zip(axes, panels, strict=True):
-            above = _draw_panel(ax, panel, signals, above, x_label=not shared or ax is axes[-1])
+        for ax, panel, styled in zip(axes, panels, styles, strict=True):
+            draw_curves(ax, panel, styled, signals, x_label=not shared or ax is axes[-1])
+            above = _legend(ax, panel, [style for _, style in styled], above)
 
 
-def _draw_panel(
-    ax: "Axes", panel: Mapping[str, Any], signals: Signals, above: dict[str, Any], x_label: bool
+def _legend(
+    ax: "Axes", panel: Mapping[str, Any], styles: Sequence[Mapping[str, Any]], above: dict[str, Any]
 ) -> dict[str, Any]:
-    """Draw one panel. Its legend (label: line style) is left out where the one above says the same; returns it."""
-    curves = curves_of(panel, signals)
-    styles = [_line(curve, curves) for curve in curves]
-    draw_curves(ax, panel, zip(curves, styles, strict=True), signals, x_label=x_label)
-    said = {curve.label: style for curve, style in zip(curves, styles, strict=True)}
+    """Say what the lines are, but where the legend above says the same; returns what has been said."""
+    said = {style["label"]: {**style} for style in styles if not style["label"].startswith("_")}
     if said.items() <= above.items():
         return above
-    if len(curves) > 1 or "label" in panel:
-        legend(ax, len(curves))
+    if len(styles) > 1 or "label" in panel:
+        legend(ax, len(said))
     return said
 
 
@@ -88,27 +106,34 @@ def draw_curves(
     *,
     x_label: bool,
 ) -> None:
-    """Draw a panel without its legend: curves, bands, labels, ranges.
+    """Draw a panel without its legend: curves, bands, marks, labels, ranges.
 
     Args:
         ax: to draw into.
         panel: the table.
         styled: curves, each with what matplotlib is to know of its line.
-        signals: what bands and x are expressions of.
+        signals: what bands, marks and x are expressions of.
         x_label: whether x is labelled here.
     """
     scale = float(panel.get("scale", 1.0))
     curves = []
     for curve, style in styled:
-        ax.plot(curve.x, scale * curve.y, label=curve.label, **style)
+        ax.plot(curve.x, scale * curve.y, **{"label": curve.label, **style})
         curves.append(curve)
+    for axis, set_scale in (("x", ax.set_xscale), ("y", ax.set_yscale)):
+        if panel.get(f"{axis}_log"):
+            set_scale("log", nonpositive="mask")
     for band in bands_of(panel):
-        _draw_band(ax, [scale * _level(end, signals) for end in band])
-    ax.set_title(panel.get("title", ""))
+        _draw_band(ax, [scale * number(end, signals) for end in band])
+    title = panel.get("title", "")
+    for text in numbers_in(title):
+        title = title.replace(f"{{{text}}}", f"{number(text, signals):.4g}")
+    ax.set_title(title)
     ax.set_ylabel(panel.get("y_label", y_label_of(panel, curves)))
     if x_label:
         ax.set_xlabel(panel.get("x_label", x_label_of(panel, signals)))
     _set_ranges(ax, panel)
+    draw_marks(ax, panel, signals, scale)
 
 
 def _set_ranges(ax: "Axes", panel: Mapping[str, Any]) -> None:
@@ -120,7 +145,7 @@ def _set_ranges(ax: "Axes", panel: Mapping[str, Any]) -> None:
         lines = [np.asarray(line.get_data(), dtype=np.float64) for line in ax.get_lines()]
         seen = [y[(x >= low) & (x <= high) & np.isfinite(y)] for x, y in lines if x.size > 2]
         values = np.concatenate([*seen, np.empty(0)])
-        if values.size and np.ptp(values) > 0:  # matplotlib would scale to what lies outside, too
+        if values.size and np.ptp(values) > 0 and not panel.get("y_log"):  # matplotlib would scale to what lies outside
             margin = 0.05 * np.ptp(values)
             ax.set_ylim(values.min() - margin, values.max() + margin)
     if "y_range" in panel:
@@ -135,22 +160,50 @@ def _draw_band(ax: "Axes", levels: list[float]) -> None:
         ax.axhline(level, color="#777777", linewidth=1.0, linestyle=(0, (6, 3)), zorder=1.5)
 
 
-def _level(end: str | float, signals: Signals) -> float:
-    """The number that an end of a band stands for."""
-    value = parse(end, FUNCTIONS).evaluate(signals) if isinstance(end, str) else end
-    if isinstance(value, np.ndarray):
-        raise ExpressionError(Problem("", f"the band '{end}' varies over time", "draw it as an entry of y"))
-    return float(value)
+def _styles(
+    figure: Sequence[Sequence[Curve]], palette: Palette, lines: int
+) -> list[list[tuple[Curve, dict[str, Any]]]]:
+    """How each curve of a figure looks; `lines` is what a legend has room for beside a panel."""
+    found, hidden = ranks(figure), any(map(_hide, figure))
+    made = []
+    for panel in figure:
+        families = list(dict.fromkeys(c.entry for c in panel if not c.alone))
+        whole = len(families) > 1 and len(panel) > lines
+        lone = [c.entry for c in panel if c.alone]
+        styles = []
+        for curve in panel:
+            if not families:
+                style = colour_and_dashes(palette.place(curve.label))
+                if hidden and len(lone) > 1:
+                    style |= _over(lone.index(curve.entry), len(lone), palette.place(curve.label))
+            elif curve.alone:
+                style = {"color": "#444444", "linestyle": DASHES[1 + lone.index(curve.entry) % 3], "linewidth": 1.3}
+            elif whole:
+                style = colour_and_dashes(families.index(curve.entry))
+            else:
+                dashes = DASHES[families.index(curve.entry) % 4]
+                style = {"color": member_colour(curve, found), "linestyle": dashes}
+            label = curve.label if curve.alone or not whole else curve.family if not curve.member else "_"
+            styles.append((curve, {**style, "label": label}))
+        made.append(styles)
+    return made
 
 
-def _line(curve: Curve, curves: Sequence[Curve]) -> dict[str, Any]:
-    """Colour by member (train), dashes by entry; single lines beside families are black and dashed."""
-    families = [c.entry for c in curves if not c.alone]
-    if not families:
-        return colour_and_dashes(curve.entry)
-    order = list(dict.fromkeys(families))
-    if curve.alone:
-        lone = list(dict.fromkeys(c.entry for c in curves if c.alone)).index(curve.entry)
-        return {"color": "#444444", "linestyle": DASHES[1 + lone % 3], "linewidth": 1.3}
-    members = max(c.member for c in curves) + 1
-    return {"color": colour(curve.member, members), "linestyle": DASHES[order.index(curve.entry) % 4]}
+def _over(k: int, count: int, place: int) -> dict[str, Any]:
+    """The k-th of lines that hide each other: the first is widest, and all show through the gaps of the others."""
+    return {"linewidth": 3.2 - 2.0 * k / (count - 1), "linestyle": DASHES[1 + (place - 1) % 3] if place else "-"}
+
+
+def _hide(panel: Sequence[Curve]) -> bool:
+    """Whether lines that are told apart by colour alone run within each other for a quarter of the panel."""
+    alone = [curve for curve in panel if curve.alone]
+    if len(alone) < len(panel):
+        return False
+    values = np.concatenate([curve.y[np.isfinite(curve.y)] for curve in alone] or [np.empty(0)])
+    near = 0.01 * np.ptp(values) if values.size else 0.0
+    return any(
+        a.y.shape == b.y.shape
+        and (both := np.isfinite(a.y) & np.isfinite(b.y)).any()
+        and (np.abs(a.y[both] - b.y[both]) <= near).mean() > _HIDDEN
+        for a, b in itertools.combinations(alone, 2)
+    )

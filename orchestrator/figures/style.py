@@ -34,14 +34,28 @@ _STYLE: Any = {  # matplotlib's own type for this is a list of every key it know
     "ytick.color": "#555555",
     "xtick.labelcolor": "black",
     "ytick.labelcolor": "black",
+    "svg.hashsalt": "railcosim",  # or the same picture would be another file each time
 }
+_NAMELESS: Any = {
+    ".png": {"Software": None},
+    ".svg": {"Date": None, "Creator": None},
+    ".pdf": {"CreationDate": None, "Creator": None, "Producer": None},
+}
+DPI = 100.0
 
 
 @contextmanager
 def page(
-    title: str, panels: int, path: Path, *, size: tuple[float, float], title_size: float = 11.5, share_x: bool = False
+    title: str,
+    panels: int,
+    path: Path,
+    *,
+    size: tuple[float, float],
+    title_size: float = 11.5,
+    share_x: bool = False,
+    dpi: float | None = None,
 ) -> Iterator[list[Axes]]:
-    """The axes of a figure to draw into, which is written as PNG file at the end.
+    """The axes of a figure to draw into, which is written at the end in the format of the file's ending.
 
     Args:
         title: above all panels.
@@ -50,17 +64,18 @@ def page(
         size: width and height in inches.
         title_size: in points.
         share_x: whether all panels have the x axis of the last.
+        dpi: dots per inch, `DPI` by default; of a vector format it only matters to what it shows as an image.
     """
     import matplotlib as mpl  # noqa: PLC0415
     from matplotlib.backends.backend_agg import FigureCanvasAgg  # noqa: PLC0415
     from matplotlib.figure import Figure  # noqa: PLC0415
 
     with mpl.rc_context(_STYLE):
-        figure = Figure(figsize=size, dpi=100, layout="constrained")
+        figure = Figure(figsize=size, dpi=dpi or DPI, layout="constrained")
         FigureCanvasAgg(figure)
         figure.suptitle(title, x=0.01, ha="left", fontsize=title_size, fontweight="bold")
         yield list(figure.subplots(panels, 1, sharex=share_x, squeeze=False)[:, 0])
-        figure.savefig(path, metadata={"Software": None})
+        figure.savefig(path, metadata=_NAMELESS[path.suffix])
 
 
 def colour(k: int, count: int) -> Any:
@@ -77,6 +92,14 @@ def colour_and_dashes(k: int) -> dict[str, Any]:
     return {"color": COLOURS[k % len(COLOURS)], "linestyle": DASHES[k // len(COLOURS) % 4]}
 
 
+def room(panels: int, height: float) -> int:
+    """How many lines a legend may have beside one of the panels of a page of that height in inches."""
+    return max(2, int((height / panels - (0.9 if panels == 1 else 0.35)) / 0.19))
+
+
 def legend(ax: Axes, count: int, **more: Any) -> None:
-    """A legend of `count` lines beside the axes, where it hides no data."""
-    ax.legend(loc="upper left", bbox_to_anchor=(1.01, 1.02), borderaxespad=0.0, ncols=1 + (count - 1) // 14, **more)
+    """A legend of `count` lines beside the axes, where it hides no data; in columns where the panel is not as high."""
+    canvas: Any = ax.figure
+    lines = room(len(canvas.axes), canvas.get_figheight())
+    columns = 1 + (count - 1) // lines
+    ax.legend(loc="upper left", bbox_to_anchor=(1.01, 1.02), borderaxespad=0.0, ncols=columns, **more)

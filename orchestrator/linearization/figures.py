@@ -4,16 +4,17 @@ from __future__ import annotations
 
 import itertools
 import re
-from collections.abc import Sequence
-from contextlib import AbstractContextManager
+from collections.abc import Iterator, Sequence
+from contextlib import AbstractContextManager, contextmanager
+from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Protocol
 
 import numpy as np
 
 from ...fmus.units import BASE
 from ...fmus.units import parse as parse_unit
-from ..figures import COLOURS, DASHES, bracketed, colour, legend, page
+from ..figures import COLOURS, DASHES, FORMATS, bracketed, colour, legend, page
 from ..names import SignalName
 from .blocks import Array
 from .closed_loop import Linearization
@@ -34,6 +35,8 @@ def draw_linear(
     directory: Path,
     *,
     duration: float | None = None,
+    format: str = FORMATS[0],
+    dpi: float | None = None,
 ) -> list[Path]:
     """Draw all figures into a directory.
 
@@ -43,19 +46,22 @@ def draw_linear(
         passings: its string stability; empty where there are no trains in a row.
         directory: it exists.
         duration: of the step responses, s.
+        format: one of `figures.FORMATS`.
+        dpi: dots per inch.
 
     Returns:
         The files.
     """
+    page = partial(_page, directory, format=format, dpi=dpi)
     title = f"{model.system.provenance.title or model.system.provenance.name}\nLinear at t = {model.time:g} s"
-    paths = [_poles(stability, title, directory / "eigenvalues.png")]
+    paths = [_poles(stability, title, page)]
     if not model.inputs:
         return paths
     for index in _stepped_inputs(model):
-        paths.append(_steps(model, index, duration or default_duration(model), title, directory))
-    paths.append(_bode(model, title, directory / "bode.png"))
+        paths.append(_steps(model, index, duration or default_duration(model), title, page))
+    paths.append(_bode(model, title, page))
     if passings:
-        paths.append(_string(model, passings, title, directory / "string-stability.png"))
+        paths.append(_string(model, passings, title, page))
     return paths
 
 
@@ -89,9 +95,31 @@ def _families(model: Linearization) -> dict[str, list[tuple[str, Array, str]]]:
     return dict(list(found.items())[:_MOST_FAMILIES])
 
 
-def _page(title: str, panels: int, path: Path) -> AbstractContextManager[list[Axes]]:
+def _shades(families: dict[str, list[tuple[str, Array, str]]]) -> dict[str, Any]:
+    """The colour of each label: the same for a train in all panels, and for the gap in front of it."""
+    labels = [label for curves in families.values() for label, _, _ in curves]
+    things = {label: re.split(r" – ", label)[-1].split()[-1] for label in labels}
+    numbered = sorted({thing for thing in things.values() if thing.isdigit()}, key=int)
+    order = {thing: k for k, thing in enumerate(numbered)}
+    for thing in things.values():
+        order.setdefault(thing, len(order))
+    return {label: colour(order[thing], len(order)) for label, thing in things.items()}
+
+
+class _Page(Protocol):
+    """Opens a page: its file's name without ending, its title and the number of its panels."""
+
+    def __call__(self, name: str, title: str, panels: int) -> AbstractContextManager[tuple[Path, list[Axes]]]: ...
+
+
+@contextmanager
+def _page(
+    directory: Path, name: str, title: str, panels: int, *, format: str, dpi: float | None
+) -> Iterator[tuple[Path, list[Axes]]]:
+    path = directory / f"{name}.{format}"
     height = 4.2 if panels == 1 else 1.0 + 2.2 * panels
-    return page(title, panels, path, size=(8.5, height), title_size=10.5)
+    with page(title, panels, path, size=(8.5, height), title_size=10.5, dpi=dpi) as axes:
+        yield path, axes
 
 
 def _legend(ax: Axes, count: int) -> None:
@@ -99,9 +127,9 @@ def _legend(ax: Axes, count: int) -> None:
         legend(ax, count)
 
 
-def _poles(stability: Stability, title: str, path: Path) -> Path:
+def _poles(stability: Stability, title: str, page: _Page) -> Path:
     """Eigenvalues in the s plane; of a pair both. Modes that are gone after one step have no place in it."""
-    with _page(f"{title}: eigenvalues", 1, path) as axes:
+    with page("eigenvalues", f"{title}: eigenvalues", 1) as (path, axes):
         ax = axes[0]
         for seen, mark, label in ((True, "x", "seen in the outputs"), (False, "+", "not seen")):
             poles = [m.pole for m in stability.modes if m.seen == seen and abs(m.pole) < np.inf]
@@ -119,16 +147,17 @@ def _poles(stability: Stability, title: str, path: Path) -> Path:
     return path
 
 
-def _steps(model: Linearization, index: int, duration: float, title: str, directory: Path) -> Path:
+def _steps(model: Linearization, index: int, duration: float, title: str, page: _Page) -> Path:
     name, unit = model.inputs[index], model.units.get(model.inputs[index], "")
     families = _families(model)
     times, found = step_response(model, index, duration)
-    path = directory / f"step-{re.sub(r'[^a-z0-9]+', '-', name.lower()).strip('-')}.png"
-    with _page(f"{title}: step of 1 {unit} at {name}", len(families), path) as axes:
+    file = f"step-{re.sub(r'[^a-z0-9]+', '-', name.lower()).strip('-')}"
+    shades = _shades(families)
+    with page(file, f"{title}: step of 1 {unit} at {name}", len(families)) as (path, axes):
         for ax, (panel, curves) in zip(axes, families.items(), strict=True):
-            for k, (label, row, _) in enumerate(curves):
+            for label, row, _ in curves:
                 style: Any = {"drawstyle": "steps-post"} if model.step is not None and len(times) < 200 else {}
-                ax.plot(times, row @ found, label=label, color=colour(k, len(curves)), **style)
+                ax.plot(times, row @ found, label=label, color=shades[label], **style)
             ax.set_ylabel(f"{panel} {bracketed(curves[0][2])}".rstrip())
             ax.margins(x=0.01)
             _legend(ax, len(curves))
@@ -136,18 +165,19 @@ def _steps(model: Linearization, index: int, duration: float, title: str, direct
     return path
 
 
-def _bode(model: Linearization, title: str, path: Path) -> Path:
+def _bode(model: Linearization, title: str, page: _Page) -> Path:
     index, frequencies = default_input(model), default_frequencies(model)
     response = FrequencyResponse(model)(frequencies, index)
     families = {k: v for k, v in _families(model).items() if any(np.abs(row @ response).any() for _, row, _ in v)}
-    with _page(f"{title}: frequency response to {model.inputs[index]}", 2 * len(families), path) as axes:
+    shades = _shades(families)
+    with page("bode", f"{title}: frequency response to {model.inputs[index]}", 2 * len(families)) as (path, axes):
         for k, (panel, curves) in enumerate(families.items()):
             size, phase = axes[2 * k : 2 * k + 2]
-            for n, (label, row, _) in enumerate(curves):
+            for label, row, _ in curves:
                 g = row @ response
                 if not np.abs(g).any():
                     continue
-                style: Any = {"label": label, "color": colour(n, len(curves)), "linestyle": DASHES[0]}
+                style: Any = {"label": label, "color": shades[label], "linestyle": DASHES[0]}
                 size.loglog(frequencies, np.abs(g), **style)
                 phase.semilogx(frequencies, np.degrees(np.unwrap(np.angle(g))), **style)
             ratio = unit_of_ratio(curves[0][2], model.units.get(model.inputs[index], ""))
@@ -179,10 +209,10 @@ def unit_of_ratio(output: str, input: str) -> str:
     return "/".join([".".join(top) or "1", *([lower] if lower else [])])
 
 
-def _string(model: Linearization, passings: Sequence[Passing], title: str, path: Path) -> Path:
+def _string(model: Linearization, passings: Sequence[Passing], title: str, page: _Page) -> Path:
     quantities = list(dict.fromkeys(passing.quantity for passing in passings))
     heading = f"{title}: string stability under {model.inputs[default_input(model)]}"
-    with _page(heading, len(quantities), path) as axes:
+    with page("string-stability", heading, len(quantities)) as (path, axes):
         for ax, quantity in zip(axes, quantities, strict=True):
             mine = [passing for passing in passings if passing.quantity == quantity]
             for k, passing in enumerate(mine):

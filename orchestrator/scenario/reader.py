@@ -9,7 +9,7 @@ from typing import Any
 
 from ..errors import ExpressionError, ScenarioError
 from ..evaluation import FUNCTIONS, check_entry, parse, parse_requirement
-from ..figures import PANEL_KEYS
+from ..figures import FIGURE_KEYS, PANEL_KEYS
 from ..names import SignalName
 from ..problems import Problem, suggestion
 from ..system import Connection
@@ -139,7 +139,7 @@ class Reader:
         found = self.tables("figures")
         for k, figure in enumerate(found):
             place = ("figures", k)
-            self._panel(figure, (*PANEL_KEYS, "panels"), *place)
+            self._panel(figure, (*PANEL_KEYS, *FIGURE_KEYS, "panels"), *place)
             if not is_plain(figure, tables=True):
                 self.problem(
                     "takes numbers, texts, true or false, lists and tables of these", *place, remedy="no dates"

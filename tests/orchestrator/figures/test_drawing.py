@@ -4,7 +4,7 @@ import matplotlib.image
 import numpy as np
 import pytest
 from railcosim.orchestrator.errors import ScenarioError
-from railcosim.orchestrator.figures import draw
+from railcosim.orchestrator.figures import draw, written_as
 
 GAP = "train[i-1].position - train[i].position"
 
@@ -96,4 +96,46 @@ def test_one_bad_figure_does_not_cost_the_others(tmp_path, recorded):
     assert "figure 'Bad' was not drawn: " in first
     assert "did you mean 'target.value'?" in first
     assert "figure 'Mathematics' was not drawn: " in second
-    assert "the band 'train[1].speed' varies over time; draw it as an entry of y" in third
+    assert "'train[1].speed' varies over time; draw it as an entry of y" in third
+
+
+def test_a_figure_is_written_in_the_format_and_resolution_it_asks_for(tmp_path, recorded):
+    figures = [{"title": "S", "y": ["train[:].speed"], "format": format, "dpi": 50} for format in ("png", "svg", "pdf")]
+    paths = draw(figures, recorded, tmp_path)
+    assert [path.suffix for path in paths] == [".png", ".svg", ".pdf"]
+    assert matplotlib.image.imread(paths[0]).shape == (200, 425, 4)
+    assert paths[1].read_text(encoding="utf-8").startswith("<?xml")
+    assert paths[2].read_bytes().startswith(b"%PDF")
+    first = [path.read_bytes() for path in paths]
+    assert [path.read_bytes() for path in draw(figures, recorded, tmp_path)] == first
+
+
+def test_options_take_the_place_of_what_figures_ask_for():
+    figures = [{"title": "A", "format": "pdf"}, {"title": "B"}]
+    assert written_as(figures, None, None) == figures
+    assert written_as(figures, "svg", 200.0) == [{"title": name, "format": "svg", "dpi": 200.0} for name in "AB"]
+
+
+def test_a_logarithmic_axis_shows_what_is_positive(drawn):
+    (ax,) = drawn(y=["train[1].speed"], y_log=True, x_range=[0, 5])
+    assert (ax.get_xscale(), ax.get_yscale()) == ("linear", "log")
+    (ax,) = drawn(y=["train[1].speed"], x_log=True)
+    assert ax.get_xscale() == "log"
+
+
+def test_lines_that_hide_each_other_get_dashes_and_widths(drawn, recorded):
+    recorded.columns["target.value"] = recorded.time * 1.001
+    (ax,) = drawn(y=["train[1].speed", "target.value", "train[3].speed"], label=["a", "b", "c"])
+    assert [line.get_linestyle() for line in ax.lines] == ["-", "--", ":"]
+    widths = [line.get_linewidth() for line in ax.lines]
+    assert widths == sorted(widths, reverse=True)
+    assert widths[0] > 2 * widths[2]
+    (ax,) = drawn(y=["train[1].speed", "train[3].speed"], label=["a", "c"])
+    assert {line.get_linestyle() for line in ax.lines} == {"-"}
+
+
+def test_a_title_says_the_numbers_of_the_run(drawn):
+    (ax,) = drawn(panels=[{"title": "gap over {cruise[1].gap_min / 1000} km", "y": ["target.value"]}])
+    assert ax.get_title(loc="left") == "gap over 15 km"
+    (ax,) = drawn(panels=[{"title": "$x_{1}$", "y": ["target.value"]}])
+    assert ax.get_title(loc="left") == "$x_{1}$"

@@ -1,8 +1,11 @@
 """The look of a page: colours, legends, and matplotlib only where it is needed."""
 
+import itertools
 import subprocess
 import sys
 from pathlib import Path
+
+import pytest
 
 
 def test_many_curves_are_coloured_by_order(drawn):
@@ -13,6 +16,31 @@ def test_many_curves_are_coloured_by_order(drawn):
 def test_the_legend_stands_beside_the_data(drawn):
     (ax,) = drawn(y=["train[:].speed"])
     assert ax.get_legend().get_window_extent().x0 >= ax.get_window_extent().x1
+
+
+def extent(ax):
+    return ax.get_legend().get_window_extent()
+
+
+@pytest.mark.parametrize("panels", [1, 3, 5])
+def test_a_legend_keeps_to_the_height_of_its_panel_and_to_the_page(drawn, panels):
+    """Twelve cars in panels of their own names, each with a legend."""
+    axes = drawn(panels=[{"y": ["car[:].speed"], "label": [f"car of panel {k}"]} for k in range(panels)])
+    boxes = [extent(ax) for ax in axes]
+    assert all(upper.y0 > lower.y1 for upper, lower in itertools.pairwise(boxes))
+    width, height = axes[0].figure.bbox.size
+    assert all(box.x0 >= 0 and box.y0 >= 0 and box.x1 <= width and box.y1 <= height for box in boxes)
+
+
+def test_a_panel_with_too_many_families_tells_the_families(drawn):
+    """Five families of three: more lines than a legend beside five panels has room for."""
+    y = [f"train[:].speed + {k}" for k in range(5)]
+    axes = drawn(panels=[{"y": y, "label": [f"start {k}: {{i}}" for k in range(5)]}] * 5)
+    assert [text.get_text() for text in axes[0].get_legend().get_texts()] == [f"start {k}" for k in range(5)]
+    assert [ax.get_legend() is None for ax in axes[1:]] == [True] * 4
+    colours = [line.get_color() for line in axes[0].lines]
+    assert [len(set(colours[k : k + 3])) for k in range(0, 15, 3)] == [1] * 5
+    assert len(set(colours)) == 5
 
 
 def test_matplotlib_is_imported_only_to_draw():
