@@ -99,6 +99,28 @@ class Mass(Component):
         return {"x": self.v, "v": self.a}
 
 
+class Cart(Component):
+    """A train of another maker: what pushes it moves it, backwards too."""
+
+    force = Input("N", optional=True)
+    position = State("m", 0.0, output=True)
+    speed = State("m/s", 0.0, output=True)
+
+    def derivatives(self):
+        return {"position": self.speed, "speed": self.force}
+
+
+class Loco(Component):
+    """The same, and nothing is called as we call it."""
+
+    pull = Input("N", optional=True)
+    place = State("km", 0.0, output=True)
+    pace = State("m/s", 0.0, output=True)
+
+    def derivatives(self):
+        return {"place": self.pace / 1000.0, "pace": self.pull}
+
+
 class Fragile(Component):
     """x' = -gain u; its root has no value below nought, where too long a step leads."""
 

@@ -63,7 +63,7 @@ class Cailc(LearningAto):
     check_sampling = Parameter("1", True, description="whether to refuse a sampled loop that is unstable")
 
     stretch_begin = Memory("1", 0.999, output=True, description="kappa: share of the barrier beyond which it is linear")
-    refused = Memory("1", False, description="whether the controller does not drive at all")
+    refused = Memory("1", False, output=True, description="whether the controller does not drive at all")
     emergency = Memory("1", False, description="whether the emergency brake is latched")
     reached = Memory("1", False, description="whether the barrier was reached on this trip")
     hold_position = Memory("m", 0.0, description="where a braked train is held")

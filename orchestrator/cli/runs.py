@@ -14,6 +14,7 @@ from ..figures import check_figures, draw, written_as
 from ..isolation import isolate
 from ..run import (
     ROWS_FILE,
+    Finding,
     Results,
     Run,
     StepCheck,
@@ -45,7 +46,17 @@ from .options import (
     draw_as,
     load_system,
 )
-from .printing import in_one_line, open_console, say, show_cases, show_progress, show_run, show_values, summary
+from .printing import (
+    in_one_line,
+    open_console,
+    say,
+    show_cases,
+    show_findings,
+    show_progress,
+    show_run,
+    show_values,
+    summary,
+)
 
 
 def run(
@@ -163,6 +174,7 @@ def reproduce(
     published: dict[str, list[ComparedValue]] = {}
     failed: dict[str, list[ComparedValue]] = {}
     every: list[ComparedValue] = []
+    noticed: dict[str, list[Finding]] = {}
     cases = published_cases(paper)
     with show_cases(len(cases), quiet) as tell:
         for case in cases:
@@ -172,6 +184,7 @@ def reproduce(
                 raise outcome.error
             if outcome.status == "interrupted":
                 raise KeyboardInterrupt
+            noticed[case.command.removeprefix("orchestrate run ")] = outcome.findings
             found = [*outcome.published, *outcome.references]
             every += found
             for groups, rows in (
@@ -181,6 +194,8 @@ def reproduce(
                 if rows:
                     groups[case.command] = rows
     out = open_console()
+    for title, findings in noticed.items():
+        show_findings(findings, title, out)
     if published and not quiet:
         show_values(out, "Published values", published)
     if failed:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from typing import Literal
 
 import numpy as np
@@ -75,13 +75,20 @@ def _is_distance(node: Node) -> bool:
     return False
 
 
-def winners(values: Sequence[float], direction: Better) -> tuple[int, ...]:
-    """Which of the values are best; none where there is no direction, or all that have a value are equal."""
+def winners(values: Sequence[float], direction: Better, barred: Collection[int] = ()) -> tuple[int, ...]:
+    """Which of the values are best; none where there is no direction, or all that have a value are equal.
+
+    Args:
+        values: one for each variant, NaN where it has none.
+        direction: what is better.
+        barred: places that win nothing, whatever their values.
+    """
     known = {k: value for k, value in enumerate(values) if not np.isnan(value)}
-    if direction == "none" or len(known) < 2:
+    able = {k: value for k, value in known.items() if k not in barred}
+    if direction == "none" or len(known) < 2 or not able:
         return ()
-    best = (min if direction == "smaller" else max)(known.values())
-    first = tuple(k for k, value in known.items() if _equal(value, best))
+    best = (min if direction == "smaller" else max)(able.values())
+    first = tuple(k for k, value in able.items() if _equal(value, best))
     return () if len(first) == len(known) else first
 
 

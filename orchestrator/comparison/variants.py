@@ -8,7 +8,7 @@ import math
 import re
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import AbstractContextManager, nullcontext
-from dataclasses import dataclass, field
+from dataclasses import asdict, dataclass, field
 from pathlib import Path
 from typing import Any
 
@@ -49,6 +49,11 @@ class Variant:
             return self.run.status
         return "failed" if self.error else "not run"
 
+    @property
+    def spoiled(self) -> bool:
+        """Whether something was found in its run with which it can win nothing."""
+        return self.run is not None and any(finding.spoils for finding in self.run.findings)
+
     def value(self, metric: str, index: int | None) -> float:
         """A metric of a completed run, NaN where there is none."""
         if self.run is None or self.run.status != "completed":
@@ -60,7 +65,8 @@ class Variant:
 class Row:
     """One metric, or one index of it, over all variants; NaN where a variant has none.
 
-    ``winners`` are the places of the best values; empty where there is no better, or all are equal.
+    ``winners`` are the places of the best values, of variants that can win; empty where there is no better, or all are
+    equal.
     """
 
     metric: str
@@ -255,10 +261,11 @@ def _rows(columns: Sequence[Variant], directions: Mapping[str, Better]) -> list[
                 direction = directions.get(metric.name) or better(metric.expression)
                 known.setdefault((metric.name, index), (metric.unit, direction))
     order = {name: k for k, name in enumerate(dict.fromkeys(name for name, _ in known))}
+    barred = [k for k, variant in enumerate(columns) if variant.spoiled]
     rows = []
     for (name, index), (unit, direction) in sorted(known.items(), key=lambda item: order[item[0][0]]):
         values = tuple(variant.value(name, index) for variant in columns)
-        rows.append(Row(name, index, unit, direction, values, winners(values, direction)))
+        rows.append(Row(name, index, unit, direction, values, winners(values, direction, barred)))
     return rows
 
 
@@ -282,6 +289,8 @@ def write_json(comparison: Comparison, path: Path) -> None:
                 "modified": v.system.provenance.modified,
                 "status": v.status,
                 "error": v.error,
+                "findings": [asdict(finding) for finding in v.run.findings] if v.run else [],
+                "can_win": not v.spoiled,
                 "results": v.directory.name if v.directory else None,
             }
             for v in comparison.variants

@@ -10,11 +10,13 @@ from .results import Results
 from .rows import ROWS_FILE, recover_rows
 from .session import Progress
 from .step_check import StepChange, StepCheck, check_step
+from .watching import Finding
 
 __all__ = [
     "CHECKPOINT_FILE",
     "ROWS_FILE",
     "Checked",
+    "Finding",
     "Progress",
     "Results",
     "Run",

@@ -24,7 +24,7 @@ from ..master import Master
 from ..system import Connection, Event, Instance, Judged, Provenance, Stepping, System
 
 CHECKPOINT_FILE = "checkpoint.zip"
-_FORMAT = 2
+_FORMAT = 3
 
 
 @dataclass(frozen=True)
@@ -38,6 +38,7 @@ class Checkpoint:
         progress: what the master carries between steps, from `Master.save`.
         states: the FMUs' serialized states, by instance.
         every: distance of checkpoints in s.
+        seen: what was found on the way, from `Watching.save`.
     """
 
     system: System
@@ -47,6 +48,7 @@ class Checkpoint:
     progress: Mapping[str, Any]
     states: Mapping[str, bytes]
     every: float | None
+    seen: Any
 
     @property
     def time(self) -> float:
@@ -68,6 +70,7 @@ class Checkpoint:
         kind: Kind,
         rows: int,
         every: float | None,
+        seen: Any,
     ) -> Checkpoint:
         """That of a master between two steps.
 
@@ -82,7 +85,7 @@ class Checkpoint:
             finally:
                 slave.forget(state)
         digests = {name: model.digest for name, model in models.items()}
-        return cls(system, kind, rows, digests, master.save(), states, every)
+        return cls(system, kind, rows, digests, master.save(), states, every, seen)
 
     def write(self, directory: Path) -> None:
         """Put it in the place of the one before.
@@ -98,6 +101,7 @@ class Checkpoint:
             "every": self.every,
             "digests": self.digests,
             "progress": self.progress,
+            "seen": self.seen,
         }
         part = directory / f"{CHECKPOINT_FILE}.part"
         try:
@@ -195,6 +199,7 @@ def read_checkpoint(directory: Path) -> Checkpoint:
             progress=content["progress"],
             states=states,
             every=content["every"],
+            seen=content["seen"],
         )
         if point.rows < 1 or point.width < 0 or not math.isfinite(point.time):
             raise ValueError(f"{point.rows} rows up to {point.time} s")

@@ -18,7 +18,6 @@ from . import checkpoint
 from . import record as record_file
 from .checking import Checked, check
 from .checkpoint import check_serializable
-from .divergence import explain_divergence
 from .outcome import Run
 from .session import Job, Progress, Session, rows_before
 
@@ -176,24 +175,17 @@ def _execute(system: System, job: Job, figures: bool) -> Run:
             forget_paths(workspace.folder)
     outcome = Run(checked.system, session.results(), session.status, checked, error=session.error, directory=directory)
     outcome.coupling, outcome.seconds = session.coupling, session.seconds
-    _tell_divergence(outcome)
+    outcome.findings = session.findings(outcome.results)
+    if outcome.error is not None and outcome.status == "failed":
+        for finding in outcome.findings:
+            if finding.kind == "diverging":
+                outcome.error.explain(finding.message)
     evaluate(outcome)
     if directory is not None:
         if figures and len(outcome.results):
             outcome.figures = draw(checked.system.judged.figures, outcome.results, directory)
         record_file.finish(directory, outcome, job.kind)
     return outcome
-
-
-def _tell_divergence(outcome: Run) -> None:
-    """In the error of what failed of it, or else as a note."""
-    checked, error = outcome.checked, outcome.error
-    interfaces = {name: model.interface for name, model in checked.models.items()}
-    found = explain_divergence(checked.system, interfaces, checked.wiring.links, outcome.results, error)
-    if found and error is not None and outcome.status == "failed":
-        error.explain(found)
-    elif found:
-        outcome.notes.append(found)
 
 
 def evaluate(outcome: Run) -> None:

@@ -15,6 +15,7 @@ from ..evaluation import BAD, ComparedValue, Metric, Verdict
 from ..system import System
 from .checking import Checked
 from .results import Results
+from .watching import Finding
 
 Status = Literal["completed", "terminated", "interrupted", "failed"]
 
@@ -31,7 +32,7 @@ class Run:
         checked: models, wiring, order, and the notes a user should read.
         directory: where the files are, if there are any. figures: those that were drawn.
         coupling: how the master's iterations, step sizes, loops and events went, where there were any.
-        notes: what a user should know of how it went.
+        findings: what no train can do, and what controllers said of themselves, the gravest first.
         seconds: wall time of ``setup`` and ``stepping``, and the number of communication ``steps``.
     """
 
@@ -46,7 +47,7 @@ class Run:
     figures: list[Path] = field(default_factory=list)
     error: RunError | None = None
     coupling: dict[str, Any] = field(default_factory=dict)
-    notes: list[str] = field(default_factory=list)
+    findings: list[Finding] = field(default_factory=list)
     directory: Path | None = None
     seconds: dict[str, float] = field(default_factory=dict)
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import time as clock
 from collections.abc import Collection, Mapping, Sequence
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -12,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import ScenarioError
+from ..master import Rows
 from .rows import Writer, read_rows
 
 _FLUSH_SECONDS = 1.0
@@ -107,6 +109,30 @@ def _check_record(record: Mapping[str, Any]) -> None:
         raise ValueError(f"its {wrong[0]} in run.json is not what a run writes there")
 
 
+@dataclass(frozen=True)
+class Due:
+    """Which communication points are recorded: every so many, and the last.
+
+    Attributes:
+        every: how many. last: the number of the last.
+    """
+
+    every: int
+    last: int
+
+    def of(self, steps: int, rows: Rows) -> Rows:
+        """Those of the rows up to a number of steps; the very same rows where that is all of them."""
+        if self.every == 1 or not len(rows):
+            return rows
+        first = steps - len(rows) + 1
+        if not isinstance(rows, np.ndarray):
+            return [row for k, row in enumerate(rows, first) if k % self.every == 0 or k == self.last]
+        numbers = np.arange(-first % self.every, len(rows), self.every)
+        if steps == self.last and steps % self.every:
+            numbers = np.append(numbers, len(rows) - 1)
+        return rows[numbers]  # a copy: the block may go
+
+
 class Recorder:
     """Collects rows while a run goes, and writes them through to files if there is a directory.
 
@@ -141,7 +167,7 @@ class Recorder:
             self.extend(past)
             self.flush()
 
-    def extend(self, rows: Sequence[Sequence[Any]] | NDArray[np.float64]) -> None:
+    def extend(self, rows: Rows) -> None:
         """Append rows of time and values; an array is kept, not copied."""
         if isinstance(rows, np.ndarray):
             self._seal()

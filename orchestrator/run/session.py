@@ -16,14 +16,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import RunError, ScenarioError, StoppedError
-from ..fmi import Kind
+from ..fmi import Interface, Kind
 from ..master import ALGORITHMS, Master, Rows
 from . import record as record_file
 from .assembly import assembled
 from .checking import Checked
 from .checkpoint import Checkpoint
 from .outcome import Status
-from .results import Recorder, Results
+from .results import Due, Recorder, Results
+from .watching import Finding, Watching
 
 Progress = Callable[[float, float], None]
 """Called now and then with the time reached and the stop time, both in s."""
@@ -73,6 +74,7 @@ class Session:
         self.coupling: dict[str, Any] = {}
         self._past = past
         self._recorder: Recorder | None = None
+        self._watching: Watching | None = None
         self._stopped = threading.Event()
 
     def run(self, begin: float) -> None:
@@ -118,11 +120,15 @@ class Session:
         master.initialize(
             system.stepping.start_time, system.stepping.stop_time, may_go_on=self.job.checkpoint_every is not None
         )
+        self._watching = Watching(system, self._interfaces, self.checked.wiring, master.signals)
         if self.job.begin is None or self._past is None:
             self._recorder = Recorder(master.signals, master.kinds, self.job.directory)
-            self._recorder.extend([[system.stepping.start_time, *master.values]])
+            first = [[system.stepping.start_time, *master.values]]
+            self._recorder.extend(first)
+            self._watching.see(first)
         else:
             self.job.begin.restore(master)
+            self._watching.restore(self.job.begin.seen)
             past, there = self._past[: self.job.begin.rows], len(self._past)
             self._recorder = Recorder(master.signals, master.kinds, self.job.directory, past, there)
 
@@ -136,7 +142,9 @@ class Session:
             row_every = system.stepping.record / system.stepping.step
             row_every = row_every if varies else round(row_every)
         stride = count if every is None else max(1, round(every / system.stepping.step))
-        observe = self._observer(master)
+        # Every point is watched; of steps of one length those that are recorded are picked out of all.
+        told_every, kept_every = (row_every, 1) if varies else (1, int(row_every))
+        observe = self._observer(master, Due(kept_every, count))
         begin, before = clock.perf_counter(), master.steps
         try:
             while True:
@@ -144,7 +152,7 @@ class Session:
                 until = min(count, (passed // stride + 1) * stride)
                 points = {"first": master.steps, "until": until}
                 if not master.run(
-                    system.stepping.start_time, system.stepping.step, count, row_every, observe, **points
+                    system.stepping.start_time, system.stepping.step, count, told_every, observe, **points
                 ):
                     return False
                 if until == count:
@@ -153,24 +161,28 @@ class Session:
         finally:
             self.seconds.update(stepping=clock.perf_counter() - begin, steps=master.steps - before)
 
-    def _observer(self, master: Master) -> Callable[[int, Rows], bool]:
+    def _observer(self, master: Master, due: Due) -> Callable[[int, Rows], bool]:
         assert self._recorder is not None
-        system, recorder, stopped, progress = self.system, self._recorder, self._stopped, self.job.progress
+        assert self._watching is not None
+        system, stopped, progress = self.system, self._stopped, self.job.progress
+        recorder, watching = self._recorder, self._watching
         last = system.stepping.stop_time - 0.5 * system.stepping.step
         percent = 0.01 * (system.stepping.stop_time - system.stepping.start_time)
         shown, told = clock.monotonic(), 0
 
-        def observe(_: int, rows: Rows) -> bool:
+        def observe(steps: int, rows: Rows) -> bool:
             nonlocal shown, told
-            recorder.extend(rows)
             time = master.time
+            watching.see(rows if len(rows) else [[time, *master.values]])
+            kept = due.of(steps, rows)
+            recorder.extend(kept)
             reached = int((time - system.stepping.start_time) / percent + 1e-9)
             if progress is not None and (reached > told or clock.monotonic() - shown > 0.1 or time >= last):
                 shown, told = clock.monotonic(), reached
                 progress(time, system.stepping.stop_time)
             if not stopped.is_set():
                 return True
-            if time < last and not (len(rows) and rows[-1][0] == time):
+            if time < last and not (len(kept) and kept[-1][0] == time):
                 recorder.extend([[time, *master.values]])  # the point at which the run was stopped
             return False
 
@@ -181,11 +193,26 @@ class Session:
         job, recorder = self.job, self._recorder
         assert job.directory is not None
         assert recorder is not None
+        assert self._watching is not None
         recorder.flush(sync=True)
         point = Checkpoint.take(
-            self.system, self.checked.models, master, kind=job.kind, rows=recorder.count, every=job.checkpoint_every
+            self.system,
+            self.checked.models,
+            master,
+            kind=job.kind,
+            rows=recorder.count,
+            every=job.checkpoint_every,
+            seen=self._watching.save(),
         )
         point.write(job.directory)
+
+    @property
+    def _interfaces(self) -> dict[str, Interface]:
+        return {name: model.interface for name, model in self.checked.models.items()}
+
+    def findings(self, results: Results) -> list[Finding]:
+        """What was found on the way, given what was recorded."""
+        return [] if self._watching is None else self._watching.findings(results, self.error)
 
     def results(self) -> Results:
         """What was recorded."""

@@ -5,15 +5,21 @@ from .order import Order, derive_order
 from .resolution import wire
 from .starts import bounded
 from .topology import describe_topology
+from .trains import Following, Quantity, Train, find_followings, find_trains
 
 __all__ = [
+    "Following",
     "Link",
     "Order",
+    "Quantity",
+    "Train",
     "Wiring",
     "bounded",
     "derive_order",
     "describe_topology",
     "described",
+    "find_followings",
+    "find_trains",
     "is_direct",
     "wire",
 ]

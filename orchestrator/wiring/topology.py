@@ -98,7 +98,7 @@ def topologies(interfaces: Mapping[str, Interface], wiring: Wiring) -> list[Topo
         heard[own] = {
             side: source
             for side in SIDES
-            if _flag(controller, f"has_{side}", fed, interfaces, wiring)
+            if is_heard(controller, f"has_{side}", fed, interfaces, wiring)
             and (source := _origin(_source(side, fed[controller], interfaces[controller]), known, feeders)) is not None
             and source != own
         }
@@ -140,7 +140,7 @@ def _source(side: str, fed: Mapping[str, str], interface: Interface) -> str | No
     return next((fed[name] for name in names if name in fed and name not in interface.unused_inputs), None)
 
 
-def _flag(
+def is_heard(
     controller: str,
     flag: str,
     fed: Mapping[str, Mapping[str, str]],

@@ -5,6 +5,7 @@
 
 from .comparison import show_comparison
 from .console import Log, and_figures, counted, folded, open_console, say, show_notes, tell
+from .findings import show_findings
 from .interface import show_interface
 from .outcome import show_run
 from .progress import show_cases, show_compilations, show_progress
@@ -23,6 +24,7 @@ __all__ = [
     "show_cases",
     "show_comparison",
     "show_compilations",
+    "show_findings",
     "show_interface",
     "show_notes",
     "show_progress",

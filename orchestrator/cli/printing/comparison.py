@@ -10,14 +10,19 @@ from rich.text import Text
 
 from ...comparison import Comparison
 from .console import and_figures, open_console, say, show_notes
+from .findings import show_findings
 from .tables import fits, number, prefixed, table, verdict
 
 _BEST = "bold green"
 
 
 def show_comparison(comparison: Comparison, quiet: bool) -> None:
-    """The tables, then who won how often, and what failed; when quiet, only what failed, on stderr."""
+    """What was found, the tables, who won how often, and what failed; when quiet, else only what failed, on stderr."""
     out = open_console(stderr=quiet)
+    for variant in comparison.variants:
+        show_findings(variant.run.findings if variant.run else (), variant.name)
+        if variant.spoiled:
+            say(open_console(), f"{variant.name}: wins nothing, because of what was found", "bold red")
     if not quiet:
         _show_tables(out, comparison)
     for variant in comparison.variants:

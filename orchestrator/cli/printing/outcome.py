@@ -8,8 +8,9 @@ from typing import Any
 from rich.console import Console
 
 from ...evaluation import compare_metrics
-from ...run import CHECKPOINT_FILE, Run, StepChange, StepCheck
+from ...run import CHECKPOINT_FILE, Finding, Run, StepChange, StepCheck
 from .console import and_figures, counted, open_console, say, show_notes
+from .findings import show_findings
 from .metrics import show_metrics
 from .tables import prefixed
 from .verdicts import by_source, not_judged_at_all, show_requirements, show_values, summary
@@ -20,21 +21,22 @@ _SHOWN = 3
 
 
 def show_run(outcome: Run, second: Run | None, step: StepCheck | None, quiet: bool) -> None:
-    """The end of a run, verdicts and files last; when quiet, only what went wrong, on stderr.
+    """The end of a run, findings first, verdicts and files last; when quiet, else only what went wrong, on stderr.
 
     Args:
         outcome: the run.
         second: the same at half the step, where that was asked for.
         step: what it shows, where it completed.
-        quiet: whether to say only what went wrong.
+        quiet: whether to say only what was found and what went wrong.
     """
     system, out = outcome.system, open_console(stderr=quiet)
+    show_findings(outcome.findings)
+    if second is not None:
+        show_findings(_others(second, outcome), "at half the step")
     if not quiet:
         _show_head(out, outcome)
         _show_tables(out, outcome, second if step is not None else None)
         out.print()
-    for note in outcome.notes:
-        say(out, f"note: {note}", "bold red")
     if outcome.status != "completed":
         reached = float(outcome.time[-1]) if len(outcome.time) else system.stepping.start_time
         why = f": {outcome.error}" if outcome.status == "terminated" else ""
@@ -84,6 +86,12 @@ def _step_line(found: StepCheck) -> str:
 def _of_allowed(change: StepChange) -> str:
     scale, unit = prefixed(change.unit, [change.change, change.allowed])
     return f"{abs(change.change) / scale:.2g} of {change.allowed / scale:.2g} {unit}".rstrip() + " allowed"
+
+
+def _others(second: Run, first: Run) -> list[Finding]:
+    """The findings of a run that another does not have, however they differ in numbers."""
+    known = {(finding.kind, finding.signal) for finding in first.findings}
+    return [finding for finding in second.findings if (finding.kind, finding.signal) not in known]
 
 
 def _coupling(how: Mapping[str, Any]) -> Iterator[str]:

@@ -91,3 +91,18 @@ def test_wrong_directions_are_told_all_at_once():
         "--better settlin=smaller: there is no metric 'settlin'; did you mean 'settling'?",
         "--better end: write METRIC=smaller, METRIC=larger or METRIC=none",
     ]
+
+
+@pytest.mark.parametrize(
+    ("values", "barred", "best"),
+    [
+        ([3.0, 1.0, 2.0], [1], (2,)),
+        ([1.0, 1.0, 2.0], [0], (1,)),
+        ([1.0, 2.0], [0], (1,)),
+        ([1.0, 1.0], [0], (1,)),
+        ([1.0, 2.0], [0, 1], ()),
+        ([1.0, math.nan], [0], ()),
+    ],
+)
+def test_who_is_barred_wins_nothing(values, barred, best):
+    assert winners(values, "smaller", barred) == best

@@ -85,7 +85,7 @@ def test_another_fmu_of_the_same_name(tmp_path, foreign, xml):
     point = run(system, kind="python", output=tmp_path / "out")
     assert point.status == "completed"
     models = point.checked.models
-    taken = checkpoint.Checkpoint(system, "python", 1, {n: m.digest for n, m in models.items()}, {}, {}, 1.0)
+    taken = checkpoint.Checkpoint(system, "python", 1, {n: m.digest for n, m in models.items()}, {}, {}, 1.0, [])
     taken.check(models, tmp_path)
     foreign([v("u", "input", start=1.0), v("y", "output")], **how)
     other = run(system, kind="python").checked.models

@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 from railcosim.orchestrator.errors import ScenarioError
 from railcosim.orchestrator.run import results as module
 from railcosim.orchestrator.run import rows as files
-from railcosim.orchestrator.run.results import Recorder, Results
+from railcosim.orchestrator.run.results import Due, Recorder, Results
 from railcosim.orchestrator.run.rows import recover_rows
 
 RECORD = {
@@ -284,3 +284,20 @@ def test_single_rows_and_blocks_keep_their_sequence():
     time, columns = recorder.columns()
     assert (list(time), list(columns["x"])) == ([0, 1, 2, 3, 4], [1, 2, 3, 4, 5])
     assert Recorder(["x"], ["Real"], None).columns()[0].shape == (0,)
+
+
+@pytest.mark.parametrize("every", [1, 2, 3, 7, 20])
+@pytest.mark.parametrize("sizes", [[1] * 17, [17], [1, 5, 4, 7], [2, 2, 13]])
+@pytest.mark.parametrize("array", [True, False])
+def test_what_is_due_of_blocks_of_any_size(every, sizes, array):
+    """Every so many points and the last, which is number 17."""
+    due, done, kept = Due(every, 17), 0, []
+    for size in sizes:
+        rows = [[float(k), -k] for k in range(done + 1, done + size + 1)]
+        done += size
+        kept += [row[0] for row in due.of(done, np.array(rows) if array else rows)]
+    assert kept == [k for k in range(1, 18) if k % every == 0 or k == 17]
+
+
+def test_of_no_rows_none_is_due():
+    assert len(Due(3, 17).of(6, ())) == 0

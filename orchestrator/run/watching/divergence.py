@@ -2,7 +2,8 @@
 
 Explicit algorithms lose a stiff coupling without a word: the numbers grow until one is infinite, or until the run ends.
 That is told from physical growth by its pace: what an unstable plant or an accelerating train does between two
-communication points is a small part of its value, or the step is too long for it anyway.
+communication points is a small part of its value, or the step is too long for it anyway. Slower growth is told where
+it shows in `swings` that become larger and larger up to the end, which no coupling of stable systems should do.
 """
 
 from __future__ import annotations
@@ -15,13 +16,15 @@ import networkx as nx
 import numpy as np
 from numpy.typing import NDArray
 
-from ..errors import FmuError
-from ..fmi import Interface
-from ..master import ALGORITHMS, find_loops
-from ..names import SignalName
-from ..system import System
-from ..wiring import Link
-from .results import Results
+from ...errors import FmuError
+from ...evaluation import Signals
+from ...fmi import Interface
+from ...master import ALGORITHMS, find_loops
+from ...names import SignalName
+from ...system import System
+from ...wiring import Link
+from .finding import Finding
+from .swings import find_swings
 
 Array = NDArray[np.float64]
 
@@ -44,63 +47,115 @@ _SHOWN = 4
 
 @dataclass(frozen=True)
 class Growth:
-    """How a signal grows: by which factor in each communication step, and since when in s."""
+    """How a signal grows: by which factor in each communication step or swing, and since when in s."""
 
     factor: float
     since: float
 
 
 def explain_divergence(
-    system: System, interfaces: Mapping[str, Interface], links: Sequence[Link], results: Results, error: object = None
-) -> str:
-    """One sentence on the coupling that diverges and what to do, or nothing.
+    system: System,
+    interfaces: Mapping[str, Interface],
+    links: Sequence[Link],
+    seen: Sequence[Signals],
+    error: object = None,
+) -> Finding | None:
+    """What coupling diverges and what to do about it, if one does.
 
     Args:
         system: what was simulated.
         interfaces: of its instances.
         links: its scalar connections.
-        results: what was recorded.
+        seen: the run's signals: all that was recorded, or every point at its end.
         error: what the run failed of, if it did.
     """
     if ALGORITHMS[
         system.stepping.algorithm
     ].varies_step:  # it holds the error or fails, and its rows are of uneven length
-        return ""
+        return None
     failed = isinstance(error, FmuError)
-    for group in _cycles(links):
-        signals = dict.fromkeys(link.source for link in links if {link.source[0], link.target[0]} <= group)
-        found = dict(_growing(signals, interfaces, results, failed=failed))
-        if found:
-            names = ", ".join(list(found)[:_SHOWN]) + (", ..." if len(found) > _SHOWN else "")
-            factor = float(np.median([growth.factor for growth in found.values()]))
-            pace = f"by a factor of {factor:.3g}" if factor < _STEADY else "more than a thousandfold"
-            since = min(growth.since for growth in found.values())
-            inner = [link for link in links if {link.source[0], link.target[0]} <= group]
-            return (
-                f"the coupling through {names} diverges: it grows {pace} per communication step since t = {since:.6g} "
-                f"s; {_advice(system, {name: interfaces[name] for name in group}, inner)}"
-            )
-    return ""
+    for inner in _cycles(links):
+        sources = dict.fromkeys(link.source for link in inner)
+        for signals in seen:
+            found = dict(_growing(sources, interfaces, signals, failed=failed))
+            if found:
+                factor = float(np.median([growth.factor for growth in found.values()]))
+                pace = f"by a factor of {factor:.3g}" if factor < _STEADY else "more than a thousandfold"
+                how = f"it grows {pace} per communication step"
+                return _finding(found, signals, how, _advice(system, interfaces, inner))
+        for signals in () if failed else seen:
+            found = dict(_swinging(sources, interfaces, signals))
+            if found:
+                factor = float(np.median([growth.factor for growth in found.values()]))
+                how = f"its swings become larger, each {factor:.3g} times the one before,"
+                return _finding(found, signals, how, _advice(system, interfaces, inner))
+    return None
 
 
-def _cycles(links: Iterable[Link]) -> Iterator[set[str]]:
-    """The groups of instances that act on each other, or on themselves."""
+def sources_in_cycles(
+    system: System, interfaces: Mapping[str, Interface], links: Sequence[Link]
+) -> Iterator[SignalName]:
+    """The signals of which `explain_divergence` wants to see every point."""
+    if not ALGORITHMS[system.stepping.algorithm].varies_step:
+        for link in (link for inner in _cycles(links) for link in inner):
+            if interfaces[link.source.instance].variables[link.source.variable].type == "Real":
+                yield link.source
+
+
+def _finding(found: Mapping[str, Growth], signals: Signals, how: str, advice: str) -> Finding:
+    since = min(growth.since for growth in found.values())
+    first = next(iter(found))
+    values = np.where(np.isfinite(signals[first]), np.abs(signals[first]), 0.0)
+    worst = int(np.argmax(values))
+    names = ", ".join(list(found)[:_SHOWN]) + (", ..." if len(found) > _SHOWN else "")
+    return Finding(
+        "diverging",
+        tuple(dict.fromkeys(SignalName.parse(name).instance for name in found)),
+        first,
+        since,
+        float(signals[first][worst]),
+        float(signals.time[worst]),
+        f"the coupling through {names} diverges: {how} since t = {since:.6g} s; {advice}",
+    )
+
+
+def _cycles(links: Sequence[Link]) -> list[list[Link]]:
+    """The connections within each group of instances that act on each other, or of one that acts on itself."""
     graph = nx.DiGraph((link.source[0], link.target[0]) for link in links)
-    for members in nx.strongly_connected_components(graph):
-        if len(members) > 1 or graph.has_edge(*[next(iter(members))] * 2):
-            yield members
+    groups = {name: k for k, names in enumerate(nx.strongly_connected_components(graph)) for name in names}
+    inner: dict[int, list[Link]] = {}
+    for link in links:
+        if groups[link.source[0]] == groups[link.target[0]]:
+            inner.setdefault(groups[link.source[0]], []).append(link)
+    return list(inner.values())
+
+
+def _sized(
+    sources: Iterable[SignalName], interfaces: Mapping[str, Interface], signals: Signals
+) -> Iterator[tuple[str, float]]:
+    """The real numbers among the sources, and what a usual size of each is."""
+    for source in sources:
+        variable, name = interfaces[source.instance].variables[source.variable], str(source)
+        if variable.type == "Real" and name in signals.names():
+            yield name, abs(variable.nominal or 1.0)
 
 
 def _growing(
-    signals: Iterable[SignalName], interfaces: Mapping[str, Interface], results: Results, *, failed: bool
+    sources: Iterable[SignalName], interfaces: Mapping[str, Interface], signals: Signals, *, failed: bool
 ) -> Iterator[tuple[str, Growth]]:
-    for signal in signals:
-        variable, name = interfaces[signal.instance].variables[signal.variable], str(signal)
-        if variable.type == "Real" and name in results.names():
-            size = abs(variable.nominal or 1.0)
-            growth = find_growth(results.time, results[name], results.step, size=size, failed=failed)
-            if growth is not None:
-                yield name, growth
+    for name, size in _sized(sources, interfaces, signals):
+        growth = find_growth(signals.time, signals[name], signals.step, size=size, failed=failed)
+        if growth is not None:
+            yield name, growth
+
+
+def _swinging(
+    sources: Iterable[SignalName], interfaces: Mapping[str, Interface], signals: Signals
+) -> Iterator[tuple[str, Growth]]:
+    for name, size in _sized(sources, interfaces, signals):
+        swings = find_swings(signals[name], size)
+        if swings is not None:
+            yield name, Growth(swings.factor, float(signals.time[swings.begin]))
 
 
 def find_growth(time: Array, values: Array, step: float, *, size: float = 1.0, failed: bool = False) -> Growth | None:
@@ -165,6 +220,7 @@ def _slow_onset(peaks: Array) -> int | None:
 
 def _advice(system: System, interfaces: Mapping[str, Interface], links: Sequence[Link]) -> str:
     """What to do about a cycle of instances."""
+    interfaces = {name: interfaces[name] for link in links for name in (link.source.instance, link.target.instance)}
     members = interfaces.values()
     moving = any(interface.interpolates_inputs for interface in members)
     ways = ["take a smaller step"]

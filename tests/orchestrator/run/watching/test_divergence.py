@@ -7,7 +7,7 @@ import pytest
 from railcosim.fmus.annotation import Annotation
 from railcosim.orchestrator.errors import CouplingError, FmuError
 from railcosim.orchestrator.names import SignalName
-from railcosim.orchestrator.run.divergence import explain_divergence, find_growth
+from railcosim.orchestrator.run.watching.divergence import explain_divergence, find_growth, sources_in_cycles
 from railcosim.orchestrator.system import Connection, System
 from railcosim.orchestrator.wiring import Link
 
@@ -156,7 +156,8 @@ def explain(*pairs, error=None, models=None, signals=None, **how):
     sources = [".".join(link.source) for link in found]
     results = Recorded(dict.fromkeys(sources, GROWS) | (signals or {}))
     interfaces = {name.split(".")[0]: model() for pair in pairs for name in pair} | (models or {})
-    return explain_divergence(System(**how), interfaces, found, results, error)
+    told = explain_divergence(System(**how), interfaces, found, [results], error)
+    return "" if told is None else told.message
 
 
 def test_the_signals_of_the_cycle_are_named():
@@ -166,6 +167,36 @@ def test_the_signals_of_the_cycle_are_named():
         'a smaller step, or algorithm = "iterative" with extrapolation = 1; if it grows alike with any, the system '
         "itself is unstable"
     )
+
+
+def test_the_record_of_it():
+    told = explain_divergence(System(), {"a": model()}, links(("a.x", "a.u")), [Recorded({"a.x": -GROWS})])
+    assert (told.kind, told.instances, told.signal) == ("diverging", ("a",), "a.x")
+    assert (told.since, told.worst, told.worst_time) == (0.0, -(2.0**39), pytest.approx(3.9))
+
+
+def test_slow_growth_is_told_by_its_swings():
+    """Half again in each swing: told of a run that came to its end, and not as the cause of a failure."""
+    swings = {"a.x": 1.5 ** (0.3 * np.arange(120) / np.pi) * np.sin(0.3 * np.arange(120))}
+    told = explain(("a.x", "a.u"), signals=swings)
+    assert "a.x diverges: its swings become larger, each 1.5" in told
+    assert explain(("a.x", "a.u"), signals=swings, error=FmuError("something else")) == ""
+
+
+def test_the_end_of_a_run_is_looked_at_where_the_rows_do_not_tell():
+    rows, end = Recorded({"a.x": CALM[:4]}), Recorded({"a.x": GROWS})
+    for seen in ([rows, end], [end, rows]):
+        assert explain_divergence(System(), {"a": model()}, links(("a.x", "a.u")), seen).worst == 2.0**39
+    assert explain_divergence(System(), {"a": model()}, links(("a.x", "a.u")), [rows]) is None
+
+
+def test_what_is_to_be_seen_of_it():
+    whole = model()
+    whole.variables["y"].type = "Integer"
+    found = links(("a.x", "b.u"), ("b.y", "a.u"), ("b.z", "a.v"), ("a.y", "c.u"))
+    interfaces = {"a": model(), "b": whole, "c": model()}
+    assert [str(x) for x in sources_in_cycles(System(), interfaces, found)] == ["a.x", "b.z"]
+    assert not list(sources_in_cycles(System(algorithm="adaptive"), interfaces, found))
 
 
 def test_of_many_signals_some_are_named():

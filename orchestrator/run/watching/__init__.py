@@ -1,0 +1,7 @@
+"""What a run finds without being asked, at every communication point: collisions, reversing, refusals, divergence."""
+
+from .divergence import explain_divergence
+from .finding import Finding, Kind
+from .watching import Watching
+
+__all__ = ["Finding", "Kind", "Watching", "explain_divergence"]

@@ -1,0 +1,103 @@
+"""`Watching`: is shown every communication point of a run in blocks, and tells what it found."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from operator import itemgetter
+from typing import Any
+
+import numpy as np
+
+from ...errors import ScenarioError
+from ...evaluation import Signals
+from ...fmi import Interface
+from ...master import Rows
+from ...system import System
+from ...wiring import Wiring
+from .crossings import Crossings
+from .divergence import explain_divergence, sources_in_cycles
+from .finding import Finding
+from .rules import rules_of
+from .tail import POINTS, Tail
+
+_BLOCK = 512
+"""Single points that are looked at together."""
+
+
+class Watching:
+    """Watches one run.
+
+    Args:
+        system: what runs. interfaces: of its instances. wiring: its connections.
+        signals: names of the values in a row, behind the time. Those that are watched are taken out of it here.
+    """
+
+    def __init__(
+        self, system: System, interfaces: Mapping[str, Interface], wiring: Wiring, signals: Sequence[str]
+    ) -> None:
+        self._system, self._interfaces, self._links = system, interfaces, wiring.links
+        rules = rules_of(interfaces, wiring)
+        ruled = dict.fromkeys(str(signal) for rule in rules for signal, _ in rule.quantity.terms)
+        coupled = dict.fromkeys(map(str, sources_in_cycles(system, interfaces, self._links)))
+        places = {name: k for k, name in enumerate(signals, 1)}
+        self._ruled, self._coupled = (np.array([places[x] for x in names], np.intp) for names in (ruled, coupled))
+        self._crossings = Crossings(rules, {name: k for k, name in enumerate(ruled)})
+        self._tail = Tail(list(coupled), system.stepping.step, system.stepping.stop_time)
+        self._pick = itemgetter(0, *self._ruled.tolist(), *self._coupled.tolist())
+        self._single: list[Sequence[Any]] = []
+
+    def see(self, rows: Rows) -> None:
+        """Take points in: each the time in s, and all values."""
+        if not len(self._ruled) + len(self._coupled):
+            return
+        if isinstance(rows, np.ndarray):
+            self._look()
+            last = rows[-POINTS:]
+            self._crossings.see(rows[:, 0], rows.take(self._ruled, axis=1))
+            self._tail.see(last[:, 0].copy(), last.take(self._coupled, axis=1))
+            return
+        self._single += map(self._pick, rows)
+        if len(self._single) >= _BLOCK:
+            self._look()
+
+    def _look(self) -> None:
+        """At single points, together."""
+        if self._single:
+            table = np.array(self._single, dtype=np.float64)
+            self._single = []
+            end = 1 + len(self._ruled)
+            self._crossings.see(table[:, 0], np.ascontiguousarray(table[:, 1:end]))
+            self._tail.see(table[:, 0], table[:, end:])
+
+    def findings(self, recorded: Signals, error: object = None) -> list[Finding]:
+        """What was found, the gravest kind first, then by time.
+
+        Args:
+            recorded: the run's results.
+            error: what it failed of, if it did.
+        """
+        self._look()
+        found = list(self._crossings.findings())
+        everything = self._system.stepping.record in (None, self._system.stepping.step)
+        seen = (recorded,) if everything else (recorded, self._tail)
+        diverging = explain_divergence(self._system, self._interfaces, self._links, seen, error)
+        found += [] if diverging is None else [diverging]
+        return sorted(found, key=lambda finding: (finding.rank, finding.since))
+
+    def save(self) -> Any:
+        """What was seen, as JSON-ready values; the end of a run is seen anew."""
+        self._look()
+        return self._crossings.save()
+
+    def restore(self, saved: Any) -> None:
+        """Go on where `save` was called.
+
+        Raises:
+            ScenarioError: that is of another system.
+        """
+        try:
+            self._crossings.restore(saved)
+        except (LookupError, TypeError, ValueError) as error:
+            raise ScenarioError(
+                f"what the checkpoint says of findings does not fit its system ({error}); run the scenario from the start"
+            ) from error
