@@ -99,5 +99,5 @@ class Watching:
             self._crossings.restore(saved)
         except (LookupError, TypeError, ValueError) as error:
             raise ScenarioError(
-                f"what the checkpoint says of findings does not fit its system ({error}); run the scenario from the start"
+                f"what the checkpoint says of findings does not fit its system ({error}); run it from the start"
             ) from error

@@ -1,4 +1,4 @@
-"""Findings are printed first, on stdout, also when quiet; they leave the exit code alone and bar a variant from winning."""
+"""Findings are printed first, on stdout, also when quiet; no exit code changes; who has some wins nothing."""
 
 import json
 from pathlib import Path
