@@ -33,6 +33,7 @@ class Variable:
     ``derivative`` names the state that it is the rate of. ``choices`` are the items of an enumeration, name and value.
     ``relative``: a difference, to which the offset of its unit does not apply. ``fmi_type`` is its type in FMI 3.0
     (``"Float32"``), empty in other versions. ``negated``: what the FMU keeps is its negative (FMI 1.0).
+    ``element``: of an FMI 3.0 array, whose elements share its reference: the array's name, and the place from 0.
     """
 
     name: str
@@ -53,6 +54,7 @@ class Variable:
     derivative: str | None = None
     fmi_type: str = ""
     negated: bool = False
+    element: tuple[str, int] | None = None
 
     @property
     def settable(self) -> bool:
@@ -140,6 +142,15 @@ class Interface:
         """The names of all inputs."""
         return frozenset(v.name for v in self.of("input"))
 
+    @cached_property
+    def wholes(self) -> Mapping[str, tuple[str, ...]]:
+        """All elements of each FMI 3.0 array, in the order of their places."""
+        found: dict[str, list[str]] = {}
+        for name, variable in self.variables.items():
+            if variable.element is not None:
+                found.setdefault(variable.element[0], []).append(name)
+        return {array: tuple(names) for array, names in found.items()}
+
     def of(self, *causalities: str) -> tuple[Variable, ...]:
         """The variables of the given causalities, in order."""
         return tuple(v for v in self.variables.values() if v.causality in causalities)
@@ -183,4 +194,4 @@ class Interface:
     def why_left_out(self, name: str) -> str:
         """A clause to append to an error about a name that is no variable: the FMU may have it all the same."""
         what = self.left_out.get(name)
-        return f": in the FMU it is {what}, and only single numbers, booleans and texts are supported" if what else ""
+        return f": in the FMU it is {what}, and only numbers, booleans and texts are supported" if what else ""

@@ -164,6 +164,7 @@ def _variable(v: Any, listed: Any, relative: bool, beside: Beside) -> Variable:
         relative=relative,
         fmi_type=beside.fmi_types.get(v.name, ""),
         negated=v.name in beside.negated,
+        element=beside.places.get(v.name),
     )
 
 

@@ -6,11 +6,14 @@ another, and which variables of 3.0 are left out because nothing here can hold t
 
 from __future__ import annotations
 
+import itertools
+import math
 import re
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Set
 from dataclasses import dataclass, field
 from typing import Any
 
+from attr import evolve
 from fmpy.model_description import Unknown
 
 VERSIONS = {"1.0": re.compile(r"1\.0"), "2.0": re.compile(r"2\.0(\..*)?"), "3.0": re.compile(r"3\.\d+(\.\d+)?")}
@@ -25,6 +28,8 @@ _CAPABILITIES_1 = (
     "canInterpolateInputs",
     "canBeInstantiatedOnlyOncePerProcess",
 )
+_LARGEST_ARRAY = 100_000
+"""How many elements an array may have: each becomes a variable."""
 _NAMED = 10
 """How many variables a warning names."""
 
@@ -36,9 +41,11 @@ class Beside:
     Attributes:
         fmi_types: types of FMI 3.0 by variable. negated: variables of FMI 1.0 that are another's negative.
         left_out: what variables are that are not taken, by name.
+        places: of elements of FMI 3.0 arrays, by name: the array's name, and the place in it from 0.
     """
 
     fmi_types: Mapping[str, str] = field(default_factory=dict)
+    places: Mapping[str, tuple[str, int]] = field(default_factory=dict)
     negated: frozenset[str] = frozenset()
     left_out: Mapping[str, str] = field(default_factory=dict)
 
@@ -150,8 +157,9 @@ def _from_3(description: Any, root: Any) -> Beside:
     description.coSimulation.canInterpolateInputs = False  # the standard has no call for that
     written = {each.get("name"): each for each in root.find("ModelVariables") if isinstance(each.tag, str)}
     fmi_types, left_out = {}, {}
+    names = {v.name for v in description.modelVariables}
     for v in description.modelVariables:
-        reason = _not_taken(v)
+        reason = _not_taken(v, names)
         if reason:
             left_out[v.name] = reason
             continue
@@ -165,17 +173,69 @@ def _from_3(description: Any, root: Any) -> Beside:
         if v.alias is not None:
             _show_as_alias(v)
     description.modelVariables = [v for v in description.modelVariables if v.name not in left_out]
-    return Beside(fmi_types=fmi_types, left_out=left_out)
+    places = _expand(description, written) if any(v.dimensions for v in description.modelVariables) else {}
+    fmi_types |= {name: fmi_types[array] for name, (array, _) in places.items()}
+    return Beside(fmi_types=fmi_types, left_out=left_out, places=places)
 
 
-def _not_taken(v: Any) -> str:
+def _not_taken(v: Any, names: Set[str]) -> str:
     if v.type == "Clock":
         return "a clock"
-    if v.dimensions:
-        return "an array"
     if v.type == "Binary":
         return "binary"
-    return "clocked" if v.clocks else ""
+    if v.clocks:
+        return "clocked"
+    if not v.dimensions:
+        return ""
+    count = math.prod(v.shape)
+    if not 0 < count <= _LARGEST_ARRAY:
+        return f"an array of {count} elements"
+    return "" if names.isdisjoint(_element_names(v)) else "an array, and its elements' names are those of others"
+
+
+def _expand(description: Any, written: Mapping[str, Any]) -> dict[str, tuple[str, int]]:
+    """Put elements in the place of arrays, in place: ``a[1]``, ``m[1,2]``, the last index the fastest.
+
+    An element depends on all that its array depends on; of derivatives the array is the derivative element by element.
+    """
+    elements = {v.name: _elements(v, written) if v.dimensions else [v] for v in description.modelVariables}
+    for v in description.modelVariables:
+        rates = [] if v.derivative is None else elements.get(v.derivative.name, [])
+        for k, element in enumerate(elements[v.name]):
+            element.derivative = rates[k] if k < len(rates) else None
+    description.outputs = [
+        Unknown(
+            variable=e, dependencies=u.dependencies and [x for d in u.dependencies for x in elements.get(d.name, ())]
+        )
+        for u in description.outputs
+        for e in elements.get(u.variable.name, ())
+    ]
+    arrays = [v for v in description.modelVariables if v.dimensions]
+    description.modelVariables = [e for own in elements.values() for e in own]
+    return {e.name: (v.name, k) for v in arrays for k, e in enumerate(elements[v.name])}
+
+
+def _elements(v: Any, written: Mapping[str, Any]) -> list[Any]:
+    names = _element_names(v)
+    return [
+        evolve(v, name=name, start=start, dimensions=[])
+        for name, start in zip(names, _starts(v, written, len(names)), strict=True)
+    ]
+
+
+def _element_names(v: Any) -> list[str]:
+    places = itertools.product(*(range(1, size + 1) for size in v.shape))
+    return [f"{v.name}[{','.join(map(str, place))}]" for place in places]
+
+
+def _starts(v: Any, written: Mapping[str, Any], count: int) -> list[Any]:
+    """The start values of an array's elements; one that stands alone is that of all."""
+    own = written.get(v.name if v.alias is None else v.alias.name)
+    texts = [] if own is None else [start.get("value") for start in own.iterfind("Start")]
+    starts = texts if v.type == "String" else (v.start or "").split()
+    if len(starts) not in (0, 1, count):
+        raise ValueError(f'the array "{v.name}" has {len(starts)} start values for {count} elements')
+    return starts if len(starts) == count else (starts or [None]) * count
 
 
 def _show_as_alias(v: Any) -> None:

@@ -50,15 +50,15 @@ def _unfed(signal: SignalName) -> Problem:
     return Problem("", f"{signal} {what}", names=(signal,))
 
 
-def _slot(instance: str, variable: Variable) -> tuple[str, str, int]:
+def _slot(instance: str, variable: Variable) -> tuple[str, str, int, int]:
     """What a variable stands for in its FMU: those that share it are one (FMI 2.0, 2.2.7)."""
     kind = "Integer" if variable.type == "Enumeration" else variable.type
-    return instance, variable.fmi_type or kind, variable.reference
+    return instance, variable.fmi_type or kind, variable.reference, variable.element[1] if variable.element else 0
 
 
-def _fed(interfaces: Mapping[str, Interface], wiring: Wiring) -> set[tuple[str, str, int]]:
+def _fed(interfaces: Mapping[str, Interface], wiring: Wiring) -> set[tuple[str, str, int, int]]:
     """Inputs that a connection feeds."""
-    fed: dict[tuple[str, str, int], Link] = {}
+    fed: dict[tuple[str, str, int, int], Link] = {}
     for link in wiring.links:
         slot = _slot(link.target[0], interfaces[link.target[0]].variables[link.target[1]])
         first = fed.setdefault(slot, link)

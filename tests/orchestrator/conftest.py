@@ -217,6 +217,21 @@ def by_hand(compile_c, tmp_path):
 
 
 @pytest.fixture
+def arrays(compile_c, tmp_path):
+    """The FMU of arrays3.c, with parts of its description replaced."""
+
+    def pack(*changes):
+        text = (FOREIGN / "arrays3.xml").read_text(encoding="utf-8")
+        for old, new in changes:
+            assert old in text
+            text = text.replace(old, new)
+        library = f"binaries/{fmpy.platform_tuple}/Arrays{fmpy.sharedLibraryExtension}"
+        return write_archive(tmp_path / "arrays.fmu", {"modelDescription.xml": text, library: compile_c("arrays3.c")})
+
+    return pack
+
+
+@pytest.fixture
 def odd(compile_c, tmp_path):
     """The FMU of odd.c: y depends directly on v."""
     v, discrete = variable, {"variability": "discrete"}

@@ -54,7 +54,7 @@ class FmuChannel:
         references = slave.references(names)
         self.references: Sequence[int] = references[:]
         more = (count,) if slave.COUNTS_VALUES else ()
-        self._arguments = (slave.pointer, references, count, self._values, *more)
+        self._arguments = (slave.pointer, references, len(references), self._values, *more)
         self._text, self._truth = kind == "String", kind == "Boolean"
         self._limits = slave.interface.variables[names[0]].whole_range if names else None
 
@@ -88,7 +88,7 @@ class FmuChannel:
 class MixedChannel:
     """Variables of one type of ours that are of several types in the FMU."""
 
-    def __init__(self, parts: Sequence[tuple[FmuChannel, Sequence[int]]], count: int) -> None:
+    def __init__(self, parts: Sequence[tuple[Channel, Sequence[int]]], count: int) -> None:
         self._parts, self._count = parts, count
 
     def set(self, values: Sequence[Any]) -> None:

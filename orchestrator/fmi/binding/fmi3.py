@@ -1,4 +1,4 @@
-"""An FMI 3.0 co-simulation FMU behind the face of an instance: scalar variables."""
+"""An FMI 3.0 co-simulation FMU behind the face of an instance: numbers, booleans and texts."""
 
 from __future__ import annotations
 
@@ -12,6 +12,7 @@ from typing import Any
 
 from fmpy import fmi3
 
+from .arrays import whole_arrays
 from .libraries import Signatures
 from .loaded import DISCARD, OK, WARNING, LoadedSlave, keep_message
 
@@ -154,10 +155,12 @@ class Fmi3Slave(LoadedSlave):
         self, unknowns: Sequence[str], knowns: Sequence[str], seed: Sequence[float]
     ) -> list[float]:
         """How the unknowns change when the knowns change by ``seed``; all are Real variables."""
-        rows, columns = self.references(unknowns), self.references(knowns)
-        found = (c_double * len(unknowns))()
-        given = (c_double * len(knowns))(*seed)
+        all_unknowns, all_knowns = whole_arrays(unknowns, self.interface), whole_arrays(knowns, self.interface)
+        rows, columns = self.references(all_unknowns), self.references(all_knowns)
+        found, seeds = (c_double * len(all_unknowns))(), dict(zip(knowns, seed, strict=True))
+        given = (c_double * len(all_knowns))(*(seeds.get(name, 0.0) for name in all_knowns))
         self.call(
             "fmi3GetDirectionalDerivative", rows, len(rows), columns, len(columns), given, len(given), found, len(found)
         )
-        return list(found)
+        by_name = dict(zip(all_unknowns, found, strict=True))
+        return [by_name[name] for name in unknowns]

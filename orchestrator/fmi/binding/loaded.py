@@ -21,7 +21,8 @@ from fmpy.fmi1 import printLogMessage
 from ...errors import FmuError, StoppedError, cut
 from ..interface import Interface, Type
 from ..slave import STATUS, Channel
-from .channel import FmuChannel, MixedChannel, NegatedChannel
+from .arrays import prepared
+from .channel import MixedChannel, NegatedChannel
 from .libraries import Signatures, close_library, library, open_library
 
 OK, WARNING, DISCARD, FATAL, PENDING = 0, 1, 2, 4, 5
@@ -102,6 +103,7 @@ class LoadedSlave(ABC):
         self._events = events
         self._span = (0.0, 0.0)
         self._keys: list[int | bytes] = []
+        self._given: dict[str, Any] = {}
         self._library = None
         self.hear_as(id(self), name.encode())
         # pythonfmu passes even its errors on only while debug logging is on; others then flood us with details.
@@ -183,20 +185,17 @@ class LoadedSlave(ABC):
     # ---------------------------------------------------------------- values
 
     def references(self, names: Sequence[str]) -> Any:
-        """The value references of variables, for C."""
-        return (ctypes.c_uint * len(names))(*(self.interface.variables[name].reference for name in names))
+        """The value references of variables, for C; of the elements of an array, which stand together, the first's."""
+        heads = [v for v in map(self.interface.variables.__getitem__, names) if v.element is None or not v.element[1]]
+        return (ctypes.c_uint * len(heads))(*(v.reference for v in heads))
 
     def channel(self, kind: Type, names: Sequence[str]) -> Channel:
         """Prepare variables of one type for being set or read together."""
         parts: dict[str, list[int]] = {}
         for place, name in enumerate(names):
             parts.setdefault(self.interface.variables[name].fmi_type or kind, []).append(place)
-        channel: Channel
-        if len(parts) == 1:
-            channel = FmuChannel(self, next(iter(parts)), names)
-        else:
-            own = [(FmuChannel(self, each, [names[k] for k in places]), places) for each, places in parts.items()]
-            channel = MixedChannel(own, len(names))
+        own = [(prepared(self, each, [names[k] for k in ks], self._given), ks) for each, ks in parts.items()]
+        channel = own[0][0] if len(own) == 1 else MixedChannel(own, len(names))
         negated = [self.interface.variables[name].negated for name in names]
         return NegatedChannel(channel, negated, kind) if any(negated) else channel
 

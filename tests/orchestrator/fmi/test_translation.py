@@ -125,7 +125,10 @@ def test_types_of_fmi_3_and_what_is_left_out():
         variable("n", "UInt64"),
         variable("on", "Boolean"),
         variable("k", "Int8", initial="exact", causality="structuralParameter"),
-        variable("row", "Float64", dimensions=[SimpleNamespace()]),
+        variable("vast", "Float64", dimensions=[SimpleNamespace()], shape=(10**6, 10**6)),
+        variable("none", "Float64", dimensions=[SimpleNamespace()], shape=(0,)),
+        variable("row", "Float64", dimensions=[SimpleNamespace()], shape=(2,)),
+        variable("row[2]", "Boolean"),
         variable("blob", "Binary"),
         variable("tick", "Clock"),
         variable("sampled", "Float64", clocks=["tick"]),
@@ -137,10 +140,19 @@ def test_types_of_fmi_3_and_what_is_left_out():
     beside = translation.translate(description, it, "3.0")
     by_name = {v.name: v for v in description.modelVariables}
     assert {name: v.type for name, v in by_name.items()} == {
-        "x": "Real", "n": "Integer", "on": "Boolean", "k": "Integer", "twin": "Real",
+        "x": "Real", "n": "Integer", "on": "Boolean", "k": "Integer", "twin": "Real", "row[2]": "Boolean",
     }  # fmt: skip
-    assert beside.fmi_types == {"x": "Float32", "n": "UInt64", "on": "Boolean", "k": "Int8", "twin": "Float64"}
-    assert beside.left_out == {"row": "an array", "blob": "binary", "tick": "a clock", "sampled": "clocked"}
+    assert beside.fmi_types == {
+        "x": "Float32", "n": "UInt64", "on": "Boolean", "k": "Int8", "twin": "Float64", "row[2]": "Boolean",
+    }  # fmt: skip
+    assert beside.left_out == {
+        "vast": "an array of 1000000000000 elements",
+        "none": "an array of 0 elements",
+        "row": "an array, and its elements' names are those of others",
+        "blob": "binary",
+        "tick": "a clock",
+        "sampled": "clocked",
+    }
     assert (by_name["n"].min, by_name["n"].max) == ("1", "18446744073709551615")
     assert by_name["k"].initial is None
     assert (by_name["twin"].causality, by_name["twin"].description) == ("local", "again (another name of x)")

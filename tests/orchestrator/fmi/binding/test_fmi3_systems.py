@@ -167,7 +167,7 @@ def test_a_bad_description_of_the_sources_is_no_reason(xml, tmp_path, workspace)
 def test_notes_name_what_is_left_out(by_hand, workspace):
     system = System(stop_time=1.0, step=0.25)
     system.add("it", str(by_hand(3)))
-    assert any("are left out: row (an array)" in note for note in check(system, workspace).notes)
+    assert any("are left out: blob (binary)" in note for note in check(system, workspace).notes)
 
 
 @pytest.mark.parametrize("derivatives", [True, False])

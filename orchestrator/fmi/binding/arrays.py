@@ -1,0 +1,67 @@
+"""Elements of FMI 3.0 arrays, which are set and read as whole arrays only."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+from ..interface import Interface
+from ..slave import Channel
+from .channel import FmuChannel, Owner
+
+_NOTHING: Mapping[str, Any] = {"Real": 0.0, "Integer": 0, "Enumeration": 0, "Boolean": False, "String": ""}
+
+
+def prepared(slave: Owner, kind: str, names: Sequence[str], given: dict[str, Any]) -> Channel:
+    """The channel of some variables of one type.
+
+    Args:
+        slave: the instance.
+        kind: the variables' type, as `FmuChannel` takes it.
+        names: the variables, in any order.
+        given: what was given to elements of arrays last, by name; the same for all channels of an instance.
+    """
+    if not any(slave.interface.variables[name].element for name in names):
+        return FmuChannel(slave, kind, names)
+    whole = whole_arrays(names, slave.interface)
+    return ElementsChannel(FmuChannel(slave, kind, whole), whole, names, given, slave.interface)
+
+
+def whole_arrays(names: Sequence[str], interface: Interface) -> list[str]:
+    """The variables, each element among them with all others of its array, and in the order of their places."""
+    found: dict[str, None] = {}
+    for name in names:
+        element = interface.variables[name].element
+        found |= dict.fromkeys((name,) if element is None else interface.wholes[element[0]])
+    return list(found)
+
+
+class ElementsChannel:
+    """Some variables of which one at least is an element of an array.
+
+    Of an array that is set in part, the other elements keep what they were given last, at first their start values.
+
+    Args:
+        channel: of `whole_arrays`. whole: its variables. names: those that are wanted.
+        given: what was given last, by name.
+        interface: the instance's.
+    """
+
+    def __init__(
+        self, channel: Channel, whole: Sequence[str], names: Sequence[str], given: dict[str, Any], interface: Interface
+    ) -> None:
+        self._channel, self._names, self._given = channel, names, given
+        rank = {name: k for k, name in enumerate(whole)}
+        self._places = [rank[name] for name in names]
+        variables = (interface.variables[name] for name in whole)
+        self._starts = {v.name: _NOTHING[v.type] if v.start is None else v.start for v in variables}
+
+    def set(self, values: Sequence[Any]) -> None:
+        """Set all of them."""
+        self._given.update(zip(self._names, values, strict=True))
+        self._channel.set([self._given.get(name, start) for name, start in self._starts.items()])
+
+    def get(self) -> list[Any]:
+        """Read all of them."""
+        values = self._channel.get()
+        return [values[k] for k in self._places]
