@@ -110,6 +110,7 @@ class Stepping:
         extrapolation: order of the polynomial by which inputs are continued over a step (0: held), for FMUs that can
             interpolate their inputs.
         algebraic_loops: ``"delay"`` (a loop acts one step late) or ``"solve"`` (solved at each communication point).
+        refresh: whether outputs with direct feed-through are brought up to date at each communication point.
         tolerance: relative; of ``iterative`` for what is exchanged, of ``adaptive`` for the error of a step; None for
             the algorithm's default. tolerances: ``[relative, absolute]`` of single signals, by name.
         max_iterations, relaxation, acceleration: of ``iterative``. min_step: of ``adaptive``, s.
@@ -123,6 +124,7 @@ class Stepping:
     order: list[str] = field(default_factory=list)
     extrapolation: int = 0
     algebraic_loops: Loops = "delay"
+    refresh: bool = False
     tolerance: float | None = None
     tolerances: dict[str, list[float]] = field(default_factory=dict)
     max_iterations: int = 50

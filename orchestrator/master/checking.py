@@ -19,6 +19,7 @@ def check_coupling(system: System, interfaces: Mapping[str, Interface], wiring: 
     return [
         *_check_rates(system),
         *_check_tolerances(system, interfaces),
+        *_check_refresh(system),
         *ALGORITHMS[system.stepping.algorithm].fit(system, interfaces, wiring).problems,
     ]
 
@@ -35,6 +36,8 @@ def _check_rates(system: System) -> Iterable[Problem]:
             limit = f"which goes with {able} only"
         elif system.stepping.algebraic_loops == "solve":
             limit = "with which algebraic_loops = 'solve' does not go"
+        elif system.stepping.refresh:
+            limit = "with which refresh does not go"
         if limit:
             yield Problem(instance.origin, f"{name} has a step of its own, {limit}", names=(name,))
         own = f"its step = {instance.step:g} s"
@@ -66,6 +69,13 @@ def _check_tolerances(system: System, interfaces: Mapping[str, Interface]) -> It
     if system.stepping.min_step is not None and not ALGORITHMS[system.stepping.algorithm].varies_step:
         able = " and ".join(name for name, one in ALGORITHMS.items() if one.varies_step)
         yield Problem("", f"simulation.min_step is for {able}", f"the algorithm is {system.stepping.algorithm}")
+
+
+def _check_refresh(system: System) -> Iterable[Problem]:
+    if system.stepping.refresh and ALGORITHMS[system.stepping.algorithm].solves_loops:
+        able = " and ".join(name for name, one in ALGORITHMS.items() if not one.solves_loops)
+        what = f"simulation.refresh is for {able}; with {system.stepping.algorithm} what is exchanged agrees anyway"
+        yield Problem("", what, "leave it out").at(system.provenance.origins.get("simulation.refresh", ""))
 
 
 def describe_coupling(system: System, interfaces: Mapping[str, Interface], wiring: Wiring) -> list[str]:

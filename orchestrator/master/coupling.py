@@ -10,6 +10,7 @@ from ..wiring import Link
 from .algebraic_loops import LoopSolver
 from .exchange import Exchange
 from .extrapolation import Extrapolator
+from .refresh import Refresher
 from .settings import Settings
 
 _SOLVED = 1e-9
@@ -29,6 +30,7 @@ class Coupling:
             that their outputs with direct feed-through are read apart from the others.
 
     Attributes:
+        refresher: brings feed-through up to date at each communication point; None where that is not wanted.
         loops: solves algebraic loops at each communication point; None where there is none, or none is to be solved.
         steps: communication steps taken. time: the communication point that has been reached, in s.
     """
@@ -50,10 +52,13 @@ class Coupling:
         parted = set(settings.rates)
         if is_of_end:
             parted |= {name for name, interface in self.interfaces.items() if interface.sampled}
-        self.exchange = Exchange(slaves, links, sweeping=is_sweeping, parted=parted)
+        self.exchange = Exchange(
+            slaves, links, sweeping=is_sweeping, parted=parted, refreshing=settings.stepping.refresh
+        )
         order = settings.stepping.extrapolation
         self.extrapolator = Extrapolator(self.exchange, links, order, ended=is_of_end) if order else None
         self.loops: LoopSolver | None = None
+        self.refresher = Refresher(self.exchange, self.interfaces, links) if settings.stepping.refresh else None
         self.steps = 0
         self.time = 0.0
 
@@ -71,17 +76,33 @@ class Coupling:
         else:
             self.extrapolator.write(name, time, length, ended=ended)
 
-    def solve_loops(self, time: float) -> None:
-        """Find values that agree at a time in s, where algebraic loops are to be solved.
+    def settle(self, time: float) -> None:
+        """Bring values at a time in s up to date, where feed-through is to be refreshed or loops are to be solved.
+
+        The point is not recorded yet.
 
         Raises:
-            CouplingError: there are none near the present ones.
+            FmuError: an FMU failed.
+            CouplingError: a loop has no solution near the present values.
         """
-        if self.loops is None:
+        if self.refresher is None and self.loops is None:
             return
-        left = self.loops.solve(time)
+        self.exchange.is_at_point = True
+        try:
+            if self.refresher is not None:
+                self.refresher.refresh(time)
+            if self.loops is not None:
+                self._solve_loops(self.loops, time)
+                if self.refresher is not None:  # what follows from the loops
+                    self.refresher.refresh(time)
+        finally:
+            self.exchange.is_at_point = False
+
+    @staticmethod
+    def _solve_loops(loops: LoopSolver, time: float) -> None:
+        left = loops.solve(time)
         if not left <= _SOLVED:
-            names = ", ".join(self.loops.signals[:6])
+            names = ", ".join(loops.signals[:6])
             raise CouplingError(
                 f"t = {time:g} s: the algebraic loop through {names} has no solution near its last one: it is left "
                 f"with a relative residual of {left:.3g}; take a smaller step, or put a component with memory into it"

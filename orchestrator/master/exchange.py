@@ -44,8 +44,8 @@ class Change:
 class Feed:
     """Inputs of one type of one instance: where each value comes from, and how it is changed on the way.
 
-    ``sources`` are indices into the values; ``ages`` say how many recorded points back to look (None: the live value);
-    ``targets`` are the inputs' names.
+    ``sources`` are indices into the values; ``ages`` say how many recorded points back to look (None: the live value),
+    and ``ages_at_point`` the same at a communication point that is not recorded yet; ``targets`` are the inputs' names.
     """
 
     channel: Channel
@@ -56,6 +56,7 @@ class Feed:
     scales: tuple[float, ...]
     offsets: tuple[float, ...]
     ages: tuple[int | None, ...]
+    ages_at_point: tuple[int | None, ...]
     changes: list[Change | None] = field(default_factory=list)
 
     @property
@@ -91,6 +92,7 @@ class Exchange:
         links: scalar connections.
         sweeping: whether instances are read one by one while others have not stepped yet, as in a Gauss-Seidel sweep.
         parted: instances whose direct outputs are read apart from the others: they are due at different points.
+        refreshing: whether direct outputs of what is not sampled are brought up to date before a point is recorded.
     """
 
     def __init__(
@@ -100,6 +102,7 @@ class Exchange:
         *,
         sweeping: bool = True,
         parted: Collection[str] = (),
+        refreshing: bool = False,
     ) -> None:
         self.slaves = slaves
         self.links = links
@@ -107,7 +110,9 @@ class Exchange:
         """Names of the values, in the order in which they are recorded."""
         self.places: dict[tuple[str, str], int] = {}
         """Where the value of (instance, variable) stands."""
-        self._sweeping = sweeping
+        self._sweeping, self._refreshing = sweeping, refreshing
+        self.is_at_point = False
+        """Whether values are exchanged at a communication point that is not recorded yet, not for a step from one."""
         wanted: dict[str, set[str]] = {name: set() for name in slaves}
         incoming: dict[str, list[Link]] = {name: [] for name in slaves}
         for link in links:
@@ -162,6 +167,7 @@ class Exchange:
                     scales=tuple(link.scale for link in links),
                     offsets=tuple(link.offset for link in links),
                     ages=tuple(self.age(link) for link in links),
+                    ages_at_point=tuple(self._age_at_point(link) for link in links),
                 )
             )
         return plan
@@ -174,7 +180,16 @@ class Exchange:
         """
         if not link.delay:
             return None
-        return link.delay - 1 if link.direct and self._sweeping else link.delay
+        return link.delay - 1 if self._is_recorded_late(link) else link.delay
+
+    def _is_recorded_late(self, link: Link) -> bool:
+        """Whether a value recorded at a point was computed from the inputs of the point before."""
+        refreshed = self._refreshing and not self.slaves[link.source[0]].interface.sampled
+        return link.direct and self._sweeping and not refreshed
+
+    def _age_at_point(self, link: Link) -> int | None:
+        """The same for the point that comes after the last one recorded."""
+        return link.delay - 1 if link.delay else None
 
     # ---------------------------------------------------------------- exchange
 
@@ -190,7 +205,8 @@ class Exchange:
     def inputs(self, feed: Feed, time: float) -> list[Any]:
         """Input values with delay, scale and offset applied, and what events make of them."""
         result = []
-        for k, scale, offset, age in zip(feed.sources, feed.scales, feed.offsets, feed.ages, strict=True):
+        ages = feed.ages_at_point if self.is_at_point else feed.ages
+        for k, scale, offset, age in zip(feed.sources, feed.scales, feed.offsets, ages, strict=True):
             value = self.values[k] if age is None else self._aged(age, k)
             result.append(scale * value + offset if feed.is_real and (scale, offset) != (1.0, 0.0) else value)
         for k, change in enumerate(feed.changes):

@@ -187,8 +187,7 @@ class Master:
 
         def see(steps: int, rows: Rows) -> bool:
             if steps == stop and self._let_happen(LATE * step, lambda: observe(steps, rows)):
-                if self.exchange.depth:
-                    self.exchange.history[-1] = list(self.values)
+                self.exchange.remember()
                 if len(rows) and rows[-1][0] == self.time:
                     rows[-1][1:] = self.values  # type: ignore[index]
             return observe(steps, rows)
@@ -208,7 +207,9 @@ class Master:
                 return False
             if self.coupling.extrapolator is not None:
                 self.coupling.extrapolator.restart()
-            self.coupling.solve_loops(self.time)
+            if self.exchange.history:  # what was noted of this point is of before
+                self.exchange.history.pop()
+            self.coupling.settle(self.time)
         except RunError:
             keep()
             raise
@@ -222,7 +223,7 @@ class Master:
         for k in range(first, stop):
             time = start_time + k * step
             take(k, time, step)
-            coupling.solve_loops(time + step)
+            coupling.settle(time + step)
             self.exchange.remember()
             coupling.steps = k + 1
             coupling.time = start_time + coupling.steps * step
@@ -307,6 +308,8 @@ class Master:
                 "solutions": loops.solutions,
                 "worst_residual": loops.residual,
             }
+        if self.coupling.refresher is not None:
+            found["refresh"] = self.coupling.refresher.report()
         if report := self.algorithm.report():
             found[self.algorithm.name] = report
         if self._schedule is not None:

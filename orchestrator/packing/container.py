@@ -110,6 +110,7 @@ def _refused(system: System, checked: Checked, platforms: Sequence[str]) -> list
         f"algorithm = {system.stepping.algorithm}": not issubclass(ALGORITHMS[system.stepping.algorithm], Explicit),
         f"extrapolation = {system.stepping.extrapolation}": bool(system.stepping.extrapolation),
         "algebraic_loops = solve": system.stepping.algebraic_loops == "solve",
+        "refresh": system.stepping.refresh,
         "[[events]]": bool(system.events),
         **{
             f"{name}: a step of its own": x.step not in (None, system.stepping.step)

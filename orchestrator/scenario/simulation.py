@@ -10,7 +10,7 @@ from ..errors import ScenarioError
 from ..master import ALGORITHMS
 from ..problems import Problem
 from ..system import ACCELERATIONS, LOOPS
-from .groups import Entry, choice, number, positive, shown, whole, whole_multiple
+from .groups import Entry, choice, number, positive, shown, truth, whole, whole_multiple
 from .patterns import Counts, members, read_signal
 
 SIMULATION_KEYS = (
@@ -23,6 +23,7 @@ SIMULATION_KEYS = (
     "order",
     "extrapolation",
     "algebraic_loops",
+    "refresh",
     "tolerance",
     "tolerances",
     "max_iterations",
@@ -68,6 +69,8 @@ def _numerics(entries: Mapping[str, Entry], problems: list[Problem]) -> dict[str
     if "extrapolation" in entries:
         order = "0, 1 or 2, the order of the polynomial by which inputs are continued"
         values["extrapolation"] = whole(entries["extrapolation"], problems, lambda value: value in (0, 1, 2), order)
+    if "refresh" in entries:
+        values["refresh"] = truth(entries["refresh"], problems)
     if "max_iterations" in entries:
         least = "a whole number, at least 1"
         values["max_iterations"] = whole(entries["max_iterations"], problems, lambda value: value >= 1, least)

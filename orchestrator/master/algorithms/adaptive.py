@@ -183,7 +183,7 @@ class Adaptive(VariableStep):
             self.exchange.read_finite(slave, time + length)
         if not ended and self.repetition.places:
             self.repetition.reached = list(self.exchange.values)
-        self.coupling.solve_loops(time + length)
+        self.coupling.settle(time + length)
 
     def _take(self, time: float, end: float, kept: list[_Point]) -> tuple[float, int]:
         """Take a step in two halves; its error as `_error` has it, and the place of the value that has it."""

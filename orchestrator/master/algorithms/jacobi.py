@@ -20,7 +20,8 @@ class Jacobi(Explicit):
     @classmethod
     def fit(cls, system: System, interfaces: Mapping[str, Interface], wiring: Wiring) -> Fit:
         """Any system can be stepped so."""
-        return Fit(steps=("steps all instances in parallel; a feed-through output acts one step late",))
+        through = "is refreshed at each communication point" if system.stepping.refresh else "acts one step late"
+        return Fit(steps=(f"steps all instances in parallel; a feed-through output {through}",))
 
     def batches(self) -> Sequence[Batch]:
         """Nothing is read before all have stepped."""

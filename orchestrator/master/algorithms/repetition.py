@@ -50,7 +50,8 @@ class Repetition:
             elif fed[instance]:
                 plain.add(instance)
         stepping = coupling.settings.stepping
-        self.is_proven = bool(plain) or not self.places or stepping.algebraic_loops == "solve"
+        self.is_proven = bool(plain) or not self.places or stepping.refresh
+        self.is_proven |= stepping.algebraic_loops == "solve"
         self.reached: list[Any] = []
         self._shown: dict[str, list[tuple[Feed, list[Any], list[Points] | None]]] = {}
         self._has_moved = False

@@ -1,11 +1,13 @@
 /* One of two species, dx/dt = x (a + b u) + c u by RK4 in parts no longer than 1 ms, with u held over the step. By value
    reference: 0 u (input); 1 y (output: x + d u, with -DHELD the u of the last step, else the one that is set); 2 a; 3 b;
-   4 c; 5 d; 6 start (parameters). The description may say of y's dependencies what it likes. */
+   4 c; 5 d; 6 start (parameters). The description may say of y's dependencies what it likes. With -DSHY it cannot be read
+   between being set and the next step. */
 
 #include "fmi2.h"
 
 typedef struct {
     double v[7], x, held, time;
+    int steps, is_set;
 } Species;
 
 void *fmi2Instantiate(const char *name, int kind, const char *guid, const char *place, const Callbacks *callbacks,
@@ -41,13 +43,19 @@ int fmi2SetReal(void *c, const unsigned *vr, size_t count, const double *values)
     for (size_t k = 0; k < count; k++) {
         s->v[vr[k]] = values[k];
     }
-    s->x = s->time == 0.0 ? s->v[6] : s->x;
+    s->x = s->steps == 0 ? s->v[6] : s->x;
+    s->is_set = s->steps > 0;
     return 0;
 }
 
 int fmi2GetReal(void *c, const unsigned *vr, size_t count, double *values)
 {
     Species *s = c;
+#ifdef SHY
+    if (s->is_set) {
+        return 3;
+    }
+#endif
 #ifdef HELD
     s->v[1] = s->x + s->v[5] * s->held;
 #else
@@ -71,6 +79,8 @@ int fmi2DoStep(void *c, double time, double step, int final)
     double h = step / count;
     (void)final;
     s->held = s->v[0];
+    s->is_set = 0;
+    s->steps++;
     for (int k = 0; k < count; k++) {
         double p = slope(s, s->x), q = slope(s, s->x + 0.5 * h * p), r = slope(s, s->x + 0.5 * h * q);
         s->x += h / 6.0 * (p + 2.0 * q + 2.0 * r + slope(s, s->x + h * r));

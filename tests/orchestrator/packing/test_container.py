@@ -220,6 +220,7 @@ def test_what_a_container_cannot_do_is_refused_by_name(tmp_path, options, part):
         ("train: a step of its own", lambda s: setattr(s.instances["train"], "step", 0.2)),
         ("algorithm = iterative", lambda s: setattr(s.stepping, "algorithm", "iterative")),
         ("extrapolation = 1", lambda s: setattr(s.stepping, "extrapolation", 1)),
+        ("refresh", lambda s: setattr(s.stepping, "refresh", True)),
         ("algebraic_loops = solve", lambda s: setattr(s.stepping, "algebraic_loops", "solve")),
     ],
 )

@@ -23,6 +23,7 @@ FINITE = st.floats(allow_nan=False, allow_infinity=False)
 NUMERICS = {
     "extrapolation": st.integers(0, 2),
     "algebraic_loops": st.sampled_from(LOOPS),
+    "refresh": st.booleans(),
     "tolerance": st.floats(1e-300, 0.999),
     "max_iterations": st.integers(1, 2**63 - 1),
     "relaxation": st.floats(1e-300, 2.0),
