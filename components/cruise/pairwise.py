@@ -50,7 +50,7 @@ class PairwiseCruise(GuardedCruise, ABC):
 
     def _bottom(self) -> Any:
         ahead = self.alpha * (self.ahead_speed - self.speed) + self._pull(self._gap_ahead())
-        behind = self.alpha * (self.speed - self.behind_speed) + self._pull(self._gap_behind())
+        behind = self.alpha * (self.speed - self.behind_speed) + self._pull_behind(self._gap_behind())
         return (
             self.k * (self.target_speed - self.speed)
             + where(self.has_ahead, ahead, 0.0)
@@ -61,6 +61,10 @@ class PairwiseCruise(GuardedCruise, ABC):
     @abstractmethod
     def _pull(self, gap: Any) -> Any:
         """P(gap) in m/s2, positive where the rear train is to catch up."""
+
+    def _pull_behind(self, gap: Any) -> Any:
+        """What of the train behind's P(gap) acts back on the own train, before rho, m/s2."""
+        return self._pull(gap)
 
     @abstractmethod
     def _compensated_speed(self) -> Any:

@@ -33,6 +33,9 @@ class Law:
     w: float = 0.20
     gap_rate: float = 1.0
     limit: float = np.inf
+    sigma: float = 1.0
+    low: float = 0.770
+    high: float = 0.422
 
     def pull(self, d, desired):
         """P(d) in m/s2, gaps and desired gap in km."""
@@ -40,7 +43,8 @@ class Law:
             return self.kappa * MU * (d - 7.4)
         if self.name == "range":
             a, b = RANGE_KM
-            return self.kappa * (-2.0 * d / (d**2 - a**2) ** 2 + 2.0 * d / (b**2 - d**2) ** 2)
+            above, below = np.maximum(d - (b - self.high), 0.0), np.maximum(a + self.low - d, 0.0)
+            return self.kappa * (above / (b - d) - below / (d - a))
         s = self.dead_zone(d - desired)
         return self.kappa * s / np.sqrt(s**2 + self.w**2)
 
@@ -50,7 +54,8 @@ class Law:
             return 0.5 * self.kappa * MU * (d - 7.4) ** 2
         if self.name == "range":
             a, b = RANGE_KM
-            return self.kappa * (1.0 / (d**2 - a**2) + 1.0 / (b**2 - d**2))
+            upper, lower = np.minimum((b - d) / self.high, 1.0), np.minimum((d - a) / self.low, 1.0)
+            return self.kappa * (self.high * (upper - 1.0 - np.log(upper)) + self.low * (lower - 1.0 - np.log(lower)))
         s = self.dead_zone(d - desired)
         return self.kappa * (np.sqrt(s**2 + self.w**2) - self.w)
 
@@ -60,10 +65,11 @@ class Law:
     def demand(self, x, v, target, desired):
         """b of all trains in m/s2; x, v of shape (..., n), the leader first."""
         front, rear = slice(None, -1), slice(1, None)
-        f = self.alpha * (v[..., front] - v[..., rear]) + self.pull((x[..., front] - x[..., rear]) / 1000.0, desired)
+        relative = self.alpha * (v[..., front] - v[..., rear])
+        pull = self.pull((x[..., front] - x[..., rear]) / 1000.0, desired)
         b = self.k * (target - v)
-        b[..., rear] += f
-        b[..., front] -= self.rho * f
+        b[..., rear] += relative + pull
+        b[..., front] -= self.rho * (relative + self.sigma * pull)
         return np.clip(b, -self.limit, self.limit)
 
     def acceleration(self, x, v, target, desired):
@@ -76,7 +82,7 @@ class Law:
 
 
 FIXED = Law("fixed", k=0.0065, alpha=0.037, kappa=7.7e-3, rho=2.0 / 3.0)
-RANGE = Law("range", k=0.019, alpha=0.016, kappa=0.20, rho=1.0)
+RANGE = Law("range", k=0.008, alpha=0.082, kappa=1.23, rho=1.0, sigma=0.345)
 TUNABLE = Law("tunable", k=0.0094, alpha=0.035, kappa=2.3, rho=2.0 / 3.0)
 COMFORT = Law("tunable", k=0.009, alpha=0.020, kappa=0.5, rho=1.0, w=0.14)
 LAWS = {"FixedDistanceCruise": FIXED, "RangePotentialCruise": RANGE, "TunablePotentialCruise": TUNABLE}
@@ -194,8 +200,14 @@ def indices(run, begin=0.0, end=2000.0):
     return convergence, float(error.max()), float(run.gaps[phase].max() - 7.4), float(np.abs(run.a[phase]).max())
 
 
+def agreement(run, band=1.0):
+    """First time in s from which all speeds are within a band (m/s) of one another to the end of the first phase."""
+    apart = np.flatnonzero(~(np.ptp(run.v[run.t < 2000.0 - 1e-9], axis=-1) <= band))
+    return float(run.t[apart[-1] + 1]) if apart.size else 0.0
+
+
 def lyapunov(law, run, target=70.0, desired=7.4):
     """W of section 7 at each reported time."""
     e = run.v - target
-    weights = law.rho ** np.arange(e.shape[-1])
+    weights = (law.rho * law.sigma) ** np.arange(e.shape[-1])
     return 0.5 * (weights * e**2).sum(axis=-1) + MU * (weights[1:] * law.potential(run.gaps, desired)).sum(axis=-1)
