@@ -24,7 +24,9 @@ class RangePotentialCruise(PairwiseCruise):
     ``range_violated`` says when one is outside.
     """
 
-    source = "Li, Yang, Gao 2015, as reference [20] of Huang et al. 2022 (J. Adv. Transp. 3639586), section 4.3, Table 4"
+    source = (
+        "Li, Yang, Gao 2015, as reference [20] of Huang et al. 2022 (J. Adv. Transp. 3639586), section 4.3, Table 4"
+    )
     equations = (
         r"$b = k\,(v_\mathrm{r} - v) + f_\mathrm{ahead} - \rho\, f_\mathrm{behind}, \qquad"
         r" f = \alpha\,(v_\mathrm{front} - v_\mathrm{rear}) + P(d)$, in $f_\mathrm{behind}$ with $\sigma\, P(d)$",

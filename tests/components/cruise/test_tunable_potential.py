@@ -18,7 +18,7 @@ SPEED = (68.0, 60.0, 45.0, 49.0, 12.0)
 LAWS = (FixedDistanceCruise, RangePotentialCruise, TunablePotentialCruise)
 GAINS = {
     FixedDistanceCruise: (0.0065, 0.037, 2.0 / 3.0),
-    RangePotentialCruise: (0.019, 0.016, 1.0),
+    RangePotentialCruise: (0.008, 0.082, 1.0),
     TunablePotentialCruise: (0.0094, 0.035, 2.0 / 3.0),
 }
 NONSENSE = {"ahead_position": -1e300, "ahead_speed": 1e300, "behind_position": 1e300, "behind_speed": -1e300}
@@ -29,7 +29,7 @@ def pull(law, d, delta=0.05, w=0.2):
     if law is FixedDistanceCruise:
         return 7.7 * (d - 7.4)
     if law is RangePotentialCruise:
-        return 0.20 * (-2 * d / (d**2 - 6.5**2) ** 2 + 2 * d / (8.0**2 - d**2) ** 2)
+        return 1.23 * (max(d - 7.578, 0.0) / (8.0 - d) - max(7.27 - d, 0.0) / (d - 6.5))
     e = d - 7.4
     s = e - min(max(e, -delta), delta)
     return 2.3 * s / math.sqrt(s**2 + w**2)
@@ -38,11 +38,12 @@ def pull(law, d, delta=0.05, w=0.2):
 def formula(law, position, speed, target=70.0):
     """Section 2: the demands b of all trains."""
     k, alpha, rho = GAINS[law]
+    sigma = 0.345 if law is RangePotentialCruise else 1.0
     pairs = list(zip(position, position[1:], speed, speed[1:], strict=False))
-    f = [alpha * (v - w) + pull(law, (x - y) / 1e3) for x, y, v, w in pairs]
-    return [
-        k * (target - v) + (f[i - 1] if i else 0.0) - rho * (f[i] if i < len(f) else 0.0) for i, v in enumerate(speed)
-    ]
+    f = [(alpha * (v - w), pull(law, (x - y) / 1e3)) for x, y, v, w in pairs]
+    ahead = [0.0, *(relative + field for relative, field in f)]
+    behind = [*(rho * (relative + sigma * field) for relative, field in f), 0.0]
+    return [k * (target - v) + a - b for v, a, b in zip(speed, ahead, behind, strict=True)]
 
 
 def controllers(law, position=POSITION, speed=SPEED, **values):
@@ -113,6 +114,19 @@ def test_the_range_law_gives_train_5_a_push_at_the_start():
     out = controllers(RangePotentialCruise)[-1].outputs()
     acceleration = PointMassTrain(speed=12.0, force=out["force"]).outputs()["acceleration"]
     assert acceleration - out["demand"] == pytest.approx(0.806, abs=5e-4)
+
+
+@given(st.floats(7.27e3, 7.578e3))
+def test_inside_the_range_nothing_pulls_under_the_range_law(gap):
+    """Section 2: gaps stay where they are once speeds agree."""
+    law = RangePotentialCruise(has_ahead=True, ahead_position=gap, k=0.0, alpha=0.0)
+    assert law.outputs()["demand"] == 0.0
+
+
+@given(st.floats(-1e6, 1e6))
+def test_the_range_laws_pull_restores_beyond_the_range_too(gap):
+    law = RangePotentialCruise(has_ahead=True, ahead_position=gap, k=0.0, alpha=0.0)
+    assert law.outputs()["demand"] * (gap - 7.4e3) >= 0.0
 
 
 # ---------------------------------------------------------------- the tunable potential
