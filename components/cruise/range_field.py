@@ -13,8 +13,10 @@ _NEAREST = 1.0
 
 
 def slope(gap: Any, low: Any, high: Any) -> Any:
-    """U'(gap) in 1/m3 of U(d) = 1/(d^2 - low^2) + 1/(high^2 - d^2); negative near the lower bound, positive near the
-    upper one, restoring beyond them too."""
+    """U'(gap) in 1/m3 of U(d) = 1/(d^2 - low^2) + 1/(high^2 - d^2).
+
+    Negative near the lower bound, positive near the upper one, restoring beyond them too.
+    """
     below = _away_from_zero(gap * gap - low * low)
     above = _away_from_zero(high * high - gap * gap)
     return 2.0 * gap / (above * above) - 2.0 * gap / (below * below)

@@ -35,7 +35,7 @@ def test_table_4(platoon, runs, name, expected):
 
 
 def test_under_the_range_law_speeds_agree_before_the_target_is_reached_and_gaps_stay(platoon, runs):
-    """Section 5: 80 s, before 100 s; 38 m from then on whatever the target speed does, nothing once speeds are equal."""
+    """Section 2.1: 80 s, before 100 s; 38 m from then on, nothing once speeds are equal."""
     run = runs["RangePotentialCruise"]
     agreed = platoon.agreement(run)
     assert agreed == 80.0
