@@ -42,6 +42,9 @@ class FixedDistanceCruise(PairwiseCruise):
     def _pull(self, gap: Any) -> Any:
         return self.gap_gain * (gap - self.desired_gap)
 
+    def _pull_behind(self, gap: Any) -> Any:
+        return self._pull(gap)
+
     def _compensated_speed(self) -> Any:
         return self.speed
 

@@ -62,9 +62,9 @@ class PairwiseCruise(GuardedCruise, ABC):
     def _pull(self, gap: Any) -> Any:
         """P(gap) in m/s2, positive where the rear train is to catch up."""
 
+    @abstractmethod
     def _pull_behind(self, gap: Any) -> Any:
         """What of the train behind's P(gap) acts back on the own train, before rho, m/s2."""
-        return self._pull(gap)
 
     @abstractmethod
     def _compensated_speed(self) -> Any:

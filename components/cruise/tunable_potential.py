@@ -72,6 +72,9 @@ class TunablePotentialCruise(PairwiseCruise):
         s = error - clip(error, -self.gap_tolerance, self.gap_tolerance)
         return self.pull_limit * s / sqrt(s * s + self.gap_width * self.gap_width)
 
+    def _pull_behind(self, gap: Any) -> Any:
+        return self._pull(gap)
+
     def _compensated_speed(self) -> Any:
         return self.speed
 
