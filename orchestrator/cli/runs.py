@@ -78,7 +78,7 @@ def run(
         int,
         typer.Option(
             min=1,
-            help="Threads that step in parallel: jacobi, FMI 2.0 FMUs; for many or heavy ones on idle cores.",
+            help="Threads that step in parallel, under jacobi with FMI 2.0 FMUs: for many or heavy ones on idle cores.",
         ),
     ] = 1,
     checkpoint_every: Annotated[

@@ -10,7 +10,7 @@ from ..run import check as check_system
 from ..run import describe_stepping
 from ..scenario import load, shipped
 from ..wiring import describe_topology
-from .options import Algorithm, Preset, Scenario, Set, Swap, With, load_system
+from .options import Algorithm, Preset, Scenario, Set, Step, Stop, Swap, With, load_system
 from .printing import counted, open_console, say, show_compilations, show_notes
 
 
@@ -39,10 +39,12 @@ def check(
     settings: Set = None,
     builds: With = None,
     swaps: Swap = None,
+    stop: Stop = None,
+    step: Step = None,
     algorithm: Algorithm = None,
 ) -> None:
     """Find what is wrong before a run, and show how the run would step."""
-    system = load_system(scenario, preset, settings, builds, swaps, algorithm=algorithm)
+    system = load_system(scenario, preset, settings, builds, swaps, stop=stop, step=step, algorithm=algorithm)
     out = open_console()
     with Workspace() as workspace, show_compilations(quiet=False):
         checked = check_system(system, workspace)

@@ -7,7 +7,7 @@ kernel.
 
 from .algebraic_loops import find_loops
 from .algorithms import ALGORITHMS, Explicit, Operation
-from .checking import check_coupling, describe_coupling
+from .checking import check_coupling, check_threads, describe_coupling
 from .event_check import check_events
 from .initialization import settle
 from .loop import Master
@@ -23,6 +23,7 @@ __all__ = [
     "Settings",
     "check_coupling",
     "check_events",
+    "check_threads",
     "describe_coupling",
     "find_loops",
     "settle",

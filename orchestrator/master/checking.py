@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 
-from ..fmi import Interface
+from ..fmi import Interface, Model
 from ..names import SignalName
 from ..problems import Problem, suggestion
 from ..system import System
@@ -12,6 +12,7 @@ from ..wiring import Wiring
 from .algebraic_loops import find_loops
 from .algorithms import ALGORITHMS
 from .algorithms.refusals import listed
+from .compiled import HAS_KERNEL, HAS_THREADS
 
 
 def check_coupling(system: System, interfaces: Mapping[str, Interface], wiring: Wiring) -> list[Problem]:
@@ -22,6 +23,49 @@ def check_coupling(system: System, interfaces: Mapping[str, Interface], wiring: 
         *_check_refresh(system),
         *ALGORITHMS[system.stepping.algorithm].fit(system, interfaces, wiring).problems,
     ]
+
+
+def check_threads(system: System, models: Mapping[str, Model], wiring: Wiring, threads: int) -> list[Problem]:
+    """Why several threads, where they are asked for, could not step anything in parallel."""
+    if threads <= 1:
+        return []
+    remedy = "leave threads out, or run it as FMI 2.0 FMUs under an algorithm that takes them"
+    why = dict.fromkeys(_against_threads(system, models, wiring))
+    return [Problem(f"threads = {threads}", f"they cannot act: {'; '.join(why)}", remedy)] if why else []
+
+
+def _against_threads(system: System, models: Mapping[str, Model], wiring: Wiring) -> Iterator[str]:
+    able = [name for name, one in ALGORITHMS.items() if one.takes_threads]
+    algorithm = system.stepping.algorithm
+    if algorithm not in able:
+        yield f"the algorithm is {algorithm}, and {listed(able)} takes them"
+    if not HAS_KERNEL:
+        yield "this installation has no compiled kernel"
+    elif not HAS_THREADS:
+        yield "the kernel has no threads on this platform"
+    if len(models) == 1:
+        yield "there is one instance"
+    if system.stepping.extrapolation:
+        yield "inputs are extrapolated in Python"
+    interfaces = {name: model.interface for name, model in models.items()}
+    if system.stepping.algebraic_loops == "solve" and find_loops(interfaces, wiring.links, doubtful=True):
+        yield "algebraic loops are solved in Python"
+    for what, names in _without_threads(system, models).items():
+        if names:
+            yield f"{what}: {listed(names)}"
+
+
+def _without_threads(system: System, models: Mapping[str, Model]) -> dict[str, list[str]]:
+    """The instances with which no thread of the kernel has something to do, by what is in the way."""
+    files = {name: model.interface for name, model in models.items() if model.plain is None}
+    python = [name for name, face in files.items() if face.own_kind == "python"]
+    return {
+        "these are Python objects": [name for name in models if name not in files],
+        "these run Python, one thread at a time": python if len(files) - len(python) < 2 else [],
+        "these run in processes of their own": [name for name in files if system.instances[name].isolate],
+        "these give texts": [n for n, face in files.items() if any(v.type == "String" for v in face.of("output"))],
+        "these are FMUs of another version than 2.0": [n for n, face in files.items() if face.version != "2.0"],
+    }
 
 
 def _check_rates(system: System) -> Iterable[Problem]:

@@ -23,6 +23,8 @@ try:
 except ImportError:  # installed without a C compiler
     kernel = None  # type: ignore[assignment]
 
+HAS_KERNEL = kernel is not None
+HAS_THREADS = HAS_KERNEL and bool(kernel.HAS_THREADS)
 _CHANGE = 3
 """The kernel's number for what an event does to values that have been read; the others are `Operation`."""
 _DISCARD = 2

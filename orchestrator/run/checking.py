@@ -17,6 +17,7 @@ from ..names import SignalName
 from ..problems import Problem, suggestion
 from ..system import System
 from ..wiring import Order, Wiring, derive_order, wire
+from .size import tell_size
 
 _MOST_STEPS = 1e15
 """So many points in time are not told apart, let alone run through."""
@@ -30,6 +31,7 @@ class Checked:
         system: as it will run: after a swap, without the tables that speak of what the new model does not have.
         models: by instance name. wiring: start values and scalar connections. order: how a sweep steps.
         notes: what a user should know though it is not an error.
+        large: the one of them that says how large results will be, where they will be large.
     """
 
     system: System
@@ -37,6 +39,7 @@ class Checked:
     wiring: Wiring
     order: Order
     notes: tuple[str, ...]
+    large: str = ""
 
 
 def check(system: System, workspace: Workspace, kind: Kind = "auto") -> Checked:
@@ -77,7 +80,9 @@ def check(system: System, workspace: Workspace, kind: Kind = "auto") -> Checked:
     if problems:
         raise ScenarioError(problems)
     order = derive_order(list(system.instances), wiring.links, system.stepping.order)
-    return Checked(system, models, wiring, order, (*left_out, *_notes(system, models, wiring, order)))
+    large = tell_size(system, sum(name not in parameters for name in names))
+    notes = [*left_out, *([large] if large else []), *_notes(system, models, wiring, order)]
+    return Checked(system, models, wiring, order, tuple(notes), large)
 
 
 def _without_the_missing(

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import logging
 import math
 import time as clock
 from dataclasses import replace
@@ -13,6 +14,7 @@ from ..evaluation import evaluate_metrics, judge_requirements, judge_values
 from ..figures import draw
 from ..fmi import Kind, Workspace
 from ..fmi.binding import forget_paths
+from ..master import check_threads
 from ..system import Instance, System
 from . import checkpoint
 from . import record as record_file
@@ -20,6 +22,8 @@ from .checking import Checked, check
 from .checkpoint import check_serializable
 from .outcome import Run
 from .session import Job, Progress, Session, rows_before
+
+_log = logging.getLogger(__name__)
 
 
 def run(
@@ -47,7 +51,7 @@ def run(
         output: directory for results, metrics and figures; without one everything stays in memory.
         figures: whether to draw the system's figures (only with an output directory).
         threads: how many threads step the instances in parallel, with compiled FMUs and an algorithm that can
-            (``jacobi``); results are the same to the bit.
+            (``jacobi``); results are the same to the bit. Where they cannot act that is an error.
         checkpoint_every: distance in s of the points from which `resume` can go on; needs an output directory.
         progress: called at every per cent of the run and at least ten times a second.
 
@@ -157,12 +161,21 @@ def _check_distance(checkpoint_every: float | None) -> None:
         raise ScenarioError(f"checkpoints: their distance must be a positive number of s, not {checkpoint_every!r}")
 
 
+def _check_threads(checked: Checked, threads: int) -> None:
+    problems = check_threads(checked.system, checked.models, checked.wiring, threads)
+    if problems:
+        raise ScenarioError(problems)
+
+
 def _execute(system: System, job: Job, figures: bool) -> Run:
     directory = job.directory
     begin = clock.perf_counter()
     with Workspace() as workspace:
         try:
             checked = check(system, workspace, job.kind)
+            _check_threads(checked, job.threads)
+            if checked.large:  # said before it fills a disk
+                _log.warning(checked.large)
             if job.begin is not None and directory is not None:
                 job.begin.check(checked.models, directory)
             if job.checkpoint_every is not None:

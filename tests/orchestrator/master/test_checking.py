@@ -2,7 +2,9 @@
 
 import pytest
 from railcosim.orchestrator.errors import ScenarioError
+from railcosim.orchestrator.master import check_threads, checking
 from railcosim.orchestrator.run.checking import check, describe_stepping
+from railcosim.orchestrator.run.execution import run
 from railcosim.orchestrator.system import System
 
 
@@ -125,3 +127,71 @@ def test_check_tells_what_iterative_repeats(ring, workspace):
 def test_check_tells_the_order_of_adaptive(ring, workspace):
     lines = describe_stepping(check(ring("LagWithRow", "Pass", algorithm="adaptive"), workspace, "plain"))
     assert lines == ["adaptive steps in the order: b, a"]
+
+
+# -------------------------------------------------------------------- threads
+
+
+def told_of_threads(it, workspace, kind="native", threads=2):
+    checked = check(it, workspace, kind)
+    return [str(problem) for problem in check_threads(checked.system, checked.models, checked.wiring, threads)]
+
+
+def test_threads_that_can_act(ring, workspace):
+    assert told_of_threads(ring(algorithm="jacobi"), workspace) == []
+    assert told_of_threads(ring(), workspace, "plain", threads=1) == []
+
+
+@pytest.mark.parametrize(
+    ("how", "kind", "why"),
+    [
+        ({"algorithm": "gauss-seidel"}, "native", "the algorithm is gauss-seidel, and jacobi takes them"),
+        ({"algorithm": "iterative"}, "native", "the algorithm is iterative, and jacobi takes them"),
+        ({"algorithm": "jacobi"}, "plain", "these are Python objects: a, b"),
+        ({"algorithm": "jacobi"}, "python", "these run Python, one thread at a time: a, b"),
+        ({"algorithm": "jacobi", "extrapolation": 1}, "native", "inputs are extrapolated in Python"),
+    ],
+)
+def test_threads_that_cannot_act_are_refused(ring, workspace, how, kind, why):
+    (told,) = told_of_threads(ring(**how), workspace, kind)
+    assert told.startswith(f"threads = 2: they cannot act: {why}; leave threads out")
+
+
+def test_threads_and_processes(ring, workspace):
+    it = ring(algorithm="jacobi")
+    it.instances["b"].isolate = True
+    (told,) = told_of_threads(it, workspace)
+    assert "these run in processes of their own: b;" in told
+
+
+def test_threads_and_loops_that_are_solved(mine, workspace):
+    it = System(stop_time=1.0, step=0.1, algorithm="jacobi", algebraic_loops="solve")
+    for name, other in ("ab", "ba"):
+        it.add(name, mine("Pass"), gain=0.5)
+        it.connect(f"{name}.y", f"{other}.u")
+    (told,) = told_of_threads(it, workspace)
+    assert "algebraic loops are solved in Python" in told
+
+
+def test_threads_and_strangers(mine, foreign, xml, workspace):
+    v = xml["variable"]
+    it = System(stop_time=1.0, step=0.1, algorithm="jacobi")
+    it.add("text", foreign([v("y", "output", "String", start="no")], name="a.fmu"))
+    (told,) = told_of_threads(it, workspace)
+    assert "there is one instance; these give texts: text;" in told
+
+
+@pytest.mark.parametrize(("name", "why"), [("HAS_KERNEL", "no compiled kernel"), ("HAS_THREADS", "no threads on this")])
+def test_threads_where_there_are_none(ring, workspace, monkeypatch, name, why):
+    monkeypatch.setattr(checking, name, False)
+    (told,) = told_of_threads(ring(algorithm="jacobi"), workspace)
+    assert why in told
+
+
+def test_a_run_does_not_begin_with_threads_that_cannot_act(ring, tmp_path):
+    """What an earlier run left stays."""
+    run(ring(), kind="plain", output=tmp_path)
+    before = (tmp_path / "run.json").read_bytes()
+    with pytest.raises(ScenarioError, match="threads = 2: they cannot act"):
+        run(ring(), kind="plain", output=tmp_path, threads=2)
+    assert (tmp_path / "run.json").read_bytes() == before

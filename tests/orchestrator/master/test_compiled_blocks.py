@@ -111,10 +111,4 @@ def test_of_several_threads_that_fail_the_first_is_told(both, odd, mode, ring):
     assert both(system, threads=3).error.instance == ("odd[5]" if mode in (3, 4) else "odd[2]")
 
 
-@THREADS
-def test_gauss_seidel_has_nothing_to_share(both, used, odd, ring):
-    both(ring(odd, 4, algorithm="gauss-seidel"), threads=2)
-    assert {len(arguments[1]) for arguments in used} == {1}
-
-
 # -------------------------------------------------------------------- what the kernel is given
