@@ -5,13 +5,22 @@ from __future__ import annotations
 import hashlib
 import shutil
 import tempfile
+import time
 import zipfile
 from pathlib import Path
 from typing import NamedTuple
 
+from filelock import FileLock, Timeout
+
 from ..errors import FmuFileError
 from .members import extract, list_members
 from .recognition import describe_file
+
+_PREFIX = "railcosim_"
+_OWNED = ".in-use"
+"""The lock in such a folder, which its owner holds for as long as it lives, however it ends."""
+_NEW = 60.0
+"""Age in s below which a folder may be one whose owner is about to take the lock."""
 
 
 class Unpacked(NamedTuple):
@@ -38,7 +47,12 @@ class Workspace:
     """
 
     def __init__(self) -> None:
-        self.folder = _plain_folder()
+        self._place = _plain_folder()
+        self._lock = FileLock(self._place / _OWNED)
+        self._lock.acquire(timeout=0)
+        _sweep(self._place)
+        self.folder = self._place / "fmus"
+        self.folder.mkdir()
         self._unpacked: dict[str, tuple[Path, tuple[str, ...]]] = {}
 
     def unpack(self, path: Path) -> Unpacked:
@@ -66,7 +80,8 @@ class Workspace:
 
     def close(self) -> None:
         """Remove everything unpacked."""
-        shutil.rmtree(self.folder, ignore_errors=True)
+        self._lock.release()
+        shutil.rmtree(self._place, ignore_errors=True)
 
     def __enter__(self) -> Workspace:
         return self
@@ -78,7 +93,7 @@ class Workspace:
 def _plain_folder() -> Path:
     for parent in (None, "/tmp", "/var/tmp", "C:/Temp"):
         try:
-            folder = Path(tempfile.mkdtemp(prefix="railcosim_", dir=parent)).resolve()
+            folder = Path(tempfile.mkdtemp(prefix=_PREFIX, dir=parent)).resolve()
         except OSError:
             continue
         if (
@@ -91,6 +106,19 @@ def _plain_folder() -> Path:
         f"FMUs cannot be unpacked below {tempfile.gettempdir()!r}: Python FMUs need a path of plain ASCII letters; "
         "set TMPDIR to such a folder"
     )
+
+
+def _sweep(own: Path) -> None:
+    """Remove what runs left behind that were killed: folders beside our own whose lock is there and held by nobody."""
+    for folder in own.parent.glob(f"{_PREFIX}*"):
+        try:
+            lock = folder / _OWNED
+            if folder == own or not lock.is_file() or time.time() - lock.stat().st_mtime < _NEW:
+                continue
+            with FileLock(lock, timeout=0):
+                shutil.rmtree(folder, ignore_errors=True)
+        except (OSError, Timeout):  # in use, or somebody else's
+            continue
 
 
 def _extract(path: Path, target: Path) -> tuple[str, ...]:

@@ -1,5 +1,9 @@
 """The place in which FMUs are unpacked."""
 
+import os
+import subprocess
+import sys
+import time
 from pathlib import Path
 
 import pytest
@@ -24,9 +28,39 @@ def test_an_archive_is_unpacked_once_however_often_it_is_asked_for(workspace, tm
 def test_a_workspace_leaves_nothing(tmp_path, xml):
     with Workspace() as workspace:
         workspace.unpack(xml["write_archive"](tmp_path / "a.fmu", DESCRIPTION))
-        folder = workspace.folder
-        assert folder.exists()
-    assert not folder.exists()
+        place = workspace.folder.parent
+        assert place.name.startswith("railcosim_")
+        assert place.exists()
+    assert not place.exists()
+
+
+def test_what_a_killed_process_has_unpacked_is_removed_at_the_next_start_and_nobody_else_s(tmp_path, monkeypatch):
+    code = "import time; from railcosim.orchestrator.fmi import Workspace; w = Workspace(); print(w.folder, flush=True)"
+    code += "; time.sleep(600)"
+    runs = [
+        subprocess.Popen(
+            [sys.executable, "-c", code], stdout=subprocess.PIPE, text=True, env=os.environ | {"TMPDIR": str(tmp_path)}
+        )
+        for _ in range(2)
+    ]
+    dead, living = (Path(run.stdout.readline().strip()).parent for run in runs)
+    foreign = tmp_path / "railcosim_data"
+    foreign.mkdir()
+    runs[0].kill()
+    runs[0].communicate()
+    monkeypatch.setattr("tempfile.tempdir", str(tmp_path))
+    try:
+        Workspace().close()
+        assert dead.is_dir()  # so young that its owner may be about to take it
+        for folder in (dead, living):
+            os.utime(folder / ".in-use", (time.time() - 100.0,) * 2)
+        Workspace().close()
+        assert not dead.exists()
+        assert living.is_dir()
+        assert foreign.is_dir()
+    finally:
+        runs[1].kill()
+        runs[1].communicate()
 
 
 def test_no_such_file(refused, tmp_path):
