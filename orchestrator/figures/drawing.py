@@ -191,7 +191,7 @@ def _styles(
 
 def _over(k: int, count: int, place: int) -> dict[str, Any]:
     """The k-th of lines that hide each other: the first is widest, and all show through the gaps of the others."""
-    return {"linewidth": 3.2 - 2.0 * k / (count - 1), "linestyle": DASHES[1 + (place - 1) % 3] if place else "-"}
+    return {"linewidth": 2.8 - 1.6 * k / (count - 1), "linestyle": DASHES[1 + (place - 1) % 3] if place else "-"}
 
 
 def _hide(panel: Sequence[Curve]) -> bool:

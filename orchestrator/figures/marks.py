@@ -55,10 +55,11 @@ def draw_marks(ax: Axes, panel: Mapping[str, Any], signals: Signals, scale: floa
         y = None if y is None else scale * y
         style: Any = {"color": _COLOUR, "linewidth": 1.1, "linestyle": (0, (1, 1.5)), "zorder": 1.6}
         text: Any = {"color": _COLOUR, "fontsize": 8, "textcoords": "offset points", "annotation_clip": True}
+        text["bbox"] = {"facecolor": "white", "alpha": 0.75, "edgecolor": "none", "pad": 0.6}
         label = mark.get("label", "")
         if x is not None and y is not None:
             ax.plot([x], [y], "o", color=_COLOUR, markersize=6, markerfacecolor="none", markeredgewidth=1.4, zorder=5)
-            ax.annotate(label, (x, y), xytext=(7, 4), ha="left", va="bottom", **text)
+            ax.annotate(label, (x, y), xytext=(8, 0), ha="left", va="center", **text)
         elif y is not None:
             ax.axhline(y, **style)
             side: Any = ax.get_yaxis_transform()
@@ -66,7 +67,7 @@ def draw_marks(ax: Axes, panel: Mapping[str, Any], signals: Signals, scale: floa
         elif x is not None:
             ax.axvline(x, **style)
             side = ax.get_xaxis_transform()
-            ax.annotate(label, (x, 0.02), xycoords=side, xytext=(3, 0), ha="left", va="bottom", **text)
+            ax.annotate(label, (x, 0.08), xycoords=side, xytext=(4, 0), ha="left", va="bottom", **text)
 
 
 def number(value: str | float, signals: Signals) -> float:

@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
 
 from .curves import Curve
-from .style import colour
+from .style import COLOURS, colour
 
 Figure = Sequence[Sequence[Curve]]
 """The curves of a figure, panel by panel."""
@@ -35,14 +35,24 @@ class Palette:
         return self._places[name]
 
 
-def ranks(figure: Figure) -> dict[tuple[int, ...], int]:
-    """The rank of each numbered thing of a figure, among those with as many numbers."""
-    things = sorted({c.thing for panel in figure for c in panel if isinstance(c.thing, tuple)})
-    return {thing: [other for other in things if len(other) == len(thing)].index(thing) for thing in things}
+def ranks(figure: Figure) -> dict[tuple[int, ...], tuple[int, int]]:
+    """The rank of each numbered thing of a figure, and among how many: those with as many numbers.
+
+    Where these are more than there are colours, things that one panel alone shows are ranked there.
+    """
+    shown = [{c.thing for c in panel if isinstance(c.thing, tuple)} for panel in figure]
+    found: dict[tuple[int, ...], tuple[int, int]] = {}
+    for length in {len(thing) for things in shown for thing in things}:
+        alike = [{thing for thing in things if len(thing) == length} for things in shown]
+        groups = [set().union(*alike)]
+        if len(groups[0]) > len(COLOURS) and sum(map(len, alike)) == len(groups[0]):
+            groups = alike
+        for group in groups:
+            found |= {thing: (rank, len(group)) for rank, thing in enumerate(sorted(group))}
+    return found
 
 
-def member_colour(curve: Curve, found: dict[tuple[int, ...], int]) -> Any:
+def member_colour(curve: Curve, found: Mapping[tuple[int, ...], tuple[int, int]]) -> Any:
     """The colour of a member of a family."""
     assert isinstance(curve.thing, tuple)
-    alike = [thing for thing in found if len(thing) == len(curve.thing)]
-    return colour(found[curve.thing], len(alike))
+    return colour(*found[curve.thing])

@@ -5,6 +5,7 @@ matplotlib is imported where it is used: importing it costs more than most comma
 
 from __future__ import annotations
 
+import textwrap
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -73,7 +74,9 @@ def page(
     with mpl.rc_context(_STYLE):
         figure = Figure(figsize=size, dpi=dpi or DPI, layout="constrained")
         FigureCanvasAgg(figure)
-        figure.suptitle(title, x=0.01, ha="left", fontsize=title_size, fontweight="bold")
+        letters = int(72 * size[0] / (0.6 * title_size))
+        lines = [line for part in title.splitlines() for line in textwrap.wrap(part, letters)]
+        figure.suptitle("\n".join(lines), x=0.01, ha="left", fontsize=title_size, fontweight="bold")
         yield list(figure.subplots(panels, 1, sharex=share_x, squeeze=False)[:, 0])
         figure.savefig(path, metadata=_NAMELESS[path.suffix])
 

@@ -7,7 +7,7 @@ from railcosim.orchestrator import load, run
 
 def hit(*settings, stop=60.0, builds=()):
     settings = [f"simulation.stop_time={stop}", *settings]
-    system = load("fault_tolerant_cruise", step=0.02, settings=settings, builds=builds)
+    system = load("fault_tolerant_cruise", preset="nominal", step=0.02, settings=settings, builds=builds)
     result = run(system, figures=False)
     for name in result.names():
         assert np.isfinite(np.asarray(result[name], dtype=float)).all(), name

@@ -24,7 +24,7 @@ RELAYED = {0.01: 0.64, 0.05: 3.20, 0.1: 6.4}
 def measured(step, settings=(), change=None, swaps=()):
     """The run, its fault error and its settled spacing fluctuation."""
     record = f"simulation.record={max(step, 0.1)}"
-    system = load("fault_tolerant_cruise", step=step, settings=[record, *settings], swaps=list(swaps))
+    system = load("fault_tolerant_cruise", preset="nominal", step=step, settings=[record, *settings], swaps=list(swaps))
     if change:
         change(system)
     result = run(system, figures=False)
@@ -101,7 +101,10 @@ def test_stress(step, late):
 @pytest.mark.parametrize(("step", "warned"), [(0.01, False), (0.02, False), (0.05, True)])
 def test_a_step_above_the_advised_one_is_told(step, warned):
     system = load(
-        "fault_tolerant_cruise", step=step, settings=["simulation.stop_time=1.0", f"simulation.record={step}"]
+        "fault_tolerant_cruise",
+        preset="nominal",
+        step=step,
+        settings=["simulation.stop_time=1.0", f"simulation.record={step}"],
     )
     notes = run(system).checked.notes
     assert any("advised to step at 0.02 s" in note for note in notes) is warned

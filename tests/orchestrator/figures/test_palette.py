@@ -1,6 +1,6 @@
 """One colour a thing, wherever it is drawn."""
 
-from railcosim.orchestrator.figures import draw
+from railcosim.orchestrator.figures import COLOURS, draw
 
 SPEED, GAP = "train[:].speed", "train[i-1].position - train[i].position"
 
@@ -21,6 +21,16 @@ def test_numbers_of_cars_and_of_trains_are_things_apart(drawn):
     trains, cars = map(colours, drawn(panels=[{"y": [SPEED]}, {"y": ["consist[:].force[:]"]}]))
     assert len(set(trains.values())) == 3
     assert len(set(cars.values())) == 4
+
+
+def test_more_things_than_colours_are_told_apart_in_their_own_panels(drawn):
+    """Nine cars in three panels of their own three, but twelve in one panel along a scale."""
+    axes = drawn(panels=[{"y": [f"car[{k}:{k + 2}].speed"]} for k in (1, 4, 7)])
+    assert [list(colours(ax).values()) for ax in axes] == [list(COLOURS[:3])] * 3
+    axes = drawn(panels=[{"y": ["car[:].speed"]}, {"y": ["car[1:3].speed"]}])
+    every, some = map(colours, axes)
+    assert some.items() <= every.items()
+    assert len({str(colour) for colour in every.values()}) == 12
 
 
 def test_a_name_keeps_its_colour_in_panels_and_figures(recorded, tmp_path, monkeypatch):

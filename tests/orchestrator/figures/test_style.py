@@ -43,6 +43,12 @@ def test_a_panel_with_too_many_families_tells_the_families(drawn):
     assert len(set(colours)) == 5
 
 
+def test_a_long_title_is_broken_before_the_edge(drawn):
+    axes = drawn(title="What is drawn here is of no interest but for its name, which is long " * 2, y=["target.value"])
+    figure = axes[0].figure
+    assert figure._suptitle.get_window_extent().x1 <= figure.bbox.x1
+
+
 def test_matplotlib_is_imported_only_to_draw():
     code = "import sys, railcosim.orchestrator.figures; print('matplotlib' in sys.modules)"
     said = subprocess.run(

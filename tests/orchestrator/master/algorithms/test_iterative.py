@@ -219,7 +219,7 @@ def test_a_platoon_of_sampled_controllers_is_that_of_gauss_seidel():
     """To the bit: nothing is late there, and no continuous components act on each other."""
     runs = []
     for algorithm in ("gauss-seidel", "iterative"):
-        it = load("fault_tolerant_cruise")
+        it = load("fault_tolerant_cruise", preset="nominal")
         it.stepping.algorithm, it.stepping.stop_time = algorithm, 1.0
         it.judged = Judged()
         runs.append(run(it, kind="plain"))
