@@ -9,6 +9,8 @@ from ..components.spelling import did_you_mean
 
 Loops = Literal["delay", "solve"]
 LOOPS: tuple[Loops, ...] = ("delay", "solve")
+Unsettled = Literal["stop", "go-on"]
+UNSETTLED: tuple[Unsettled, ...] = ("stop", "go-on")
 Acceleration = Literal["none", "aitken", "anderson"]
 ACCELERATIONS: tuple[Acceleration, ...] = ("none", "aitken", "anderson")
 ACTIONS = ("set", "override", "freeze", "bias", "ramp")
@@ -113,7 +115,8 @@ class Stepping:
         refresh: whether outputs with direct feed-through are brought up to date at each communication point.
         tolerance: relative; of ``iterative`` for what is exchanged, of ``adaptive`` for the error of a step; None for
             the algorithm's default. tolerances: ``[relative, absolute]`` of single signals, by name.
-        max_iterations, relaxation, acceleration: of ``iterative``. min_step: of ``adaptive``, s.
+        max_iterations, relaxation, acceleration: of ``iterative``. unsettled: whether it stops (``"stop"``) where they
+            lead nowhere, or goes on with the last iterate (``"go-on"``). min_step: of ``adaptive``, s.
     """
 
     stop_time: float = 1.0
@@ -130,6 +133,7 @@ class Stepping:
     max_iterations: int = 50
     relaxation: float = 1.0
     acceleration: Acceleration = "anderson"
+    unsettled: Unsettled = "stop"
     min_step: float | None = None
 
 

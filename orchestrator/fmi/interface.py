@@ -98,6 +98,7 @@ class Interface:
     generator: str = ""
     default_step: float | None = None
     default_stop: float | None = None
+    default_tolerance: float | None = None
     version: str = "2.0"
     can_save_state: bool = False
     can_serialize_state: bool = False

@@ -74,6 +74,7 @@ def _interface(description: Any, root: Any, beside: Beside) -> Interface:
         generator=description.generationTool or "",
         default_step=_number(experiment.stepSize) if experiment else None,
         default_stop=_number(experiment.stopTime) if experiment else None,
+        default_tolerance=_number(experiment.tolerance) if experiment else None,
         can_save_state=bool(simulation.canGetAndSetFMUstate),
         can_serialize_state=bool(simulation.canGetAndSetFMUstate and simulation.canSerializeFMUstate),
         directional_derivatives=bool(simulation.providesDirectionalDerivative),

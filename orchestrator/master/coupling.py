@@ -108,15 +108,20 @@ class Coupling:
                 f"with a relative residual of {left:.3g}; take a smaller step, or put a component with memory into it"
             )
 
-    def tolerances(self, default: float) -> list[tuple[float, float]]:
-        """Relative and absolute tolerance of each value; `default` is relative, for a system that gives none."""
+    def tolerances(self, default: float, own: Mapping[str, float] | None = None) -> list[tuple[float, float]]:
+        """Relative and absolute tolerance of each value.
+
+        Args:
+            default: relative, for a system that gives none.
+            own: the same for what single instances give, by their names.
+        """
         given = self.settings.stepping.tolerance
-        tolerance = default if given is None else given
         found = []
         for (instance, name), signal in zip(self.exchange.places, self.exchange.signals, strict=True):
+            tolerance = (own or {}).get(instance, default) if given is None else given
             nominal = self.interfaces[instance].variables[name].nominal
             ways = self.settings.stepping.tolerances
             array = f"{instance}.{name.rpartition('[')[0]}"
-            own = ways.get(signal) or ways.get(array) or (tolerance, tolerance * abs(nominal or 1.0))
-            found.append((float(own[0]), float(own[1])))
+            pair = ways.get(signal) or ways.get(array) or (tolerance, tolerance * abs(nominal or 1.0))
+            found.append((float(pair[0]), float(pair[1])))
         return found

@@ -10,6 +10,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
+from ..errors import FmuError, LostError
 from ..wiring import Link
 from .exchange import Exchange, Feed
 
@@ -54,6 +55,10 @@ class Extrapolator:
                 members = tuple(k for k, target in enumerate(feed.targets) if (name, target) in smooth)
                 if members:
                     self._courses[name] = _Course(name, feed, members, tuple(feed.targets[k] for k in members))
+        self.orders: dict[str, int] = {}
+        """Of instances that refused derivatives of the order wanted: the order they take."""
+        self.said: dict[str, str] = {}
+        """What they said."""
         self.past: dict[str, list[list[tuple[float, float]]]] = {}
         """For each continued input of an instance, the last values and the times they belong to, newest last."""
 
@@ -86,14 +91,34 @@ class Extrapolator:
 
     def _give(self, course: _Course, values: list[float], past: Sequence[Points], time: float) -> None:
         """Set the inputs of a continued feed from a time in s on, by the polynomials through the past."""
-        derivatives: list[float] = []
-        for points, k in zip(past, course.members, strict=True):
-            values[k], *slopes = polynomial(points, time, self._order)
-            derivatives += slopes
-        course.feed.channel.set(values)
-        names = [n for n in course.names for _ in range(self._order)]
-        orders = [*range(1, self._order + 1)] * len(course.names)
-        self._exchange.slaves[course.instance].interpolate(names, orders, derivatives)
+        order, given, derivatives = self.orders.get(course.instance, self._order), list(values), list[float]()
+        if order:
+            for points, k in zip(past, course.members, strict=True):
+                given[k], *slopes = polynomial(points[-order - 1 :], time, order)
+                derivatives += slopes
+        course.feed.channel.set(given)
+        if not order:
+            return
+        names = [n for n in course.names for _ in range(order)]
+        orders = [*range(1, order + 1)] * len(course.names)
+        try:
+            self._exchange.slaves[course.instance].interpolate(names, orders, derivatives)
+        except LostError:
+            raise
+        except FmuError as error:
+            if error.status == "fatal":
+                raise
+            self.orders[course.instance] = order - 1
+            self.said.setdefault(course.instance, str(error).partition("\n")[0])
+            self._give(course, values, past, time)
+
+    def report(self) -> dict[str, Any]:
+        """Whose inputs are continued by less than was wanted, for the record of the run; empty where there are none."""
+        if not self.orders:
+            return {}
+        each = (f"{name} {order} ({self.said[name]})" for name, order in self.orders.items())
+        summary = f"derivatives of inputs were refused; the order of extrapolation is lower: {', '.join(each)}"
+        return {"orders": dict(self.orders), "said": dict(self.said), "summary": summary}
 
     def continued(self, name: str, feed: Feed) -> list[list[tuple[float, float]]] | None:
         """What inputs of a feed are continued by now: the points of each; None where all of them are held."""

@@ -308,6 +308,8 @@ class Master:
                 "solutions": loops.solutions,
                 "worst_residual": loops.residual,
             }
+        if self.coupling.extrapolator is not None and (report := self.coupling.extrapolator.report()):
+            found["extrapolation"] = report
         if self.coupling.refresher is not None:
             found["refresh"] = self.coupling.refresher.report()
         if report := self.algorithm.report():

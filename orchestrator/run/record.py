@@ -107,6 +107,7 @@ def _describe(system: System, checked: Checked, kind: str) -> dict[str, Any]:
         "extrapolation": system.stepping.extrapolation,
         "algebraic_loops": system.stepping.algebraic_loops,
         "refresh": system.stepping.refresh,
+        "unsettled": system.stepping.unsettled,
         "steps": {name: instance.step for name, instance in system.instances.items() if instance.step is not None},
         "events": [dataclasses.asdict(event) for event in system.events],
         "delays": {c.target: c.delay for c in system.connections if c.delay},

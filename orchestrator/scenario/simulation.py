@@ -9,7 +9,7 @@ from typing import Any
 from ..errors import ScenarioError
 from ..master import ALGORITHMS
 from ..problems import Problem
-from ..system import ACCELERATIONS, LOOPS
+from ..system import ACCELERATIONS, LOOPS, UNSETTLED
 from .groups import Entry, choice, number, positive, shown, truth, whole, whole_multiple
 from .patterns import Counts, members, read_signal
 
@@ -29,6 +29,7 @@ SIMULATION_KEYS = (
     "max_iterations",
     "relaxation",
     "acceleration",
+    "unsettled",
     "min_step",
 )
 TOLERANCES = "tolerances."
@@ -38,6 +39,7 @@ _CHOICES = {
     "algorithm": (ALGORITHMS, "algorithm"),
     "algebraic_loops": (LOOPS, "treatment of algebraic loops"),
     "acceleration": (ACCELERATIONS, "acceleration"),
+    "unsettled": (UNSETTLED, "way on where iterations lead nowhere"),
 }
 
 

@@ -3,12 +3,17 @@
 Only instances that depend on each other within the step, in a cycle, are repeated; the others step once, sources before
 receivers, with the values of the step's end. Sampled components are no part of that: they act on the values of the
 step's begin, and step first.
+
+What two repetitions give cannot agree better than the FMUs solve their own equations: the tolerance is not below theirs
+unless one is given. Where there is nothing that agrees, as where a threshold flips, the system says whether that ends
+the run.
 """
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any
 
 import networkx as nx
@@ -62,13 +67,15 @@ def find_blocks(interfaces: Mapping[str, Interface], links: Iterable[Link]) -> B
 class Tally:
     """How the iterations went.
 
-    Communication ``steps``, ``iterations`` in all and at ``most``, the worst ``residual`` in units of the tolerance.
+    Communication ``steps``, ``iterations`` in all and at ``most``, the worst ``residual`` in units of the tolerance,
+    and the begins in s of steps that were taken ``unsettled``.
     """
 
     steps: int = 0
     iterations: int = 0
     most: int = 0
     residual: float = 0.0
+    unsettled: list[float] = field(default_factory=list)
 
 
 class Iterative(FixedStep):
@@ -83,7 +90,8 @@ class Iterative(FixedStep):
         settings, exchange = coupling.settings, coupling.exchange
         self.exchange, self.tally = exchange, Tally()
         self.blocks = find_blocks(coupling.interfaces, exchange.links)
-        self.tolerances = coupling.tolerances(_TOLERANCE)
+        self.tolerances = coupling.tolerances(_TOLERANCE, own_tolerances(self.blocks, coupling.interfaces))
+        self.unsettled = settings.stepping.unsettled
         self.max_iterations = settings.stepping.max_iterations
         self.relaxation, self.acceleration = settings.stepping.relaxation, settings.stepping.acceleration
         self._exchanged = {
@@ -105,6 +113,10 @@ class Iterative(FixedStep):
         able = sorted(name for name in blocks.cyclic if interfaces[name].interpolates_inputs)
         if able and not system.stepping.extrapolation:
             notes.append(f"{listed(able)} can interpolate inputs: extrapolation = 1 makes iterative second order there")
+        own = own_tolerances(blocks, interfaces)
+        if own and system.stepping.tolerance is None:
+            coarse = f"{listed(sorted(own))} agree to a tolerance of {max(own.values()):g}, at most"
+            notes.append(f"{coarse}: that of their own solvers (DefaultExperiment)")
         steps = []
         if blocks.sampled:
             steps.append(f"steps first, at the values of the step's begin: {', '.join(blocks.sampled)}")
@@ -195,10 +207,21 @@ class Iterative(FixedStep):
                     break
                 for k, value in zip(reals[u], following, strict=True):
                     exchange.values[k] = float(value)
-            raise self._failure((time, length), wrong, error, sizes)
+            if not self._goes_on_with(reals, reached, sizes, time):
+                raise self._failure((time, length), wrong, error, sizes)
         finally:
             for slave, state in zip(slaves, states, strict=True):
                 slave.forget(state)
+
+    def _goes_on_with(self, places: Sequence[int], reached: Vector, sizes: Sequence[float], time: float) -> bool:
+        """Whether the last iterate, of which the FMUs' states are, may stand though nothing settled; note it if so."""
+        if self.unsettled == "stop" or not np.isfinite(reached).all() or sizes[-1] > _GROWN * sizes[0]:
+            return False
+        for k, value in zip(places, reached, strict=True):
+            self.exchange.values[k] = float(value)
+        self._count(len(sizes), 0.0)
+        self.tally.unsettled.append(time)
+        return True
 
     def _scale(self, places: Sequence[int], a: Vector, b: Vector) -> Vector:
         bounds = np.array([self.tolerances[k] for k in places]).reshape(-1, 2)
@@ -227,7 +250,11 @@ class Iterative(FixedStep):
         what = f"still disagree by {worst:.3g} times the tolerance" if worst > 1.0 else "still change"
         if failure:
             what += f", and with the next guess an FMU fails ({failure})"
+        enough = 0.0
+        if worst > 1.0 and not grows:
+            enough = _rounded_up(max(sizes[-_LAST:]) * max(self.tolerances[k][0] for k in wrong))
         ways = ["a smaller step"]
+        ways += [f"simulation.tolerance = {enough:g}"] if 0.0 < enough < _LOOSE else []
         ways += [] if grows else ["more simulation.max_iterations"]
         ways += [] if self.acceleration == "anderson" else ['simulation.acceleration = "anderson"']
         return CouplingError(
@@ -244,9 +271,36 @@ class Iterative(FixedStep):
             "iterations_per_step": mean,
             "most_iterations": tally.most,
             "worst_residual_per_tolerance": tally.residual,
+            "unsettled": len(tally.unsettled),
+            "first_unsettled": tally.unsettled[:_TOLD],
             "summary": f"{mean:.3g} iterations per step, at most {tally.most}; worst residual {tally.residual:.2g} of "
-            "the tolerance",
+            f"the tolerance{self._unsettled()}",
         }
+
+    def _unsettled(self) -> str:
+        """What to say of steps that were taken though nothing agreed."""
+        begins = self.tally.unsettled
+        if not begins:
+            return ""
+        return f"; {len(begins)} of {self.tally.steps} steps went on unsettled, the first from t = {begins[0]:.10g} s"
+
+
+def own_tolerances(blocks: Blocks, interfaces: Mapping[str, Interface]) -> dict[str, float]:
+    """The coarsest tolerance of an FMU's own solver in each cycle where that is above the usual, by instance."""
+    found = {}
+    for group in blocks.continuous:
+        coarsest = max(interfaces[name].default_tolerance or 0.0 for name in group)
+        if _TOLERANCE < coarsest < 1.0 and not blocks.cyclic.isdisjoint(group):
+            found.update(dict.fromkeys(group, coarsest))
+    return found
+
+
+def _rounded_up(value: float) -> float:
+    """The next number with one digit that is not less."""
+    if not 0.0 < value < math.inf:
+        return 0.0
+    unit = 10.0 ** math.floor(math.log10(value))
+    return math.ceil(value / unit) * unit
 
 
 def _largest(errors: Vector) -> float:
@@ -255,4 +309,6 @@ def _largest(errors: Vector) -> float:
 
 _HOPELESS, _GROWN = 1e12, 10.0
 """How many times farther apart than at first values are that nothing will bring together, or that are getting away."""
-_SHOWN = 3
+_LAST, _LOOSE = 5, 0.01
+"""Iterations whose distances tell how near they get, and the tolerance from which on none is advised."""
+_SHOWN, _TOLD = 3, 100

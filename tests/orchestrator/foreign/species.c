@@ -1,12 +1,13 @@
 /* One of two species, dx/dt = x (a + b u) + c u by RK4 in parts no longer than 1 ms, with u held over the step. By value
    reference: 0 u (input); 1 y (output: x + d u, with -DHELD the u of the last step, else the one that is set); 2 a; 3 b;
    4 c; 5 d; 6 start (parameters). The description may say of y's dependencies what it likes. With -DSHY it cannot be read
-   between being set and the next step. */
+   between being set and the next step; with -DROUGH its solver is off by 1e-5, in another way for each u; with
+   -DORDER=n it refuses derivatives of u of a higher order than n, and follows the first. */
 
 #include "fmi2.h"
 
 typedef struct {
-    double v[7], x, held, time;
+    double v[7], x, held, time, rate;
     int steps, is_set;
 } Species;
 
@@ -45,6 +46,7 @@ int fmi2SetReal(void *c, const unsigned *vr, size_t count, const double *values)
     }
     s->x = s->steps == 0 ? s->v[6] : s->x;
     s->is_set = s->steps > 0;
+    s->rate = 0.0;
     return 0;
 }
 
@@ -67,9 +69,23 @@ int fmi2GetReal(void *c, const unsigned *vr, size_t count, double *values)
     return 0;
 }
 
-static double slope(const Species *s, double x)
+#ifdef ORDER
+int fmi2SetRealInputDerivatives(void *c, const unsigned *vr, size_t count, const int *orders, const double *values)
 {
-    return x * (s->v[2] + s->v[3] * s->v[0]) + s->v[4] * s->v[0];
+    for (size_t k = 0; k < count; k++) {
+        if (orders[k] > ORDER || vr[k] != 0) {
+            return 3;
+        }
+        ((Species *)c)->rate = orders[k] == 1 ? values[k] : ((Species *)c)->rate;
+    }
+    return 0;
+}
+#endif
+
+static double slope(const Species *s, double x, double since)
+{
+    double u = s->v[0] + s->rate * since;
+    return x * (s->v[2] + s->v[3] * u) + s->v[4] * u;
 }
 
 int fmi2DoStep(void *c, double time, double step, int final)
@@ -82,9 +98,13 @@ int fmi2DoStep(void *c, double time, double step, int final)
     s->is_set = 0;
     s->steps++;
     for (int k = 0; k < count; k++) {
-        double p = slope(s, s->x), q = slope(s, s->x + 0.5 * h * p), r = slope(s, s->x + 0.5 * h * q);
-        s->x += h / 6.0 * (p + 2.0 * q + 2.0 * r + slope(s, s->x + h * r));
+        double t = k * h, p = slope(s, s->x, t), q = slope(s, s->x + 0.5 * h * p, t + 0.5 * h);
+        double r = slope(s, s->x + 0.5 * h * q, t + 0.5 * h);
+        s->x += h / 6.0 * (p + 2.0 * q + 2.0 * r + slope(s, s->x + h * r, t + h));
     }
+#ifdef ROUGH
+    s->x += 1e-5 * sin(1e9 * s->v[0]);
+#endif
     s->time = time + step;
     return 0;
 }

@@ -2,6 +2,7 @@
 
 from types import SimpleNamespace
 
+import fmpy
 import pytest
 from railcosim.orchestrator.errors import FmuError
 from railcosim.orchestrator.master import compiled
@@ -93,5 +94,27 @@ def instantiated(workspace):
         )
         master.initialize(system.stepping.start_time, 1e9)
         return master
+
+    return make
+
+
+@pytest.fixture
+def species(compile_c, xml, tmp_path):
+    """The FMU of species.c, whose y is said to depend on the inputs given; None says nothing."""
+
+    def make(on, *options, able="", tolerance=None, **of):
+        v = xml["variable"]
+        shown = [v("u", "input", start=0.0), v("y", "output", dependencies=on, **of)]
+        shown += [v(name, "parameter", start=0.0) for name in ("a", "b", "c", "d", "start")]
+        all_able = f"canGetAndSetFMUstate canHandleVariableCommunicationStepSize {able}".split()
+        said = " ".join(f'{name}="true"' for name in all_able)
+        text = xml["description"](shown, identifier="Species", simulation=said)
+        if tolerance is not None:
+            text = text.replace("<ModelVariables>", f'<DefaultExperiment tolerance="{tolerance}"/><ModelVariables>')
+        files = {
+            "modelDescription.xml": text,
+            f"binaries/{fmpy.platform}/Species{fmpy.sharedLibraryExtension}": compile_c("species.c", *options),
+        }
+        return str(xml["write_archive"](tmp_path / f"species{len(list(tmp_path.iterdir()))}.fmu", files))
 
     return make

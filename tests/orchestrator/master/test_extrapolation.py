@@ -1,5 +1,7 @@
 """Inputs that go on during a step: polynomials, the times that values belong to, and what is held all the same."""
 
+import json
+
 import numpy as np
 import pytest
 from hypothesis import given, settings
@@ -104,6 +106,33 @@ def test_what_is_held_all_the_same(mine, monkeypatch):
     it.connect("whole.m", "more.n")
     run(it, kind="native")
     assert seen == {"moves": {"u"}}
+
+
+@pytest.mark.parametrize("order", [1, 2])
+@pytest.mark.parametrize("takes", [0, 1, 2])
+def test_derivatives_that_an_fmu_refuses_are_of_a_lower_order(species, mine, tmp_path, order, takes):
+    """It says that it interpolates inputs, and takes them to some order only; the rest is held."""
+
+    def made(order, **of):
+        it = System(stop_time=2.0, step=0.5, algorithm="jacobi", extrapolation=order)
+        it.add("course", mine("Course"), a=0.0, b=2.0)
+        it.add("sum", species([], f"-DORDER={takes}", able="canInterpolateInputs"), c=1.0)
+        it.connect("course.y", "sum.u")
+        return run(it, **of)
+
+    result, held = made(order, output=tmp_path / "out"), made(0)
+    told = json.loads((tmp_path / "out" / "run.json").read_text())["coupling"]
+    reached = min(order, takes)
+    if reached == order:
+        assert told == {}
+    else:
+        assert told["extrapolation"]["orders"] == {"sum": reached}
+        assert "sum" in told["extrapolation"]["summary"]
+        assert "fmi2SetRealInputDerivatives failed" in told["extrapolation"]["said"]["sum"]
+    if reached == 0:
+        assert np.array_equal(result["sum.y"], held["sum.y"])
+    else:  # but for the first step, of which no slope is known
+        assert np.diff(result["sum.y"])[1:] == pytest.approx(np.diff(result.time**2)[1:], abs=1e-9)
 
 
 def test_python_fmus_hold_their_inputs_and_it_is_said(mine):

@@ -3,7 +3,6 @@
 import json
 from pathlib import Path
 
-import fmpy
 import numpy as np
 import pytest
 from railcosim.orchestrator.errors import FmuError, ScenarioError
@@ -167,18 +166,11 @@ def test_an_event_is_passed_on_at_its_point(mine):
     assert list(result["p2.y"][2:]) == [56.0] * 3
 
 
-def test_one_that_refuses_is_left_alone_and_told(compile_c, xml, tmp_path, mine):
+def test_one_that_refuses_is_left_alone_and_told(species, tmp_path, mine):
     """As FMI 2.0 lets an FMU: it cannot be read between being set and the next step."""
-    v = xml["variable"]
-    shown = [v("u", "input", start=0.0), v("y", "output", dependencies=["u"])]
-    shown += [v(name, "parameter", start=0.0) for name in "abcd"]
-    files = {
-        "modelDescription.xml": xml["description"](shown, identifier="Shy"),
-        f"binaries/{fmpy.platform}/Shy{fmpy.sharedLibraryExtension}": compile_c("species.c", "-DSHY"),
-    }
     it = System(stop_time=1.0, step=0.25, algorithm="jacobi", refresh=True)
     it.add("ramp", mine("Course"), a=1.0, b=1.0)
-    it.add("shy", str(xml["write_archive"](tmp_path / "shy.fmu", files)), d=1.0)
+    it.add("shy", species(["u"], "-DSHY"), d=1.0)
     it.add("p", mine("Pass"), gain=2.0)
     it.connect("ramp.y", "shy.u")
     it.connect("ramp.y", "p.u")

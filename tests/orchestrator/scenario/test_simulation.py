@@ -30,7 +30,7 @@ def problems(text, **changes):
 
 def test_without_a_word_the_values_are_those_of_a_system():
     system, other = loads(TEXT), System()
-    keys = ("extrapolation", "algebraic_loops", "refresh", "tolerance", "tolerances", "max_iterations")
+    keys = ("extrapolation", "algebraic_loops", "refresh", "unsettled", "tolerance", "tolerances", "max_iterations")
     for key in (*keys, "relaxation", "acceleration", "min_step"):
         assert getattr(system.stepping, key) == getattr(other.stepping, key), key
     assert system.events == other.events
@@ -42,6 +42,7 @@ def test_without_a_word_the_values_are_those_of_a_system():
         ("extrapolation", "2", 2),
         ("algebraic_loops", '"solve"', "solve"),
         ("refresh", "true", True),
+        ("unsettled", '"go-on"', "go-on"),
         ("tolerance", "1e-6", 1e-6),
         ("max_iterations", "1", 1),
         ("relaxation", "2", 2.0),

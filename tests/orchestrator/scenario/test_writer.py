@@ -11,7 +11,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from railcosim.orchestrator.master import ALGORITHMS
 from railcosim.orchestrator.scenario.loading import dump, loads
-from railcosim.orchestrator.system import ACCELERATIONS, LOOPS, Connection, Event, Instance, System
+from railcosim.orchestrator.system import ACCELERATIONS, LOOPS, UNSETTLED, Connection, Event, Instance, System
 
 EXAMPLE = Path(__file__).with_name("two_trains.toml").read_text(encoding="utf-8")
 TEXTS = st.text(st.characters(exclude_categories=["Cs"]), max_size=8)
@@ -24,6 +24,7 @@ NUMERICS = {
     "extrapolation": st.integers(0, 2),
     "algebraic_loops": st.sampled_from(LOOPS),
     "refresh": st.booleans(),
+    "unsettled": st.sampled_from(UNSETTLED),
     "tolerance": st.floats(1e-300, 0.999),
     "max_iterations": st.integers(1, 2**63 - 1),
     "relaxation": st.floats(1e-300, 2.0),

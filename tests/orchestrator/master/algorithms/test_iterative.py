@@ -1,5 +1,7 @@
 """Implicit coupling: which instances are repeated, how guesses are improved, what is said where that leads nowhere."""
 
+import json
+import re
 from types import SimpleNamespace
 
 import numpy as np
@@ -16,6 +18,7 @@ from railcosim.orchestrator.master.algorithms.iterative import find_blocks
 from railcosim.orchestrator.master.coupling import Coupling
 from railcosim.orchestrator.master.settings import DEFAULT
 from railcosim.orchestrator.names import SignalName
+from railcosim.orchestrator.run.checking import check
 from railcosim.orchestrator.run.execution import execute, run
 from railcosim.orchestrator.system import Connection, Judged, System
 from railcosim.orchestrator.wiring import Link
@@ -280,6 +283,70 @@ def test_an_fmu_that_fails_of_a_guess_is_not_blamed_alone(mine):
     assert isinstance(caught.value.__cause__, FmuError)
 
 
+def rough(fmu, **how):
+    """x'' = -x - x'/2 in two FMUs, one of which solves its own part to 1e-5 only."""
+    it = System(**{"stop_time": 1.0, "step": 0.1, "algorithm": "iterative"} | how)
+    it.add("p", fmu, a=-0.5, c=-1.0, start=0.0)
+    it.add("q", fmu, c=1.0, start=1.0)
+    it.connect("p.y", "q.u")
+    it.connect("q.y", "p.u")
+    return it
+
+
+def test_values_cannot_agree_better_than_their_fmus_solve(species):
+    """The tolerance that would do is said, and it does."""
+    with pytest.raises(CouplingError) as caught:
+        run(rough(species([], "-DROUGH")))
+    advised = re.search(r"take a smaller step, simulation\.tolerance = (\S+), more", str(caught.value))
+    assert 1e-6 < float(advised[1]) < 1e-3
+    result = run(rough(species([], "-DROUGH"), tolerance=float(advised[1])))
+    assert result["q.y"][-1] == pytest.approx(0.5999, abs=0.1)
+
+
+def test_the_tolerance_is_no_smaller_than_that_of_the_fmus(species, workspace):
+    """Unless one is given: by the DefaultExperiment."""
+    it = rough(species([], "-DROUGH", tolerance=1e-4))
+    told = "p, q agree to a tolerance of 0.0001, at most: that of their own solvers (DefaultExperiment)"
+    assert told in check(it, workspace).notes
+    result = run(it)
+    assert result.status == "completed"
+    assert result.coupling["iterative"]["unsettled"] == 0
+    it.stepping.tolerance = 1e-8
+    assert told not in check(it, workspace).notes
+    with pytest.raises(CouplingError):
+        run(it)
+
+
+def test_it_goes_on_where_it_is_told_to(mine, tmp_path):
+    """On, it ends too high for being on; off, too low for being off: the last iterate stands, and is counted."""
+    it = System(stop_time=0.9, step=0.3, algorithm="iterative", max_iterations=7, unsettled="go-on")
+    it.add("heater", mine("Heater"), x=0.0)
+    it.add("relay", mine("Level"), upside_down=True, level=0.1)
+    it.connect("heater.x", "relay.u")
+    it.connect("relay.on", "heater.on")
+    result = run(it, kind="plain", output=tmp_path)
+    assert result.status == "completed"
+    assert np.abs(np.diff(result["heater.x"])) == pytest.approx([0.3] * 3)
+    told = json.loads((tmp_path / "run.json").read_text())
+    assert told["unsettled"] == "go-on"
+    told = told["coupling"]["iterative"]
+    assert told["unsettled"] == len(told["first_unsettled"]) > 0
+    assert told["first_unsettled"][0] == 0.0
+    assert f"; {told['unsettled']} of 3 steps went on unsettled, the first from t = 0 s" in told["summary"]
+
+
+def test_it_does_not_go_on_where_values_get_away(mine):
+    it = System(stop_time=2.0, step=1.0, algorithm="iterative", acceleration="none", max_iterations=9)
+    it.stepping.unsettled = "go-on"
+    it.add("a", mine("Lag"), gain=-5.0)
+    it.add("b", mine("Lag"), gain=5.0)
+    it.connect("a.x", "b.u")
+    it.connect("b.x", "a.u")
+    with pytest.raises(CouplingError) as caught:
+        run(it, kind="plain")
+    assert "diverges" in str(caught.value)
+
+
 @pytest.mark.parametrize("fails", [False, True])
 def test_saved_states_are_given_back(mine, monkeypatch, fails):
     """Of native FMUs, whose states are memory: also where the iterations lead nowhere."""
@@ -307,5 +374,7 @@ def test_what_is_told_of_the_iterations():
         "iterations_per_step": 2.5,
         "most_iterations": 5,
         "worst_residual_per_tolerance": 0.5,
+        "unsettled": 0,
+        "first_unsettled": [],
         "summary": "2.5 iterations per step, at most 5; worst residual 0.5 of the tolerance",
     }

@@ -1,6 +1,5 @@
 """Outputs that may show their FMU's inputs: states are watched whatever a list of dependencies says."""
 
-import fmpy
 import numpy as np
 import pytest
 from railcosim.orchestrator.errors import CouplingError, ScenarioError
@@ -8,26 +7,6 @@ from railcosim.orchestrator.run.checking import check
 from railcosim.orchestrator.run.execution import run
 from railcosim.orchestrator.system import System
 from scipy.integrate import solve_ivp
-
-ABLE = 'canGetAndSetFMUstate="true" canHandleVariableCommunicationStepSize="true"'
-
-
-@pytest.fixture
-def species(compile_c, xml, tmp_path):
-    """The FMU of species.c, whose y is said to depend on the inputs given; None says nothing."""
-
-    def make(on, *options, **of):
-        v = xml["variable"]
-        shown = [v("u", "input", start=0.0), v("y", "output", dependencies=on, **of)]
-        shown += [v(name, "parameter", start=0.0) for name in ("a", "b", "c", "d", "start")]
-        name = "_".join(("species", *(on if on is not None else ["unsaid"]), *options)).replace("-", "")
-        files = {
-            "modelDescription.xml": xml["description"](shown, identifier="Species", simulation=ABLE),
-            f"binaries/{fmpy.platform}/Species{fmpy.sharedLibraryExtension}": compile_c("species.c", *options),
-        }
-        return str(xml["write_archive"](tmp_path / f"{name}.fmu", files))
-
-    return make
 
 
 def couple(fmu, prey, predator, **how):
