@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import codecs
 import math
 import re
 import tempfile
 from collections.abc import Iterable, Mapping, Set
 from dataclasses import replace
+from io import BytesIO
 from pathlib import Path
 from typing import Any, cast
 
@@ -35,7 +37,7 @@ def read_interface(folder: Path, name: str) -> Interface:
     Raises:
         FmuFileError: not a co-simulation FMU of a version of FMI that is known, or a description beyond repair.
     """
-    root = _parse(folder / "modelDescription.xml", name)
+    root, overlooked = _parse(folder / "modelDescription.xml", name)
     version = standard(root)
     if version not in VERSIONS:
         raise FmuFileError(
@@ -46,9 +48,9 @@ def read_interface(folder: Path, name: str) -> Interface:
         raise FmuFileError(f"{name} has no co-simulation part{f' (it is {other})' if other else ''}")
     try:
         before = etree.tostring(root)
-        faults = repair(root) if version == "2.0" else []
+        faults = [*overlooked, *(repair(root) if version == "2.0" else [])]
         # Of FMI 3.0 FMPy would read the description of the sources, too, and refuse an FMU for faults in that.
-        alone = version == "3.0" or etree.tostring(root) != before
+        alone = version == "3.0" or overlooked or etree.tostring(root) != before
         description, problems = _read(folder, root if alone else None)
         beside = translate(description, root, version)
         told = [problem for problem in problems if not is_pedantry(version, problem)]
@@ -89,16 +91,44 @@ def _interface(description: Any, root: Any, beside: Beside) -> Interface:
     )
 
 
-def _parse(path: Path, name: str) -> Any:
+def _parse(path: Path, name: str) -> tuple[Any, list[str]]:
+    """The root element, and what had to be overlooked to read it."""
+    overlooked: list[str] = []
     try:
-        parsed = etree.parse(str(path), etree.XMLParser(resolve_entities=False, no_network=True))
+        parsed = etree.parse(str(path), _parser())
     except (etree.XMLSyntaxError, OSError) as error:  # the latter where bytes do not fit the encoding
-        what = getattr(error, "msg", None) or "it has bytes that do not fit its encoding"
-        raise FmuFileError(f"{name}: its modelDescription.xml is not XML: {what}") from error
+        parsed, overlooked = _parse_anyhow(path.read_bytes())
+        if parsed is None:
+            what = getattr(error, "msg", None) or "it has bytes that do not fit its encoding"
+            raise FmuFileError(f"{name}: its modelDescription.xml is not XML: {what}") from error
     # Asked of the parser, not searched for in the bytes: they may be in any encoding.
     if parsed.docinfo.internalDTD is not None:
         raise FmuFileError(f"{name} is refused: its modelDescription.xml has a DOCTYPE, which may declare XML entities")
-    return parsed.getroot()
+    return parsed.getroot(), overlooked
+
+
+def _parser(encoding: str | None = None) -> etree.XMLParser:
+    return etree.XMLParser(resolve_entities=False, no_network=True, encoding=encoding)
+
+
+def _parse_anyhow(content: bytes) -> tuple[Any, list[str]]:
+    """What is XML but for blanks at its beginning or letters of Windows' in what calls itself UTF-8; None otherwise."""
+    overlooked = []
+    begun = content.removeprefix(codecs.BOM_UTF8).lstrip()
+    if begun != content.removeprefix(codecs.BOM_UTF8):
+        overlooked.append("it begins with blanks, which XML does not allow")
+    try:
+        begun.decode()
+        encoding = None
+    except UnicodeDecodeError:
+        encoding = "windows-1252"
+        overlooked.append("its letters are not those of the encoding it names; they are read as Windows-1252")
+    if b"\0" in content[:4] or not overlooked:
+        return None, []
+    try:
+        return etree.parse(BytesIO(begun), _parser(encoding)), overlooked
+    except (etree.XMLSyntaxError, OSError, LookupError):
+        return None, []
 
 
 def _read(folder: Path, repaired: Any) -> tuple[Any, list[str]]:

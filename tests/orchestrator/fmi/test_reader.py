@@ -146,10 +146,28 @@ def test_model_exchange_only(reading, xml):
 
 
 @pytest.mark.parametrize(
-    "text", ["", "not XML", "<fmiModelDescription>", "<a></b>", b"\xff\xfe\x00<", '<a b="größe"/>'.encode("latin-1")]
+    "text", ["", "not XML", "<fmiModelDescription>", "<a></b>", b"\xff\xfe\x00<", b'<a b="\x81"/>', b" \n <a>"]
 )
 def test_not_xml(reading, text):
     assert refusal(reading, text).startswith("their.fmu: its modelDescription.xml is not XML: ")
+
+
+@pytest.mark.parametrize(
+    ("begin", "encoding", "told"),
+    [
+        (b"", "utf-8", []),
+        (b"\xef\xbb\xbf", "utf-8", []),
+        (b"\n  ", "utf-8", ["it begins with blanks, which XML does not allow"]),
+        (b"\xef\xbb\xbf\r\n", "utf-8", ["it begins with blanks, which XML does not allow"]),
+        (b"", "cp1252", ["its letters are not those of the encoding it names; they are read as Windows-1252"]),
+    ],
+)
+def test_bytes_that_tools_write_and_xml_forbids(reading, xml, begin, encoding, told):
+    text = xml["description"]([xml["variable"]("größe", "output")])
+    assert text.startswith("<?xml"), "the declaration is what must stand first"
+    it = reading(begin + text.encode(encoding))
+    assert list(it.variables) == ["größe"]
+    assert [warning.removeprefix("their.fmu: ") for warning in it.warnings] == told
 
 
 def test_a_second_element_that_names_no_library_leaves_no_gap(reading, xml):
