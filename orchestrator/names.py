@@ -12,6 +12,8 @@ _NUMBERED = re.compile(r"(.*)\[(\d{1,9})\]", re.DOTALL)
 _INDICES = re.compile(r"\[( *-?\d{1,9} *(?:, *-?\d{1,9} *)*)\]")
 _NAME_OR_INDICES = re.compile(rf"'(?:[^'\\]|\\.)*'|{_INDICES.pattern}", re.DOTALL)
 
+_PARTS = re.compile(r"(?:'(?:[^'\\]|\\.)*'|\[[^\]]*\]|[^,])+")
+
 
 class SignalName(NamedTuple):
     """A scalar variable, or a whole array, of one instance: ``train[2].force[3]``.
@@ -89,6 +91,11 @@ def arrays_of(variable: str) -> Iterator[tuple[str, tuple[int, ...]]]:
         ends = [*(group.start() for group in groups[k + 1 :]), len(variable)]
         rest = (variable[group.end() : end] for group, end in zip(groups[k:], ends, strict=True))
         yield variable[: first.start()] + "".join(rest), _numbers(groups[k:])
+
+
+def parted(texts: Iterable[str]) -> Iterator[str]:
+    """Names that commas part in texts; a comma in an index or in a quoted name is part of the name."""
+    return (part.strip() for text in texts for part in _PARTS.findall(text) if part.strip())
 
 
 def plainly(variable: str) -> str:

@@ -117,22 +117,31 @@ def _label(expression: Expression, resolved: list[list[str]], index: int | None,
     if not families:
         return _short(expression.text)
     array = families[0].partition("[")[0]
-    numbers = [re.findall(r"\[([\d,]+)\]", name) for name in families if name.startswith(f"{array}[")]
+    numbers = [re.findall(r"\[([-\d, ]+)\]", name) for name in families if name.startswith(f"{array}[")]
     first = sorted({tuple(map(int, found[0].split(","))) for found in numbers})
     own = "–".join(",".join(map(str, index)) for index in first)
-    return " ".join([array.replace(".", " "), own, *numbers[0][1:]])
+    return _verbatim(" ".join([array.replace(".", " "), own, *numbers[0][1:]]))
 
 
 def _short(text: str) -> str:
     """`gust acceleration` for a plain signal, the expression otherwise."""
     plain = re.fullmatch(r"[\w.\[\]:,-]+", text)
-    return text.removesuffix(".value").replace("[:]", "").replace("[i]", "").replace(".", " ") if plain else text
+    if not plain:
+        return _verbatim(text)
+    return text.removesuffix(".value").replace("[:]", "").replace("[i]", "").replace(".", " ")
+
+
+def _verbatim(text: str) -> str:
+    """A name as it is: between dollars, matplotlib would set mathematics."""
+    return text.replace("$", r"\$")
 
 
 def _variable(text: str) -> str:
     """`speed` for a plain signal, nothing for a formula."""
     tree = parse(text, FUNCTIONS).tree
-    return tree.parts[-1][0].replace("_", " ") if isinstance(tree, Reference) else ""
+    if not isinstance(tree, Reference):
+        return ""
+    return _verbatim(next(name for name, _ in reversed(tree.parts) if name).replace("_", " "))
 
 
 def bracketed(unit: str) -> str:

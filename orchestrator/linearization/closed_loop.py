@@ -21,7 +21,7 @@ from ..errors import FmuError, ScenarioError
 from ..fmi import Kind, Workspace
 from ..fmi.binding import forget_paths
 from ..master import ALGORITHMS, Explicit, Master, Operation, settle
-from ..names import SignalName
+from ..names import SignalName, parted
 from ..problems import Problem, suggestion
 from ..run import Checked, Progress, assembled, check
 from ..system import System
@@ -335,8 +335,8 @@ def _resolve(wanted: Sequence[str], valid: Sequence[SignalName], option: str) ->
     found: dict[SignalName, None] = {}
     problems = []
     names = {str(signal): signal for signal in valid}
-    for name in (part.strip() for text in wanted for part in re.split(r",(?![^\[]*\])", text) if part.strip()):
-        pattern = re.compile(re.escape(name).replace(re.escape("[:]"), r"\[[\d,]+\]") + r"(\[[\d,]+\])?")
+    for name in parted(wanted):
+        pattern = re.compile(re.escape(name).replace(re.escape("[:]"), r"\[[-\d, ]+\]") + r"(\[[-\d, ]+\])*")
         hits = [signal for full, signal in names.items() if full == name] or [
             signal for full, signal in names.items() if pattern.fullmatch(full)
         ]

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 
 from ..errors import ScenarioError
 from ..fmi import Interface, Variable
-from ..names import SignalName
+from ..names import SignalName, parted
 from ..problems import Problem, suggestion
 from ..run import Checked
 from ..scenario import NAME
@@ -46,7 +46,7 @@ def select(wanted: Sequence[str], system: System, checked: Checked) -> tuple[tup
         checked: its models and connections.
     """
     interfaces = {name: model.interface for name, model in checked.models.items()}
-    patterns = [part.strip() for text in wanted for part in re.split(r",(?![^\[]*\])", text) if part.strip()]
+    patterns = list(parted(wanted))
     if not patterns:
         trains = [name for name in system.instances if name.startswith(DEFAULT_FAMILY)]
         patterns = trains or list(system.instances)

@@ -3,7 +3,7 @@
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from railcosim.orchestrator.names import SignalName, arrays_of, plainly
+from railcosim.orchestrator.names import SignalName, arrays_of, parted, plainly
 
 
 @pytest.mark.parametrize(
@@ -108,3 +108,17 @@ def test_the_arrays_that_a_variable_belongs_to(name, arrays):
 )
 def test_an_index_without_blanks_in_one_pair_of_brackets(name, plain):
     assert plainly(name) == plain
+
+
+@pytest.mark.parametrize(
+    ("texts", "names"),
+    [
+        (["a.x, b[:].y", "c"], ["a.x", "b[:].y", "c"]),
+        (["a.m[1,2],a.m[1, :]"], ["a.m[1,2]", "a.m[1, :]"]),
+        (["a.'x, y',b.z"], ["a.'x, y'", "b.z"]),
+        (["a.o'neil,b"], ["a.o'neil", "b"]),
+        ([" , ", ""], []),
+    ],
+)
+def test_names_that_commas_part(texts, names):
+    assert list(parted(texts)) == names

@@ -24,6 +24,7 @@ class Run:
             self.columns[f"car[{i}].speed"] = self.time / i
         self.columns |= {f"consist[{i}].force[{k}]": self.time * k for i in (1, 2) for k in (1, 2)}
         self.columns |= {f"lone.{name}": self.time for name in ("force[1]", "force[2]", "map[1,1]", "map[1,2]")}
+        self.columns |= {f"lone.{name}": self.time for name in ("x[0]", "x[-1]", "n[1][1]", "n[1][2]", "$a")}
 
     def names(self):
         return self.columns.keys()
