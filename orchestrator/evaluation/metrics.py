@@ -209,7 +209,7 @@ def unit_of(expression: Expression, signals: Signals, index: int | None = None) 
                 unit = expression.functions[name].unit
                 first = visit(arguments[0]) or ""
                 both = name in {"minimum", "maximum", "overshoot"}
-                same = shared([visit(argument) for argument in arguments]) if both else first
+                same = shared([visit(argument) for argument in arguments[:2]]) if both else first  # not of the window
                 return {"same": same, "per s": _PER_SECOND.get(first, "")}.get(unit, unit)
         return ""
 
@@ -233,12 +233,15 @@ class Metric:
     unit: str = ""
     comfort: bool = False  # to be shown with the levels of the reaction scale, under COMFORT_TITLE
     problem: str = ""
+    truth: bool = False  # a condition: 1 is true, 0 is false
 
     def text(self, index: int | None = None) -> str:
         """One value as it is printed: `138.5 s`, `never`, `1.000 m/s2 (levels 3, 4)`."""
         value = self.values[index]
         if value == np.inf and self.unit == "s":
             return "never"
+        if self.truth and not np.isnan(value):
+            return "true" if value else "false"
         if not self.comfort or not np.isfinite(value):
             return f"{value:.6g} {self.unit}".rstrip()
         levels = comfort_levels(value)
@@ -316,7 +319,7 @@ def evaluate_metrics(table: Mapping[str, str], signals: Signals) -> list[Metric]
 
 def _evaluate(name: str, text: str, signals: Signals) -> Metric:
     values: dict[int | None, float] = {}
-    unit, comfort = "", False
+    unit, comfort, truth = "", False, False
     try:
         expression = parse(text, FUNCTIONS)
         comfort = isinstance(expression.tree, Call) and expression.tree.name == "comfort"
@@ -325,11 +328,11 @@ def _evaluate(name: str, text: str, signals: Signals) -> Metric:
             value = expression.evaluate(signals, index)
             if isinstance(value, np.ndarray):
                 raise ExpressionError(_not_reduced(text))
-            values[index] = float(value)
+            values[index], truth = float(value), isinstance(value, bool)
             unit = unit_of(expression, signals, index)
     except ExpressionError as error:
         return Metric(name, text, values or {None: np.nan}, unit, comfort, str(error))
-    return Metric(name, text, values, unit, comfort)
+    return Metric(name, text, values, unit, comfort, truth=truth)
 
 
 def compare_metrics(metrics: Sequence[Metric], others: Sequence[Metric]) -> list[MetricChange]:

@@ -69,6 +69,7 @@ def check(system: System, workspace: Workspace, kind: Kind = "auto") -> Checked:
     problems += check_events(system, interfaces, wiring)
     problems += check_coupling(system, interfaces, wiring)
     parameters = {f"{name}.{v.name}" for name, interface in interfaces.items() for v in interface.of("parameter")}
+    parameters |= wiring.left.keys()
     problems += check_requirements(system.judged.requirements, names, every_step, parameters)
     found = check_metrics(system.judged.metrics, names, every_step)
     problems += found
@@ -128,13 +129,16 @@ def _is_there(signal: str, interfaces: Mapping[str, Interface]) -> bool:
 
 
 def signal_names(interfaces: Mapping[str, Interface], wiring: Wiring) -> list[str]:
-    """What expressions may speak of: everything that will be recorded, and every parameter."""
+    """What expressions may speak of: everything that will be recorded, every parameter, and what a swap left."""
     sources = {link.source for link in wiring.links}
     return [
-        f"{instance}.{variable.name}"
-        for instance, interface in interfaces.items()
-        for variable in interface.variables.values()
-        if variable.causality in ("output", "parameter") or (instance, variable.name) in sources
+        *(
+            f"{instance}.{variable.name}"
+            for instance, interface in interfaces.items()
+            for variable in interface.variables.values()
+            if variable.causality in ("output", "parameter") or (instance, variable.name) in sources
+        ),
+        *wiring.left,
     ]
 
 

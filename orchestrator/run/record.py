@@ -132,7 +132,8 @@ def _describe(system: System, checked: Checked, kind: str) -> dict[str, Any]:
         "connections": [dataclasses.asdict(connection) for connection in system.connections],
         "units": _units(checked),
         "texts": _texts(checked),
-        "parameters": {
+        "parameters": checked.wiring.left
+        | {
             f"{name}.{v.name}": starts[name].get(v.name, v.start)
             for name, model in checked.models.items()
             for v in model.interface.of("parameter")

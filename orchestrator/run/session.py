@@ -218,7 +218,8 @@ class Session:
         """What was recorded."""
         recorder = self._recorder
         time, columns = (np.empty(0), {}) if recorder is None else recorder.columns()
-        units, parameters = {}, {}
+        units: dict[str, str] = {}
+        parameters: dict[str, Any] = dict(self.checked.wiring.left)
         for instance, model in self.checked.models.items():
             starts = self.checked.wiring.starts[instance]
             for variable in model.interface.variables.values():

@@ -42,6 +42,8 @@ class Wiring:
 
     Attributes:
         starts: start values by instance and scalar variable. links: scalar connections.
+        left: numbers that a scenario gives to a variable which the model that was swapped in does not have, by full
+            name: a requirement that reads a bound from there still finds it.
         problems: with one the system cannot run. notes: sentences.
         told: what a note has said of some connection, and need not of others. compared: names that wrong ones were
             compared with.
@@ -49,6 +51,7 @@ class Wiring:
 
     starts: dict[str, dict[str, Any]] = field(default_factory=dict)
     links: list[Link] = field(default_factory=list)
+    left: dict[str, float | bool] = field(default_factory=dict)
     problems: list[Problem] = field(default_factory=list)
     notes: list[str] = field(default_factory=list)
     told: set[str] = field(default_factory=set, repr=False)

@@ -28,6 +28,7 @@ def find_starts(system: System, instance: Instance, interface: Interface, wiring
         origin = system.provenance.origins.get(str(signal), instance.origin)
         if scalars is None and instance.swapped:
             dropped.append(name)
+            wiring.left.update(_numbers(signal, given))
         elif scalars is None:
             why = interface.why_left_out(name)
             valid = (v.name for v in interface.variables.values() if v.settable)
@@ -68,6 +69,15 @@ def _elements(
         scalar: _typed(elements[k % len(elements)], interface.variables[scalar], instance)
         for k, scalar in enumerate(scalars)
     }
+
+
+def _numbers(signal: SignalName, given: Any) -> dict[str, float | bool]:
+    """The numbers of a start value that no variable takes, by full name."""
+    if isinstance(given, list | tuple | np.ndarray):
+        elements = {f"{signal}[{k}]": element for k, element in enumerate(_flatten(given), 1)}
+    else:
+        elements = {str(signal): given}
+    return {name: x for name, x in elements.items() if isinstance(x, bool | int | float)}
 
 
 def _flatten(given: Any) -> list[Any]:

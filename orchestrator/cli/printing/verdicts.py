@@ -34,7 +34,9 @@ def show_requirements(out: Console, verdicts: Sequence[Verdict]) -> None:
 def show_values(out: Console, title: str, groups: Mapping[str, Sequence[ComparedValue]]) -> None:
     """Measured beside known, in groups with a line above each: where the values stand, or how to see them."""
     rows = [row for group in groups.values() for row in group]
-    heads = ["claim", "known", "measured", "tolerance", "unit", "verdict"]
+    own = {row.origin == REFERENCE for row in rows}
+    known = "known" if len(own) > 1 else "reference" if own == {True} else "published"
+    heads = ["claim", known, "measured", "tolerance", "unit", "verdict"]
     lines = [heads, *map(_cells, rows)]
     widths = [max(len(line[k]) for line in lines) for k in range(len(heads))]
     widths[0] = max(min(widths[0], out.width - sum(widths[1:]) - 2 * len(heads)), _SMALLEST_CLAIM)
@@ -50,7 +52,7 @@ def show_values(out: Console, title: str, groups: Mapping[str, Sequence[Compared
 def _value_table(heads: Sequence[str], widths: Sequence[int], rows: Sequence[ComparedValue]) -> Table:
     made = Table(show_header=not rows, **PLAIN)
     for head, width in zip(heads, widths, strict=True):
-        numeric = head in ("known", "measured", "tolerance")
+        numeric = head not in ("claim", "unit", "verdict")
         made.add_column(head, justify="right" if numeric else "left", overflow="fold", width=width)
     for row in rows:
         *texts, word = _cells(row)
@@ -133,6 +135,7 @@ def _counted(text: str, rows: Sequence[tuple[str, str]], bad: Sequence[str]) -> 
         named = [name for name, found in rows if found == word]
         text += f"; {word}: {', '.join(named)}" if named else ""
     open_ = Counter(word for _, word in rows if word in ("departs", "inconclusive", "not judged"))
-    told = {"departs": "departs as known"}
-    text += "".join(f"; {count} {told.get(word, word)}" for word, count in open_.items())
+    for word, count in open_.items():
+        known = f"depart{'s' * (count == 1)} as known"
+        text += f"; {count} {known if word == 'departs' else word}"
     return text, any(word in bad for _, word in rows)

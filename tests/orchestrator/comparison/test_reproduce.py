@@ -96,7 +96,7 @@ def test_published_values_under_the_command_and_references_counted(
     assert said.err == ""  # progress is for a terminal
     lines = [line.rstrip() for line in said.out.splitlines() if line.strip()]
     assert lines[0] == "Published values"
-    assert lines[1].split() == ["claim", "known", "measured", "tolerance", "unit", "verdict"]
+    assert lines[1].split() == ["claim", "published", "measured", "tolerance", "unit", "verdict"]
     assert lines[2] == "orchestrate run one"
     assert lines[3].split() == ["start", "10", "10", "0.5", "m/s", "reproduced"]
     assert lines[4] == "orchestrate run one --preset fast"

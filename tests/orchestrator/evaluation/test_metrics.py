@@ -324,6 +324,7 @@ def test_one_bad_metric_does_not_hide_the_others():
         ("jerk(1)", ""),
         ("traction_energy(s.x, a[1].v)", "J"),
         ("overshoot(s.x, 3)", "m"),
+        ("overshoot(s.x, 3, until = first_time(s.x > 4))", "m"),
         ("max(minimum(s.x, 3))", "m"),
         ("final(s.x) * 2", ""),
         ("final(s.x) - final(a[1].v)", ""),
@@ -334,6 +335,13 @@ def test_one_bad_metric_does_not_hide_the_others():
 )
 def test_units_are_told_only_where_they_are_certain(text, unit):
     assert unit_of(parse(text, FUNCTIONS), ramp()) == unit
+
+
+def test_a_condition_is_true_or_false():
+    (metric, *_) = evaluate_metrics({"kept": "max(s.x) < 1e9", "number": "max(s.x)"}, ramp())
+    assert (metric.truth, metric.text()) == (True, "true")
+    (metric,) = evaluate_metrics({"kept": "max(s.x) < -1e9"}, ramp())
+    assert (metric.values, metric.text()) == ({None: 0.0}, "false")
 
 
 def test_values_are_printed_for_people():

@@ -2,6 +2,7 @@
 
 import pytest
 from railcosim.orchestrator.errors import ScenarioError
+from railcosim.orchestrator.run import Results, run
 from railcosim.orchestrator.run.checking import check
 from railcosim.orchestrator.system import System
 
@@ -152,3 +153,23 @@ def test_problems_say_where_they_were_written(problems):
     system.instances["train"].origin = "line.toml:12"
     system.instances["train"].start["mas"] = 1.0
     assert problems(system)[0].startswith("line.toml:12: train.mas: PointMassTrain has no such variable")
+
+
+def test_requirements_read_what_a_swap_left(examine, tmp_path):
+    """A scenario's bounds outlive the controller that had them; a model that is no swap must have them."""
+    system = train(
+        stop_time=1.0, requirements={"slow": "always train.speed <= train.bounds[2] outside [0, train.late]"}
+    )
+    system.instances["train"].swapped = True
+    system.instances["train"].start |= {"speed": 20.0, "bounds": [10, 30.0], "late": 0.5, "word": "i > 1"}
+    checked = examine(system)
+    assert checked.wiring.left == {"train.bounds[1]": 10, "train.bounds[2]": 30.0, "train.late": 0.5}
+    assert checked.system.judged.requirements == system.judged.requirements
+    outcome = run(system, kind="plain", output=tmp_path)
+    assert [(verdict.verdict, verdict.points) for verdict in outcome.requirements] == [("pass", 5)]
+    assert Results.load(tmp_path).parameters["train.bounds[2]"] == 30.0
+
+
+def test_a_window_does_not_hang_on_a_signal(problems):
+    system = train(requirements={"slow": "always train.speed <= 30 from train.position"})
+    assert problems(system) == ["requirement 'slow': 'train.position': a time is a number or a parameter, not a signal"]
