@@ -17,6 +17,7 @@ from ..names import SignalName
 from ..problems import Problem, suggestion
 from ..system import System
 from ..wiring import Order, Wiring, derive_order, wire
+from .loop_delay import loop_delays
 from .size import tell_size
 
 _MOST_STEPS = 1e15
@@ -194,6 +195,8 @@ def describe_stepping(checked: Checked) -> list[str]:
     algorithm = ALGORITHMS[system.stepping.algorithm]
     steps = [f"steps in the order: {', '.join(checked.order.sequence)}"] if algorithm.in_order else []
     lines = [f"{algorithm.name} {line}" for line in (*steps, *algorithm.fit(system, interfaces, checked.wiring).steps)]
+    delays = loop_delays(system, interfaces, checked.wiring, checked.order.sequence)
+    lines += [str(delay) for delay in delays if not delay.wanted and delay.steps]
     for instance in system.instances.values():
         if instance.step is not None:
             lines.append(f"{instance.name} steps every {instance.step:g} s")
@@ -214,6 +217,8 @@ def _notes(system: System, models: Mapping[str, Model], wiring: Wiring, order: O
             ] = None
         if interface.needs_tool and not interface.annotation:
             notes[f"{model} says that it needs the tool it was made with ({interface.generator or 'unnamed'})"] = None
+    delays = loop_delays(system, interfaces, wiring, order.sequence)
+    notes.update(dict.fromkeys(str(delay) for delay in delays if delay.wanted))
     notes.update(dict.fromkeys(isolation_notes(system, models)))
     notes.update(dict.fromkeys(describe_coupling(system, interfaces, wiring)))
     if ALGORITHMS[system.stepping.algorithm].in_order:

@@ -5,9 +5,10 @@ from .order import Order, derive_order
 from .resolution import wire
 from .starts import bounded
 from .topology import describe_topology
-from .trains import Following, Quantity, Train, find_followings, find_trains
+from .trains import Control, Following, Quantity, Train, find_controls, find_followings, find_trains
 
 __all__ = [
+    "Control",
     "Following",
     "Link",
     "Order",
@@ -18,6 +19,7 @@ __all__ = [
     "derive_order",
     "describe_topology",
     "described",
+    "find_controls",
     "find_followings",
     "find_trains",
     "is_direct",

@@ -15,6 +15,7 @@ from ..fmi import Interface
 from ..names import SignalName
 from .links import Link, Wiring
 from .topology import is_heard
+from .tracing import Ends, ends_of, first_of, force_paths, position_path
 
 
 @dataclass(frozen=True)
@@ -53,17 +54,20 @@ class Following:
 
 
 @dataclass(frozen=True)
-class _Ends:
-    """The connections by their ends."""
+class Control:
+    """A controller and the train it drives, with the connections from the train's position to it, and on to the train.
 
-    into: Mapping[str, Sequence[Link]]
-    feeding: Mapping[tuple[str, str], Link]
-    out_of: Mapping[str, Sequence[Link]]
+    ``links`` are in the order in which a value passes them.
+    """
+
+    controller: str
+    train: str
+    links: tuple[Link, ...]
 
 
 def find_trains(interfaces: Mapping[str, Interface], wiring: Wiring) -> list[Train]:
     """The trains of a system, in the order of its instances."""
-    ends = _ends(wiring.links)
+    ends = ends_of(wiring.links)
     by_wiring = dict(_driven(interfaces, ends))
     found = []
     for name, face in interfaces.items():
@@ -82,7 +86,7 @@ def find_followings(interfaces: Mapping[str, Interface], wiring: Wiring, trains:
         wiring: start values and connections of the system.
         trains: which of the instances are trains.
     """
-    ends = _ends(wiring.links)
+    ends = ends_of(wiring.links)
     fed = {name: {link.target.variable: link.source.instance for link in links} for name, links in ends.into.items()}
     found: dict[tuple[str, str], Following] = {}
     for name, face in interfaces.items():
@@ -100,6 +104,25 @@ def find_followings(interfaces: Mapping[str, Interface], wiring: Wiring, trains:
                 pair = _owner(first), _owner(second)
                 found.setdefault(pair, Following(*pair, first.minus(second)))
     return list(found.values())
+
+
+def find_controls(interfaces: Mapping[str, Interface], wiring: Wiring, trains: Collection[str]) -> Iterator[Control]:
+    """Which controller drives which train, and by what ways.
+
+    Args:
+        interfaces: by instance name.
+        wiring: start values and connections of the system.
+        trains: which of the instances are trains.
+    """
+    ends = ends_of(wiring.links)
+    for name, face in interfaces.items():
+        link = ends.feeding.get((name, first_of(face, "position")))
+        path = None if link is None or name in trains else position_path(link, trains, interfaces, ends)
+        if path:
+            train = path[-1].source.instance
+            forces = force_paths(name, ends).get(train)
+            if forces:
+                yield Control(name, train, (*reversed(path), *forces))
 
 
 def _has_port(face: Interface) -> bool:
@@ -122,42 +145,14 @@ def _mean(name: str, face: Interface, variable: str) -> Quantity:
     return Quantity(tuple((SignalName(name, scalar), factor) for scalar in scalars))
 
 
-def _ends(links: Sequence[Link]) -> _Ends:
-    into: dict[str, list[Link]] = {}
-    out_of: dict[str, list[Link]] = {}
-    for link in links:
-        into.setdefault(link.target.instance, []).append(link)
-        out_of.setdefault(link.source.instance, []).append(link)
-    return _Ends(into, {(link.target.instance, link.target.variable): link for link in links}, out_of)
-
-
-def _driven(interfaces: Mapping[str, Interface], ends: _Ends) -> Iterator[tuple[str, Quantity]]:
+def _driven(interfaces: Mapping[str, Interface], ends: Ends) -> Iterator[tuple[str, Quantity]]:
     """Instances with the speed that a controller reads of them, and which its force reaches."""
     for name, face in interfaces.items():
-        position, speed = (ends.feeding.get((name, _first(face, x))) for x in ("position", "speed"))
+        position, speed = (ends.feeding.get((name, first_of(face, x))) for x in ("position", "speed"))
         if position is None or speed is None or position.source.instance != speed.source.instance:
             continue
-        if position.source.instance in _reached(name, ends):
+        if position.source.instance in force_paths(name, ends):
             yield speed.source.instance, Quantity(((speed.source, 1.0),)).through(speed)
-
-
-def _reached(name: str, ends: _Ends) -> set[str]:
-    """Instances that a controller's force reaches, through protections and the like."""
-    found: set[str] = set()
-    front = [name]
-    while front:
-        here = front.pop()
-        for link in ends.out_of.get(here, ()):
-            to = link.target.instance
-            if link.source.array == "force" and to not in found:
-                found.add(to)
-                front.append(to)
-    return found
-
-
-def _first(face: Interface, name: str) -> str:
-    """A variable's name, or that of the first element of an array."""
-    return (face.scalars(name) or (name,))[0]
 
 
 def _owner(quantity: Quantity) -> str:
@@ -165,27 +160,20 @@ def _owner(quantity: Quantity) -> str:
 
 
 def _own_position(
-    name: str, face: Interface, trains: Collection[str], interfaces: Mapping[str, Interface], ends: _Ends
+    name: str, face: Interface, trains: Collection[str], interfaces: Mapping[str, Interface], ends: Ends
 ) -> Quantity | None:
     """The position of the train that a controller drives, as it reads it; or of the train that it is."""
     if name in trains:
         scalars = _outputs(face, "position")
         return Quantity(((SignalName(name, scalars[0]), 1.0),)) if scalars else None
-    link = ends.feeding.get((name, _first(face, "position")))
+    link = ends.feeding.get((name, first_of(face, "position")))
     return None if link is None else _origin(link, trains, interfaces, ends)
 
 
-def _origin(link: Link, trains: Collection[str], interfaces: Mapping[str, Interface], ends: _Ends) -> Quantity | None:
+def _origin(link: Link, trains: Collection[str], interfaces: Mapping[str, Interface], ends: Ends) -> Quantity | None:
     """The position of a train that arrives by a connection; None where it is of no train, or not of one alone."""
-    seen: set[SignalName] = set()
-    paths = [[link]]
-    while paths:
-        found = [_along(path) for path in paths if path[-1].source.instance in trains]
-        if found:
-            return found[0] if len(set(map(_owner, found))) == 1 else None
-        seen.update(path[-1].target for path in paths)
-        paths = [[*path, x] for path in paths for x in _behind(path[-1], interfaces, ends) if x.target not in seen]
-    return None
+    path = position_path(link, trains, interfaces, ends)
+    return _along(path) if path else None
 
 
 def _along(path: Sequence[Link]) -> Quantity:
@@ -194,13 +182,3 @@ def _along(path: Sequence[Link]) -> Quantity:
     for link in reversed(path):
         quantity = quantity.through(link)
     return quantity
-
-
-def _behind(link: Link, interfaces: Mapping[str, Interface], ends: _Ends) -> Iterator[Link]:
-    """The connections of positions into the instance that a connection comes from, as far as its output needs them."""
-    instance, variable = link.source
-    needed = interfaces[instance].variables[variable].dependencies
-    for further in ends.into.get(instance, ()):
-        names = further.source.array, further.target.array
-        if any(name.endswith("position") for name in names) and (not needed or further.target.variable in needed):
-            yield further

@@ -84,7 +84,7 @@ def test_each_algorithm(same, mine, algorithm, eventful):
 
 
 def test_threads(same, mine):
-    same(loop(mine, algorithm="jacobi", events=EVENTS), 1.4, threads=2)
+    same(loop(mine, algorithm="jacobi", events=EVENTS), 1.4, "native", threads=2)
 
 
 def test_events_under_way_in_the_compiled_loop(same, mine):
