@@ -7,7 +7,7 @@ import math
 from abc import ABC
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
-from typing import Any, ClassVar, Literal
+from typing import TYPE_CHECKING, Any, ClassVar, Literal
 
 import numpy as np
 
@@ -27,7 +27,7 @@ from .declarations import (
     Tape,
     Variable,
 )
-from .spelling import nearest
+from .spelling import did_you_mean, nearest
 
 Values = dict[str, Any]
 Method = Literal["initial", "derivatives", "outputs", "update", "keep"]
@@ -38,6 +38,10 @@ MAX_LENGTH = 10_000
 
 class ComponentError(ValueError):
     """A component was declared, built or used wrongly; the message names it, the variable and the remedy."""
+
+
+class UnknownNameError(ComponentError, AttributeError):
+    """Equations read something that their component does not have."""
 
 
 @dataclass(frozen=True)
@@ -207,6 +211,16 @@ class Component(ABC):
     def noises(self) -> dict[str, Noise]:
         """The declared random numbers by name."""
         return {name: d for name, d in self.declarations.items() if isinstance(d, Noise)}
+
+    if not TYPE_CHECKING:  # or a type checker would take any name for one that is there
+
+        def __getattr__(self, name: str) -> Any:
+            """Called for what is not there alone: a misspelt name, or an output, which has no value to read."""
+            cls = type(self)
+            if name in cls.declarations:
+                raise UnknownNameError(cls.declarations[name].unreadable(cls))
+            known = [*cls.declarations, "time", "step", *(n for n in dir(cls) if not n.startswith("__"))]
+            raise UnknownNameError(f"{cls.__name__} has no {name!r}{did_you_mean(name, known)}")
 
     def __setattr__(self, name: str, value: Any) -> None:
         if name not in ("slots", "build_arguments"):

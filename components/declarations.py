@@ -31,7 +31,11 @@ class Declaration(ABC):
         # A non-data descriptor: a value of the instance wins, at the speed of a plain attribute.
         if instance is None:
             return self
-        raise AttributeError(
+        raise AttributeError(self.unreadable(owner))
+
+    def unreadable(self, owner: type) -> str:
+        """Why an instance that has no value of it has none."""
+        return (
             f"{owner.__name__}.{self.name} has no value to read: an output is what outputs() returns; "
             "equations that need it share a method of their own"
         )

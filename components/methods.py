@@ -7,7 +7,7 @@ checked here against the declarations.
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Set
+from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
@@ -15,6 +15,7 @@ import numpy as np
 from . import noise
 from .component import Component, ComponentError, Method, Slot, Values, evaluated, pack
 from .declarations import Memory, Output, State, Tape
+from .returned import check_returned, due
 
 _KINDS = {float: "iuf", int: "iu", bool: "b", str: ""}
 """NumPy's kinds of array that hold numbers of a type without a closer look."""
@@ -40,19 +41,7 @@ class Methods:
         self.outputs = tuple(component.of(Output))
         self._noises = tuple(component.noises.items())
         self._array_states = tuple(slot for slot in self.states if slot.shape)
-        self._kept = {slot.name: slot for slot in (*self.memory, *self.states)}
-        self._may_return: dict[Method, dict[str, Slot]] = {
-            "outputs": {slot.name: slot for slot in self.outputs},
-            "initial": self._kept,
-            "update": self._kept | {slot.name: slot for slot in self.tapes},
-            "derivatives": {slot.name: slot for slot in self.states},
-        }
-        self._must_return: dict[Method, Set[str]] = {
-            "outputs": self._may_return["outputs"].keys(),
-            "initial": frozenset[str](),
-            "update": {slot.name for slot in (*self.memory, *self.tapes)},
-            "derivatives": self._may_return["derivatives"].keys(),
-        }
+        self._due = due(component)
 
     def evaluate(self) -> Values:
         """All outputs."""
@@ -116,21 +105,14 @@ class Methods:
         return rates
 
     def _call(self, method: Method) -> Values:
-        returned = evaluated(self.component, method)
-        if not isinstance(returned, dict):
-            raise ComponentError(f"{self.name}.{method} returns {returned!r}; it must return a dict")
-        must = self._must_return[method]
-        if returned.keys() != must:
-            may = self._may_return[method].keys()
-            if not returned.keys() <= may:
-                unknown = sorted(returned.keys() - may)
-                raise ComponentError(f"{self.name}.{method} returns {unknown}; it may return {sorted(may)}")
-            if not must <= returned.keys():
-                raise ComponentError(f"{self.name}.{method} returns no value of {sorted(must - returned.keys())}")
+        returned: Values = evaluated(self.component, method)
+        owed = self._due[method]
+        if not isinstance(returned, dict) or returned.keys() != owed.must:
+            check_returned(self.component, method, returned, owed)
         return returned
 
     def _cast(self, method: Method, returned: Values) -> Values:
-        slots = self._may_return[method]
+        slots = self._due[method].may
         result = {}
         for name, value in returned.items():
             slot = slots[name]

@@ -10,9 +10,11 @@ from typing import Any
 
 import numpy as np
 
+from .authors import line_of
 from .component import Component, ComponentError, Method, evaluated
 from .declarations import Input, Memory, Output, Parameter, State, Tape
 from .maths import SymbolArray, elementwise
+from .returned import check_returned, due
 
 Names = frozenset[str]
 
@@ -100,7 +102,7 @@ def used_inputs(component: Component) -> Names:
     found = [computed, started, dependencies(component), _collect(probe, "derivatives", State)]
     probe.present_values["step"] = Sourced(frozenset({"time"}))
     found.append(_collect(probe, "update", State, Memory, Tape))
-    kept = evaluated(probe, "keep")
+    kept = _run(probe, "keep")
     used = set(_DRIVING if component.of(Tape) else ()) | (kept.names if isinstance(kept, Sourced) else frozenset())
     used.update(*(names for part in found for names in part.values()))
     inputs = component.of(Input)
@@ -137,17 +139,28 @@ def _cells(cells: list[Sourced], shape: tuple[int, ...]) -> Any:
     return array.reshape(shape).view(SymbolArray)
 
 
-def _collect(component: Component, method: Method, *kinds: type[Output | State | Memory | Tape]) -> dict[str, Names]:
+def _run(component: Component, method: Method) -> Any:
+    """What a method returns; what goes wrong in it is told with its name and its author's line."""
     where = f"{type(component).__name__}.{method}"
     try:
-        returned = dict(evaluated(component, method))
-    except TracingError as error:
-        raise TracingError(f"{where}: {error}") from error
+        return evaluated(component, method)
     except Exception as error:
+        line = line_of(error)
+        at = f" (at {line})" if line else ""
+        if isinstance(error, TracingError):
+            raise TracingError(f"{where}: {error}{at}") from error
+        if isinstance(error, ComponentError):
+            raise ComponentError(f"{where}: {error}{at}") from error
         raise TracingError(
-            f"{where} cannot be traced ({type(error).__name__}: {error}): "
+            f"{where} cannot be traced ({type(error).__name__}: {error}){at}: "
             "on values use operators, slices, reshaping and railcosim.components.maths, nothing else"
         ) from error
+
+
+def _collect(component: Component, method: Method, *kinds: type[Output | State | Memory | Tape]) -> dict[str, Names]:
+    where = f"{type(component).__name__}.{method}"
+    returned = _run(component, method)
+    check_returned(component, method, returned, due(component)[method])
     texts = frozenset(
         name
         for slot in component.of(Input, Parameter)

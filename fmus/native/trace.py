@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import contextlib
 import functools
-import traceback
 from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
@@ -17,9 +16,11 @@ from typing import Any, NoReturn
 import casadi as ca
 import numpy as np
 
+from ...components.authors import line_of
 from ...components.component import Component, ComponentError, Method, Slot, evaluated
 from ...components.declarations import Memory, Output, State, Tape
 from ...components.maths import SymbolArray, elementwise
+from ...components.returned import check_returned, due
 from ...components.tracing import TracingError
 from ..variables import scalar_variables
 from .ccode import function
@@ -36,13 +37,8 @@ _FUNCTIONS = {
     "abs": ca.fabs,
 }
 _REMEDY = "on values use operators, slices, reshaping and railcosim.components.maths, nothing else"
-_NOT_THE_AUTHORS = (
-    Path(__file__).parent,
-    Path(__file__).parents[1],
-    Path(__file__).parents[2] / "components",
-    Path(np.__file__).parent,
-)
-"""Folders whose files are never to blame: this package, `maths` and its neighbours, NumPy."""
+_NOT_THE_AUTHORS = (Path(__file__).parent, Path(__file__).parents[1])
+"""Folders whose files are never to blame."""
 
 
 class Symbol:
@@ -252,12 +248,12 @@ class _Tracer:
         outputs = self._results("outputs", [*self.probe.of(Output)])
         derivatives = self._results("derivatives", [*self.probe.of(State)])
         kept = [*self.probe.of(State, Memory)]
-        started = self._returned("initial", kept)
+        started = self._returned("initial")
         computed = [slot for slot in kept if slot.name in started]
         initial = self._flat(started, computed, "initial")
         remembered = [*self.probe.of(Memory), *self.probe.of(Tape)]
         self.probe.present_values["step"] = Symbol(self.clock[1])
-        updated = self._returned("update", [*remembered, *self.probe.of(State)])
+        updated = self._returned("update")
         del self.probe.present_values["step"]
         again = [slot for slot in self.probe.of(State) if slot.name in updated]
         update = self._flat(updated, [*remembered, *again], "update")
@@ -291,7 +287,7 @@ class _Tracer:
             return function(f"{self.prefix}_{name}", [*arguments, ("seed", seed)], results)
 
     def _results(self, method: Method, slots: list[Slot]) -> list[Any]:
-        return self._flat(self._returned(method, slots), slots, method)
+        return self._flat(self._returned(method), slots, method)
 
     def _call(self, method: Method) -> Any:
         try:
@@ -299,29 +295,19 @@ class _Tracer:
         except Exception as error:
             self._refuse(method, error)
 
-    def _returned(self, method: Method, slots: list[Slot]) -> dict[str, Any]:
-        """What a method returns; only values of these slots."""
-        returned = self._call(method)
-        if not isinstance(returned, dict):
-            raise TracingError(f"{self.name}.{method} returns {returned!r}; it must return a dict")
-        names = [slot.name for slot in slots]
-        unknown = sorted(returned.keys() - set(names))
-        if unknown:
-            raise TracingError(f"{self.name}.{method} returns {unknown}; it may return {sorted(names)}")
+    def _returned(self, method: Method) -> dict[str, Any]:
+        """What a method returns, by name."""
+        returned: dict[str, Any] = self._call(method)
+        check_returned(self.probe, method, returned, due(self.probe)[method])
         return returned
 
     def _refuse(self, method: str, error: Exception) -> NoReturn:
         """Say which method of which component did what: the author's own line."""
         what = f"{self.name}.{method} cannot be traced"
         remedy = "" if isinstance(error, ComponentError) else f"; {_REMEDY}"
-        frames = [
-            frame
-            for frame in traceback.extract_tb(error.__traceback__)
-            if Path(frame.filename).parent not in _NOT_THE_AUTHORS
-            and not Path(frame.filename).is_relative_to(_NOT_THE_AUTHORS[-1])
-        ]
-        if frames:
-            what += f" at {Path(frames[-1].filename).name}:{frames[-1].lineno}, '{frames[-1].line}'"
+        line = line_of(error, *_NOT_THE_AUTHORS)
+        if line:
+            what += f" at {line}"
         raise TracingError(f"{what}: {error}{remedy}") from error
 
     def _flat(self, returned: dict[str, Any], slots: list[Slot], method: str) -> list[Any]:
@@ -329,8 +315,6 @@ class _Tracer:
         for slot in slots:
             if slot.type is str:
                 raise TracingError(f"{self.name}.{slot.name} is a computed text; only a Python FMU can have one")
-            if slot.name not in returned:
-                raise TracingError(f"{self.name}.{method} returns no value of {slot.name!r}")
             try:
                 array = np.asarray(returned[slot.name], dtype=object)
                 expressions = [_expression(cell) for cell in array.flat]

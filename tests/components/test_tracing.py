@@ -176,15 +176,58 @@ def test_asking_for_truth_or_a_plain_number_names_the_remedy(equation):
         dependencies(cls())
 
 
-@pytest.mark.parametrize(
-    "equation", [lambda s: np.tanh(s.a), lambda s: round(s.a), lambda s: f"{s.a:.3f}", lambda s: s.q]
-)
+@pytest.mark.parametrize("equation", [lambda s: np.tanh(s.a), lambda s: round(s.a), lambda s: f"{s.a:.3f}"])
 def test_anything_else_that_fails_is_named_with_its_cause(equation):
     cls = type("Case", (Probe,), {"outputs": lambda self: {"y": equation(self)}})
     with pytest.raises(
-        TracingError, match=r"Case\.outputs cannot be traced \((TypeError|AttributeError): .*\): on values"
+        TracingError,
+        match=r"Case\.outputs cannot be traced \((Type|Attribute)Error: .*\) \(at test_tracing\.py:\d+, .*\): on val",
     ):
         dependencies(cls())
+
+
+class Whole(Probe):
+    """With every method that returns values."""
+
+    x = State("1", 0.0)
+
+    def outputs(self):
+        return {"y": self.x}
+
+    def derivatives(self):
+        return {"x": self.a}
+
+
+@pytest.mark.parametrize("method", ["outputs", "derivatives", "update", "initial", "keep"])
+def test_a_misspelt_name_is_told_with_the_nearest_and_the_authors_line(method):
+    """In every method that is run, through helpers too."""
+
+    def misspelt(self):
+        return self._half()
+
+    cls = type("Case", (Whole,), {method: misspelt, "_half": lambda self: {"y": 0.5 * self.tiem}})
+    with pytest.raises(ComponentError) as told:
+        used_inputs(cls())
+    assert not isinstance(told.value, TracingError)
+    line = misspelt.__code__.co_firstlineno + 3
+    expected = f"Case.{method}: Case has no 'tiem'; did you mean 'time'? (at test_tracing.py:{line}, "
+    assert str(told.value).startswith(expected)
+
+
+@pytest.mark.parametrize(
+    ("method", "said"),
+    [
+        ("outputs", "Case.outputs returns no value of ['y'] (test_tracing.py:"),
+        ("update", "Case.update returns no value of ['m'] (test_tracing.py:"),
+        ("derivatives", "Case.derivatives returns no value of ['x'] (test_tracing.py:"),
+    ],
+)
+def test_what_a_method_forgets_is_told_before_a_run(method, said):
+    cls = type("Case", (Whole,), {method: lambda self: {}})
+    with pytest.raises(ComponentError) as told:
+        used_inputs(cls())
+    assert str(told.value).startswith(said)
+    assert not isinstance(told.value, TracingError)
 
 
 def test_initial_is_named_where_it_fails():

@@ -12,7 +12,7 @@ from pathlib import Path
 import fmpy
 import numpy as np
 import pytest
-from railcosim.components import simulate
+from railcosim.components import ComponentError, simulate
 from railcosim.fmus import build as build_module
 from railcosim.fmus.build import build, build_component, cache_folder, plain, write_archive, write_whole
 from railcosim.fmus.references import resolve
@@ -108,6 +108,26 @@ def test_arguments_that_change_no_interface_still_tell_fmus_apart(instantiate, s
 def test_unusable_arguments(sample, name, arguments, complaint):
     with pytest.raises(ValueError, match=re.escape(complaint)):
         build(sample(name), arguments)
+
+
+@pytest.mark.parametrize(
+    ("equation", "said"),
+    [
+        ("{}", "Mine.outputs returns no value of ['y'] (mine.py:8)"),
+        ('{"y": self.spead}', "Mine.outputs: Mine has no 'spead'; did you mean 'speed'? (at mine.py:9, "),
+    ],
+)
+def test_a_mistake_in_the_equations_is_no_reason_for_another_kind(tmp_path, equation, said):
+    """A forgotten output and a misspelt name are told with the line in their author's file."""
+    path = tmp_path / "mine.py"
+    path.write_text(
+        "from railcosim.components import Component, Input, Output\n\n\nclass Mine(Component):\n"
+        f'    speed = Input("m/s")\n    y = Output("m/s")\n\n    def outputs(self):\n        return {equation}\n'
+    )
+    for kind in ("auto", "python"):
+        with pytest.raises(ComponentError) as told:
+            build_module.package(f"{path}:Mine", {}, kind)
+        assert said in str(told.value)
 
 
 def test_start_values_given_to_the_component_are_part_of_the_identity(component_class):

@@ -40,7 +40,7 @@ def law(**methods):
 
 
 def refusal(component):
-    with pytest.raises(TracingError) as caught:
+    with pytest.raises(ComponentError) as caught:
         trace(component, "Changed")
     return str(caught.value)
 
@@ -186,12 +186,12 @@ def test_a_refusal_shows_the_line_of_the_author_not_of_the_library():
 @pytest.mark.parametrize(
     ("methods", "said"),
     [
-        ({"outputs": lambda s: {}}, "outputs returns no value of 'y'"),
+        ({"outputs": lambda s: {}}, "outputs returns no value of ['y']"),
         ({"outputs": lambda s: {"y": 1.0, "z": 1.0}}, r"outputs returns ['z']; it may return ['y']"),
         ({"outputs": lambda s: [1.0]}, "must return a dict"),
-        ({"derivatives": lambda s: {}}, "derivatives returns no value of 'x'"),
+        ({"derivatives": lambda s: {}}, "derivatives returns no value of ['x']"),
         ({"derivatives": lambda s: {"x": 1.0, "m": 1.0}}, "derivatives returns ['m']"),
-        ({"update": lambda s: {}}, "update returns no value of 'm'"),
+        ({"update": lambda s: {}}, "update returns no value of ['m']"),
         ({"update": lambda s: {"m": 1.0, "y": 1.0}}, "update returns ['y']"),
         ({"initial": lambda s: {"u": 1.0}}, "initial returns ['u']"),
     ],

@@ -1,0 +1,54 @@
+"""What a component's methods must return, out of its declarations, and what is wrong with what they do."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Set
+from dataclasses import dataclass
+from typing import Any
+
+from .authors import place_of
+from .component import Component, ComponentError, Method, Slot
+from .declarations import Memory, Output, State, Tape
+
+
+@dataclass(frozen=True)
+class Due:
+    """What a method may return, by name, and the names it must."""
+
+    may: Mapping[str, Slot]
+    must: Set[str]
+
+
+def due(component: Component) -> dict[Method, Due]:
+    """What is due of each method that returns values by name."""
+
+    def slots(*kinds: type[Output | State | Memory | Tape]) -> dict[str, Slot]:
+        return {slot.name: slot for slot in component.of(*kinds)}
+
+    outputs, states = slots(Output), slots(State)
+    return {
+        "outputs": Due(outputs, outputs.keys()),
+        "initial": Due(slots(Memory) | states, frozenset()),
+        "update": Due(slots(Memory) | states | slots(Tape), slots(Memory, Tape).keys()),
+        "derivatives": Due(states, states.keys()),
+    }
+
+
+def check_returned(component: Component, method: Method, returned: Any, owed: Due) -> None:
+    """Refuse what a method returned if it is not what its component declares.
+
+    Raises:
+        ComponentError: no dict, a name too many or one too few; with the place of the method in its author's file.
+    """
+    function = getattr(type(component), method, None)
+    name = type(component).__name__
+    where = place_of(function)
+    at = f" ({where})" if where else ""
+    if not isinstance(returned, dict):
+        raise ComponentError(f"{name}.{method} returns {returned!r}; it must return a dict{at}")
+    if unknown := sorted(returned.keys() - owed.may.keys()):
+        raise ComponentError(f"{name}.{method} returns {unknown}; it may return {sorted(owed.may)}{at}")
+    if missing := sorted(owed.must - returned.keys()):
+        if function is None:
+            raise ComponentError(f"{name} has no method {method!r}, which must return {missing}")
+        raise ComponentError(f"{name}.{method} returns no value of {missing}{at}")
