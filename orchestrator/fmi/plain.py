@@ -47,6 +47,7 @@ class PlainSlave:
         self.name = name
         self.interface = interface
         self.time = 0.0
+        self.disturbed: dict[str, None] = {}
         self.simulation = simulation
 
     def setup(self, start_time: float, stop_time: float) -> None:

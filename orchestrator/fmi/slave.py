@@ -24,12 +24,14 @@ class Channel(Protocol):
 class Slave(Protocol):
     """One instance. Every method raises `FmuError` with instance, time, status and log when the model fails.
 
-    ``time`` is how far it has got, in s; ``log`` what it said, oldest line first.
+    ``time`` is how far it has got, in s; ``log`` what it said, oldest line first; ``disturbed`` what it has done to the
+    process that it shares with others.
     """
 
     name: str
     interface: Interface
     time: float
+    disturbed: dict[str, None]
 
     def setup(self, start_time: float, stop_time: float) -> None:
         """Announce the experiment, whose stop time may be infinite, and enter nothing yet."""

@@ -65,6 +65,7 @@ class IsolatedSlave:
         self.interface = interface
         self.time = 0.0
         self.log: list[str] = []
+        self.disturbed: dict[str, None] = {}
         self._room = _SPARE_CELLS + _CELLS_PER_VARIABLE * len(interface.variables)
         self._used = 0
         try:

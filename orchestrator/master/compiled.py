@@ -12,7 +12,7 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from ..fmi.binding import FmuChannel, FmuSlave
+from ..fmi.binding import FmuChannel, FmuSlave, is_watched
 from .algorithms import Explicit, Operation
 from .coupling import Coupling
 from .exchange import Change
@@ -41,7 +41,7 @@ _ENTRY = np.dtype([("place", "i8"), ("age", "i8"), ("change", "i8"), ("scale", "
 _CHANGES = np.dtype(
     [("active", "i8"), ("place", "i8"), ("is_real", "i8"), *((n, "f8") for n in ("scale", "offset", "slope", "since"))]
 )
-_OPERATION = np.dtype([(name, "i4") for name in ("kind", "index", "period", "phase", "rank", "unused")])
+_OPERATION = np.dtype([(name, "i4") for name in ("kind", "index", "period", "phase", "rank", "is_watched")])
 
 
 class CompiledLoop:
@@ -74,7 +74,13 @@ class CompiledLoop:
                 self._add(list(share), batch.operations)
                 ends.append(len(self._operations))
         self._plan = (
-            np.array([(*o, rank, 0) for o, rank in zip(self._operations, self._ranks(), strict=True)], _OPERATION),
+            np.array(
+                [
+                    (*operation, rank, is_watched(slave))
+                    for operation, rank, (slave, _) in zip(self._operations, self._ranks(), self._culprits, strict=True)
+                ],
+                _OPERATION,
+            ),
             np.array(ends if self.threads > 1 else [len(self._operations)], dtype=np.int64),
             np.array(self._channels, dtype=_CHANNEL),
             np.array(self._instances, dtype=_INSTANCE),
@@ -177,12 +183,14 @@ class CompiledLoop:
             block = min(block, stop - done, max(1, _MOST_VALUES // width) * every)
             rows = np.empty((_rows_due(done, block, every, count), width))
             clock_begin = clock.perf_counter()
-            taken, written, failed, status, newest = kernel.run(
+            taken, written, failed, status, newest, disturber = kernel.run(
                 *self._plan, changes, values, history, newest, rows, every, start_time, step, done, block, count, begin
             )
             seconds = clock.perf_counter() - clock_begin
             begin = 0
             done += taken
+            if disturber >= 0:
+                self._tell_disturber(disturber)
             coupling.steps, coupling.time = done, start_time + done * step
             exchange.values[:] = values.tolist()
             for place in self._whole:  # the kernel's values are all doubles
@@ -197,6 +205,11 @@ class CompiledLoop:
         for slave in coupling.slaves.values():
             slave.time = start_time + done * step
         return goes_on
+
+    def _tell_disturber(self, operation: int) -> None:
+        slave = self._culprits[operation][0]
+        if slave is not None:
+            slave.mend()
 
     def _unrolled(self, width: int) -> tuple[NDArray[np.float64], int]:
         """The recorded points that delayed connections look back on, as the kernel's ring, and its newest row."""

@@ -13,6 +13,7 @@ from typing import Any
 
 from ..errors import FmuError, RunError
 from ..fmi import Slave
+from ..fmi.binding import Watch
 from ..wiring import Link
 from .algebraic_loops import LoopSolver, find_feeders, find_loops
 from .algorithms import ALGORITHMS, Explicit, FixedStep, VariableStep
@@ -68,6 +69,7 @@ class Master:
         self._stop_time = 0.0
         self._schedule: Schedule | None = None
         self._compiled: CompiledLoop | None = None
+        self._watch = Watch(slaves.values())
 
     @property
     def steps(self) -> int:
@@ -167,6 +169,17 @@ class Master:
             CouplingError: what is exchanged does not settle, or cannot be kept within its tolerance.
         """
         end = count if until is None else until
+        if not self._watch.is_needed:
+            return self._run(start_time, step, (first, end, count), every, observe)
+        try:
+            return self._run(start_time, step, (first, end, count), every, self._watching(observe))
+        finally:
+            self._watch.look(at_once=True)
+
+    def _run(
+        self, start_time: float, step: float, points: tuple[int, int, int], every: float, observe: Observer
+    ) -> bool:
+        first, end, count = points
         if isinstance(self.algorithm, VariableStep):
             return self._run_variably(start_time, step, (end, count), every, observe)
         self.coupling.steps = first
@@ -178,6 +191,15 @@ class Master:
             if not take(start_time, step, (self.steps, stop, count), int(every), self._eventful(step, stop, observe)):
                 return False
         return True
+
+    def _watching(self, observe: Observer) -> Observer:
+        """An observer before whom what the instances share is looked at."""
+
+        def see(steps: int, rows: Rows) -> bool:
+            self._watch.look()
+            return observe(steps, rows)
+
+        return see
 
     def _eventful(self, step: float, stop: int, observe: Observer) -> Observer:
         """An observer before whom the events at the last point happen, so that the row of that point shows them."""

@@ -168,8 +168,9 @@ def _check_threads(checked: Checked, threads: int) -> None:
 
 
 def _execute(system: System, job: Job, figures: bool) -> Run:
-    directory = job.directory
-    begin = clock.perf_counter()
+    given, begin = job.directory, clock.perf_counter()
+    directory = None if given is None else given.absolute()  # whatever becomes of the working directory
+    job = replace(job, directory=directory)
     with Workspace() as workspace:
         try:
             checked = check(system, workspace, job.kind)
@@ -183,21 +184,37 @@ def _execute(system: System, job: Job, figures: bool) -> Run:
             session = Session(checked, job, rows_before(job))
             if directory is not None:
                 _open_directory(directory, checked, job)
-            session.run(begin)
+            outcomes: list[Run] = []
+            session.run(begin, lambda: outcomes.append(_completed(session, figures)))
         finally:
             forget_paths(workspace.folder)
-    outcome = Run(checked.system, session.results(), session.status, checked, error=session.error, directory=directory)
+    outcome = outcomes[-1]
+    known = len(outcome.notes)
+    outcome.notes += [note for note in session.disturbances() if note not in outcome.notes]
+    if directory is not None and len(outcome.notes) > known:  # something new, while instances were given back
+        record_file.finish(directory, outcome, job.kind)
+    outcome.directory = given
+    return outcome
+
+
+def _completed(session: Session, figures: bool) -> Run:
+    """What came out, judged and written down."""
+    checked, job = session.checked, session.job
+    outcome = Run(
+        checked.system, session.results(), session.status, checked, error=session.error, directory=job.directory
+    )
     outcome.coupling, outcome.seconds = session.coupling, session.seconds
     outcome.findings = session.findings(outcome.results)
     if outcome.error is not None and outcome.status == "failed":
         for finding in outcome.findings:
             if finding.kind == "diverging":
                 outcome.error.explain(finding.message)
+    outcome.notes += session.disturbances()
     evaluate(outcome)
-    if directory is not None:
+    if job.directory is not None:
         if figures and len(outcome.results):
-            outcome.figures = draw(checked.system.judged.figures, outcome.results, directory)
-        record_file.finish(directory, outcome, job.kind)
+            outcome.figures = draw(checked.system.judged.figures, outcome.results, job.directory)
+        record_file.finish(job.directory, outcome, job.kind)
     return outcome
 
 

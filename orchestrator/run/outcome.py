@@ -33,6 +33,7 @@ class Run:
         directory: where the files are, if there are any. figures: those that were drawn.
         coupling: how the master's iterations, step sizes, loops and events went, where there were any.
         findings: what no train can do, and what controllers said of themselves, the gravest first.
+        notes: what a user should know of how it went.
         seconds: wall time of ``setup`` and ``stepping``, and the number of communication ``steps``.
     """
 
@@ -48,6 +49,7 @@ class Run:
     error: RunError | None = None
     coupling: dict[str, Any] = field(default_factory=dict)
     findings: list[Finding] = field(default_factory=list)
+    notes: list[str] = field(default_factory=list)
     directory: Path | None = None
     seconds: dict[str, float] = field(default_factory=dict)
 

@@ -54,6 +54,7 @@ def finish(directory: Path, outcome: Run, kind: str) -> None:
     record["time_reached"] = float(outcome.time[-1]) if len(outcome.time) else None
     record["seconds"] = outcome.seconds
     record["coupling"] = outcome.coupling
+    record["notes"] += outcome.notes
     record["findings"] = [dataclasses.asdict(finding) for finding in outcome.findings]
     record["values"] = count_values([*outcome.published, *outcome.references])
     record["figures"] = [path.name for path in outcome.figures]

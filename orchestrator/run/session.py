@@ -6,7 +6,7 @@ import math
 import signal
 import threading
 import time as clock
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import RunError, ScenarioError, StoppedError
-from ..fmi import Interface, Kind
+from ..fmi import Interface, Kind, Slave
 from ..master import ALGORITHMS, Master, Rows
 from . import record as record_file
 from .assembly import assembled
@@ -75,44 +75,63 @@ class Session:
         self._past = past
         self._recorder: Recorder | None = None
         self._watching: Watching | None = None
+        self._slaves: Mapping[str, Slave] = {}
         self._stopped = threading.Event()
 
-    def run(self, begin: float) -> None:
+    def run(self, begin: float, complete: Callable[[], None]) -> None:
         """Run from the first to the last point; a failing model is no exception here but a status.
 
         Args:
             begin: when the set-up began, by the performance counter.
+            complete: called when all is recorded and nothing is given back yet: an FMU may end the process then.
 
         Raises:
             ScenarioError: initial values do not settle.
         """
         with _interruptible(self._stopped):
             try:
-                with assembled(self.checked, threads=self.job.threads) as master:
-                    self._simulate(master, begin)
-            except StoppedError as error:
-                self.status, self.error = "terminated", error
-            except RunError as error:
-                self.status, self.error = "failed", error
-            except KeyboardInterrupt:  # a second Ctrl-C
-                self.status = "interrupted"
+                with self._ending(), assembled(self.checked, threads=self.job.threads) as master:
+                    self._slaves = master.slaves
+                    with self._ending():
+                        self._simulate(master, begin)
+                    complete()
+                    return
             except BaseException as error:  # initial values that do not settle
                 if self.job.directory is not None:
                     record_file.abandon(self.job.directory, error)
                 raise
+        complete()
+
+    @contextmanager
+    def _ending(self) -> Iterator[None]:
+        """Make a status of what ends a run."""
+        try:
+            yield
+        except StoppedError as error:
+            self.status, self.error = "terminated", error
+        except RunError as error:
+            self.status, self.error = "failed", error
+        except KeyboardInterrupt:  # a second Ctrl-C
+            self.status = "interrupted"
 
     def _simulate(self, master: Master, begin: float) -> None:
         try:
             self._begin(master)
             self.seconds["setup"] = clock.perf_counter() - begin
-            try:
-                self.status = "completed" if self._step(master) else "interrupted"
-                master.terminate()
-            finally:
-                self.coupling = master.report()
+            self.status = "completed" if self._step(master) else "interrupted"
         finally:
             if self._recorder is not None:
                 self._recorder.close()
+            self.coupling = master.report()
+        master.terminate()
+
+    def disturbances(self) -> list[str]:
+        """What FMUs have done to the process, a sentence each."""
+        return [
+            f"{name} ({slave.interface.model}) {'; '.join(slave.disturbed)}; isolate it to keep that to itself"
+            for name, slave in self._slaves.items()
+            if slave.disturbed
+        ]
 
     def _begin(self, master: Master) -> None:
         """Bring instances to their initial state, or that of the checkpoint, and the rows up to there."""

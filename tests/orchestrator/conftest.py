@@ -21,6 +21,24 @@ _WRAPPER = next(
     (Path(pythonfmu.__file__).parent / "resources" / "binaries" / fmpy.platform).glob("*pythonfmu-export.*")
 )
 
+_HEADERS = Path(fmpy.__file__).parent / "c-code"
+_PLACES = ("ON_INSTANTIATE", "ON_RESET", "ON_GET", "ON_STEP", "ON_RESTORE", "ON_FREE")
+_LAG = """<?xml version="1.0" encoding="UTF-8"?>
+<fmiModelDescription fmiVersion="2.0" modelName="Lag" guid="{1}" generationTool="a test">
+  <CoSimulation modelIdentifier="Lag" canGetAndSetFMUstate="true"/>
+  <ModelVariables>
+    <ScalarVariable name="y" valueReference="0" causality="output"><Real/></ScalarVariable>
+    <ScalarVariable name="u" valueReference="1" causality="input"><Real start="0"/></ScalarVariable>
+    <ScalarVariable name="k" valueReference="2" causality="parameter" variability="fixed">
+      <Real start="1"/>
+    </ScalarVariable>
+  </ModelVariables>
+  <ModelStructure>
+    <Outputs><Unknown index="1"/></Outputs><InitialUnknowns><Unknown index="1"/></InitialUnknowns>
+  </ModelStructure>
+</fmiModelDescription>
+"""
+
 _SLAVE = '''import math
 
 globals().setdefault("_references", []).append(globals())  # pythonfmu drops one it does not own
@@ -214,6 +232,29 @@ def by_hand(compile_c, tmp_path):
         return write_archive(tmp_path / (name or f"{identifier.lower()}.fmu"), files)
 
     return pack
+
+
+@pytest.fixture(scope="session")
+def lag_description():
+    """The description of the FMU of `lag`."""
+    return _LAG
+
+
+@pytest.fixture
+def lag(compile_c, tmp_path):
+    """A small FMU in C, with code of choice put in at some places: dy/dt = k + u - y, Euler."""
+
+    def make(description=_LAG, library="Lag", platform=fmpy.platform, name="lag.fmu", options=(), **code):
+        defined = [f"-D{place}={code.get(place.lower(), '')}" for place in _PLACES]
+        defined += [f"-D{name.upper()}={text}" for name, text in code.items() if name.upper() not in _PLACES]
+        binary = compile_c("lag.c", f"-I{_HEADERS}", *defined, *options)
+        path = tmp_path / name
+        with zipfile.ZipFile(path, "w") as archive:
+            archive.writestr("modelDescription.xml", description)
+            archive.writestr(f"binaries/{platform}/{library}{fmpy.sharedLibraryExtension}", binary)
+        return path
+
+    return make
 
 
 @pytest.fixture

@@ -126,7 +126,7 @@ def _show_head(out: Console, outcome: Run) -> None:
     if text := system.provenance.description:
         before = "before the changes: " if system.provenance.modified else ""
         say(out, before + text, "yellow" if "WARNING" in text else "")
-    show_notes(out, outcome.checked.notes)
+    show_notes(out, [*outcome.checked.notes, *outcome.notes])
 
 
 def _kinds(outcome: Run) -> str:

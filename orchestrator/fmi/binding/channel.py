@@ -8,6 +8,7 @@ from typing import Any, ClassVar, Protocol
 from ...errors import FmuError
 from ..interface import Interface, Type
 from ..slave import Channel
+from .surroundings import ONE, SMALL, TINY
 
 
 class Owner(Protocol):
@@ -31,6 +32,9 @@ class Owner(Protocol):
 
     def check(self, call: str, status: int) -> None:
         """Raise unless the status of a call is ok or warning."""
+
+    def mend(self) -> None:
+        """Put the floating-point environment back, which it has changed."""
 
 
 class FmuChannel:
@@ -64,6 +68,8 @@ class FmuChannel:
             self._check_limits(values, *self._limits)
         self._values[:] = [v.encode() for v in values] if self._text else values
         status = (self._set or self._slave.function(self.calls[0]))(*self._arguments)
+        if ONE + SMALL != ONE or ONE - SMALL != ONE or TINY * ONE == 0.0:
+            self._slave.mend()
         if status:
             self._slave.check(self.calls[0], status)
 
@@ -77,6 +83,8 @@ class FmuChannel:
     def get(self) -> list[Any]:
         """Read all of them."""
         status = (self._get or self._slave.function(self.calls[1]))(*self._arguments)
+        if ONE + SMALL != ONE or ONE - SMALL != ONE or TINY * ONE == 0.0:
+            self._slave.mend()
         if status:
             self._slave.check(self.calls[1], status)
         if self._text:

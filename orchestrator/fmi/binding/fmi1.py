@@ -14,7 +14,8 @@ from fmpy.logging import addLoggerProxy
 from lxml import etree
 
 from .libraries import Signatures
-from .loaded import DISCARD, LOGGER, OK, WARNING, LoadedSlave
+from .loaded import DISCARD, OK, WARNING, LoadedSlave
+from .messages import LOGGER
 
 _LAST_SUCCESSFUL_TIME = 2
 """What fmiGetRealStatus is asked for."""
@@ -85,7 +86,7 @@ class Fmi1Slave(LoadedSlave):
         done after fmiInitializeSlave and before the first step. That call therefore stands where the mode begins:
         start values have been set, and what connected instances give each other can be exchanged until it settles.
         """
-        self.call("fmiInitializeSlave", self._span[0], *self._end())
+        self.call_once("fmiInitializeSlave", self._span[0], *self._end())
 
     def exit_initialization(self) -> None:
         """Nothing is left to be done."""

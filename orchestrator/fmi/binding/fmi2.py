@@ -14,7 +14,8 @@ from fmpy.logging import addLoggerProxy
 
 from .channel import FmuChannel
 from .libraries import Signatures
-from .loaded import DISCARD, LOGGER, OK, WARNING, LoadedSlave
+from .loaded import DISCARD, OK, WARNING, LoadedSlave
+from .messages import LOGGER
 
 __all__ = ["FmuChannel", "FmuSlave"]
 
@@ -89,14 +90,14 @@ class FmuSlave(LoadedSlave):
 
     def enter_initialization(self) -> None:
         """Enter initialization mode."""
-        self.call("fmi2EnterInitializationMode")
+        self.call_once("fmi2EnterInitializationMode")
 
     def exit_initialization(self) -> None:
         """Leave initialization mode."""
-        self.call("fmi2ExitInitializationMode")
+        self.call_once("fmi2ExitInitializationMode")
 
     def _announce(self) -> None:
-        self.call("fmi2SetupExperiment", 0, 0.0, self._span[0], *self._end())
+        self.call_once("fmi2SetupExperiment", 0, 0.0, self._span[0], *self._end())
 
     def _attempt(self, time: float, part: float, final: bool, *, again: bool) -> int:
         return int(self._do_step(self.pointer, time, part, final))

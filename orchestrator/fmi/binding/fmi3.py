@@ -14,7 +14,8 @@ from fmpy import fmi3
 
 from .arrays import whole_arrays
 from .libraries import Signatures
-from .loaded import DISCARD, OK, WARNING, LoadedSlave, keep_message
+from .loaded import DISCARD, OK, WARNING, LoadedSlave
+from .messages import keep_message
 
 _MOST_UPDATES = 1000
 """Updates of discrete states at one event, after which they count as never settling."""
@@ -107,11 +108,11 @@ class Fmi3Slave(LoadedSlave):
 
     def enter_initialization(self) -> None:
         """Enter initialization mode."""
-        self.call("fmi3EnterInitializationMode", False, 0.0, self._span[0], *self._end())
+        self.call_once("fmi3EnterInitializationMode", False, 0.0, self._span[0], *self._end())
 
     def exit_initialization(self) -> None:
         """Leave initialization mode, and the event mode it leads to: the first step may follow."""
-        self.call("fmi3ExitInitializationMode")
+        self.call_once("fmi3ExitInitializationMode")
         if self._events:
             self._leave_events()
 

@@ -5,7 +5,10 @@ from __future__ import annotations
 import ctypes
 import os
 import sys
+import threading
+import time
 from collections.abc import Mapping
+from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
@@ -27,6 +30,7 @@ class Library:
     """
 
     def __init__(self, path: Path, signatures: Signatures, prefix: str) -> None:
+        self._before = threads()
         here = os.getcwd()
         os.chdir(path.parent)  # where some libraries look for others
         try:
@@ -49,9 +53,41 @@ class Library:
         function.restype, *function.argtypes = types
         return function
 
-    def unload(self) -> None:
-        """Take it out of memory: no function may be called any more."""
+    def own(self, started: set[int]) -> None:
+        """Threads that it has started, and no other library."""
+        _OWNERS.update(dict.fromkeys(started, self.path))
+
+    def _left(self) -> set[int]:
+        """Threads that are there since it was loaded, and that no other library has started as far as is known."""
+        return {each for each in threads() - self._before if _OWNERS.get(each, self.path) == self.path}
+
+    def unload(self) -> bool:
+        """Take it out of memory: no function may be called any more. False where it has to stay.
+
+        Threads that it has started (of OpenMP, say) would go on in what is no longer there.
+        """
+        patience = _PATIENCE
+        while self._left():
+            if patience <= 0.0:
+                return False
+            time.sleep(_LOOK)
+            patience -= _LOOK
         fmpy.freeLibrary(self._dll._handle)
+        return True
+
+
+_OWNERS: dict[int, Path] = {}
+"""By thread, the library that has started it; where that is known."""
+_PATIENCE, _LOOK = 0.05, 0.005
+"""How long threads that are about to end are waited for, and how often they are looked for, in s."""
+
+
+def threads() -> set[int]:
+    """The threads of this process that Python has not started; none where the system does not list them."""
+    with suppress(OSError):
+        ours = {thread.native_id for thread in threading.enumerate()}
+        return {int(each) for each in os.listdir("/proc/self/task")} - ours
+    return set()
 
 
 _LIBRARIES: dict[Path, Library] = {}
@@ -75,12 +111,13 @@ def open_library(path: Path, signatures: Signatures, prefix: str = "") -> Librar
     return _LIBRARIES[path]
 
 
-def close_library(it: Library) -> None:
-    """Give a library back; the last to do so unloads it."""
+def close_library(it: Library) -> bool:
+    """Give a library back; the last to do so unloads it. False where it has to stay loaded for the threads it left."""
     it.users -= 1
-    if not it.users:
-        del _LIBRARIES[it.path]
-        it.unload()
+    if it.users:
+        return True
+    del _LIBRARIES[it.path]
+    return it.unload()
 
 
 def address(function: Any) -> int:

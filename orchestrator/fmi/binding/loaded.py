@@ -11,19 +11,19 @@ import os
 import struct
 from abc import ABC, abstractmethod
 from collections import deque
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Any, ClassVar
 
-from fmpy import fmi2
-from fmpy.fmi1 import printLogMessage
-
-from ...errors import FmuError, StoppedError, cut
+from ...errors import FmuError, StoppedError
 from ..interface import Interface, Type
 from ..slave import STATUS, Channel
 from .arrays import prepared
 from .channel import MixedChannel, NegatedChannel
-from .libraries import Signatures, close_library, library, open_library
+from .libraries import Signatures, close_library, library, open_library, threads
+from .messages import LOGS, without_head
+from .surroundings import FLOATS, ONE, SMALL, TINY, are_floats_disturbed, kept, mend_floats
 
 OK, WARNING, DISCARD, FATAL, PENDING = 0, 1, 2, 4, 5
 _SHORTEST_PART = 1e-6
@@ -34,31 +34,6 @@ _NO_INSTANCE = ", and says nothing; the library may belong to another modelDescr
 _TIME = struct.Struct("=d")
 STATE_HEAD = _TIME.size
 """Bytes of ours before the FMU's own in a serialized state: the time."""
-
-_LOGS: dict[int | bytes, deque[str]] = {}
-"""What living FMUs said, by the keys that each may hand back with its messages."""
-
-
-def keep_message(keys: Sequence[int | bytes | None], status: int, message: bytes | None) -> bool:
-    """Put a message into the log of the first key that is known; False if none is."""
-    for key in keys:
-        log = None if key is None else _LOGS.get(key)
-        if log is not None:
-            label = STATUS[status] if 0 <= status < len(STATUS) else str(status)
-            lines = (message or b"").decode(errors="replace").splitlines()
-            log.extend(cut(f"[{label}] {line}") for line in lines)
-            return True
-    return False
-
-
-def _log(environment: int | None, instance: bytes | None, status: int, category: bytes, message: bytes) -> None:
-    if not keep_message((environment, instance), status, message):  # an FMU that FMPy runs beside us
-        printLogMessage(environment, instance, status, category, message)  # type: ignore[arg-type]
-
-
-LOGGER = fmi2.fmi2CallbackLoggerTYPE(_log)
-"""One for all FMUs of FMI 1.0 and 2.0: FMPy's proxy, which fills a message's arguments in, knows only the logger it was
-given last. They pass the same arguments, but for the first: the environment in 2.0, the instance's address in 1.0."""
 
 
 class LoadedSlave(ABC):
@@ -105,20 +80,22 @@ class LoadedSlave(ABC):
         self._keys: list[int | bytes] = []
         self._given: dict[str, Any] = {}
         self._library = None
+        self.disturbed: dict[str, None] = {}
         self.hear_as(id(self), name.encode())
         # pythonfmu passes even its errors on only while debug logging is on; others then flood us with details.
         self._talks = interface.annotation is not None or "pythonfmu" in interface.generator.lower()
         prefix = f"{interface.identifier}_" if self.PREFIXED else ""
         try:
-            self._library = open_library(library(folder, interface, interface.model), self.SIGNATURES, prefix)
-            self.functions, self._addresses = self._library.functions, self._library.addresses
-            self.pointer = self._instantiate(folder) or self._ask_why(folder)
+            with self._carefully():
+                self._library = open_library(library(folder, interface, interface.model), self.SIGNATURES, prefix)
+                self.functions, self._addresses = self._library.functions, self._library.addresses
+                self.pointer = self._instantiate(folder) or self._ask_why(folder)
             if not self.pointer:
                 raise RuntimeError("it gives no instance" + ("" if self.log else _NO_INSTANCE))
             self._do_step = self.function(self.DO_STEP)
         except Exception as error:
             self._release()
-            what = _without_head(error).replace(f"{folder}{os.sep}", "")
+            what = without_head(error).replace(f"{folder}{os.sep}", "")
             raise FmuError(f"cannot be instantiated: {what}", instance=name, log=self.log) from error
 
     def _ask_why(self, folder: Path) -> int:
@@ -135,7 +112,7 @@ class LoadedSlave(ABC):
     def hear_as(self, *keys: int | bytes) -> None:
         """Messages that come with one of these keys are this instance's."""
         self._keys += keys
-        _LOGS.update(dict.fromkeys(keys, self.log))
+        LOGS.update(dict.fromkeys(keys, self.log))
 
     def function(self, name: str) -> Any:
         """A function of the library.
@@ -155,8 +132,33 @@ class LoadedSlave(ABC):
     def call(self, name: str, *arguments: Any) -> None:
         """Make a call that has to succeed."""
         status = self.function(name)(self.pointer, *arguments)
+        if ONE + SMALL != ONE or ONE - SMALL != ONE or TINY * ONE == 0.0:
+            self.mend()
         if status:
             self.check(name, status)
+
+    def call_once(self, name: str, *arguments: Any) -> None:
+        """Make a call of those that an instance gets once in a run: time enough to look at all that it may change."""
+        with self._carefully():
+            self.call(name, *arguments)
+
+    @contextmanager
+    def _carefully(self) -> Iterator[None]:
+        """Put back what the instance changes meanwhile, and note which threads it starts."""
+        before = threads()
+        with kept(self.tell):
+            yield
+        if self._library is not None:
+            self._library.own(threads() - before)
+
+    def tell(self, what: str) -> None:
+        """Note what it has changed of what all share."""
+        self.disturbed[f"changed {what}, put back since"] = None
+
+    def mend(self) -> None:
+        """Put the floating-point environment back, which it has changed, and note that."""
+        mend_floats()
+        self.tell(FLOATS)
 
     def check(self, call: str, status: int) -> None:
         """Raise unless the status of a call is ok or warning."""
@@ -233,6 +235,8 @@ class LoadedSlave(ABC):
         """Advance from ``time`` by ``length``, both in s; not ``final`` where an older state may be restored."""
         self.time = time
         status = self._attempt(time, length, final, again=False)
+        if ONE + SMALL != ONE or ONE - SMALL != ONE or TINY * ONE == 0.0:
+            self.mend()
         if status or self._is_cut_short():
             self.resume(time, length, status, final)
         self.time = time + length
@@ -265,6 +269,8 @@ class LoadedSlave(ABC):
             if part < shortest or not self.interface.variable_step:
                 break
             status = self._attempt(time, part, final, again=not on)
+            if are_floats_disturbed():
+                self.mend()
         if status in (OK, WARNING, DISCARD):
             raise self._failure(f"discarded the step{self._why(reached, part)}", DISCARD)
         self.check(self.DO_STEP, status)
@@ -370,7 +376,7 @@ class LoadedSlave(ABC):
 
     def terminate(self) -> None:
         """End the run."""
-        self.call(self.TERMINATE)
+        self.call_once(self.TERMINATE)
 
     def free(self) -> None:
         """Give the instance and its library back; after a fatal status neither, as FMI 2.0 (2.1.3) has it.
@@ -378,19 +384,16 @@ class LoadedSlave(ABC):
         An FMU made with pythonfmu 0.7 has dropped its Python objects by then, and drops them again when freed: the
         process would crash.
         """
-        if not self._dead and self._library is not None:
-            self.function(self.FREE)(self.pointer)
-        self._release()
+        with kept(self.tell):
+            if not self._dead and self._library is not None:
+                self.function(self.FREE)(self.pointer)
+            self._release()
 
     def _release(self) -> None:
         if not self._dead and self._library is not None:
-            close_library(self._library)
+            if not close_library(self._library):
+                self.disturbed["left threads behind: its library stays loaded"] = None
             self._library = None
         for key in self._keys:
-            if _LOGS.get(key) is self.log:
-                del _LOGS[key]
-
-
-def _without_head(error: Exception) -> str:
-    """What went wrong; of an error of ours without instance and time, which are said once."""
-    return Exception.__str__(error) if isinstance(error, FmuError) else str(error)
+            if LOGS.get(key) is self.log:
+                del LOGS[key]

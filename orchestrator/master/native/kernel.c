@@ -98,6 +98,7 @@ static int resolve(const Plan *plan, const Py_buffer *buffers, const Operation *
     group->period = operation->period;
     group->phase = operation->phase;
     group->rank = operation->rank;
+    group->is_watched = operation->is_watched;
     *call = (Call){0};
     if (operation->period < 1 || operation->phase < 0 || operation->phase >= operation->period) {
         return 0;
@@ -266,6 +267,8 @@ static int take(Plan *plan, const Block *block, Outcome *outcome)
     if (hands == NULL) {
         return 0;
     }
+    plan->control = float_control();
+    fegetenv(&plan->floats);
     Py_BEGIN_ALLOW_THREADS
 #if HAS_THREADS
     if (plan->thread_count > 1) {
@@ -283,11 +286,12 @@ static int take(Plan *plan, const Block *block, Outcome *outcome)
 
 PyDoc_STRVAR(run_doc,
     "run(operations, parts, channels, instances, entries, references, changes, values, history, newest, rows, every,\n"
-    "    start, step, first, count, last, begin) -> (done, written, failed, status, newest)\n\n"
+    "    start, step, first, count, last, begin) -> (done, written, failed, status, newest, disturber)\n\n"
     "Take up to `count` communication steps from number `first`, and from operation `begin` of that step, which one\n"
     "that failed may have left undone. Rows (time, values) are written for every `every`-th\n"
     "step and for step number `last`; the block ends before a row for which there is no room. `failed` is the operation\n"
-    "that ended the block, -1 if none did, and `status` its FMI status; of ok or warning, a value is not finite.");
+    "that ended the block, -1 if none did, and `status` its FMI status; of ok or warning, a value is not finite. `disturber` is an\n"
+    "operation after which numbers were rounded in another way, which was put back, or -1.");
 
 static PyObject *run(PyObject *module, PyObject *arguments)
 {
@@ -313,8 +317,8 @@ static PyObject *run(PyObject *module, PyObject *arguments)
             block.rows = b[ROWS].buf;
             block.capacity = length(b, ROWS) / (plan.value_count + 1);
             if (take(&plan, &block, &outcome)) {
-                result = Py_BuildValue("(LnLin)", outcome.done, (Py_ssize_t)outcome.written, (long long)outcome.failed,
-                                       outcome.status, (Py_ssize_t)plan.newest);
+                result = Py_BuildValue("(LnLinL)", outcome.done, (Py_ssize_t)outcome.written, (long long)outcome.failed,
+                                       outcome.status, (Py_ssize_t)plan.newest, (long long)outcome.disturber);
             }
         }
     }

@@ -9,8 +9,12 @@
 #define HAS_THREADS 1
 #endif
 
+#include <fenv.h>
 #include <stddef.h>
 #include <stdint.h>
+#if defined(__SSE2__) || defined(_M_X64)
+#include <xmmintrin.h>
+#endif
 
 enum { OPERATION_SET = 0, OPERATION_STEP = 1, OPERATION_GET = 2, OPERATION_CHANGE = 3 };
 
@@ -54,7 +58,7 @@ typedef struct {
     int32_t period; /* it is due in every so manyth step, */
     int32_t phase;  /* in those with this rest */
     int32_t rank;   /* where it would stand if all were done one after the other */
-    int32_t unused;
+    int32_t is_watched; /* whether it may change how numbers are rounded */
 } Operation;
 
 /* ------------------------------------------------------------------------------------------------ the plan, as it runs */
@@ -78,6 +82,7 @@ typedef struct {
     int32_t period;
     int32_t phase;
     int32_t rank; /* of the first call; they follow each other */
+    int32_t is_watched;
     Call *begin;
     Call *end;
 } Group;
@@ -95,6 +100,8 @@ typedef struct {
     size_t depth;
     size_t newest; /* the ring's newest row */
     const Change *changes;
+    unsigned control; /* how numbers are rounded when the block begins, as `float_control` has it, */
+    fenv_t floats;    /* and all that belongs to it */
 } Plan;
 
 /* A thread with room for the values of the largest channel. */
@@ -113,6 +120,7 @@ typedef struct {
     int64_t failed; /* operation, or -1 */
     int32_t rank;   /* of the one that failed */
     int status;
+    int64_t disturber; /* operation after which numbers were rounded in another way, or -1 */
 } Advance;
 
 /* Which steps to take, and where their rows go. */
@@ -134,10 +142,24 @@ typedef struct {
     size_t written;
     int64_t failed;
     int status;
+    int64_t disturber; /* the last operation after which numbers were rounded in another way, or -1 */
     long long wait; /* steps to the next row that is due; counted, because to divide takes as long as a light FMU's step */
 } Outcome;
 
 
+/* How this thread rounds, and whether it takes subnormal numbers for zero: in a register that costs nothing to read. */
+static inline unsigned float_control(void)
+{
+#if defined(__SSE2__) || defined(_M_X64)
+    return _mm_getcsr() & ~0x3fU; /* without the flags of what has happened */
+#elif defined(__aarch64__) && defined(__GNUC__)
+    uint64_t control;
+    __asm__ volatile("mrs %0, fpcr" : "=r"(control));
+    return (unsigned)control;
+#else
+    return (unsigned)fegetround();
+#endif
+}
 
 /* Hidden, so that nothing of a name like one of theirs elsewhere in the process can stand in their place. */
 #ifdef __GNUC__

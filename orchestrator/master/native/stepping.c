@@ -179,6 +179,10 @@ void take_part(const Hand *hand, int part, size_t from, Advance *it)
             taken = &rest;
         }
         const Call *call = take_group(hand, taken, it->time, it->step, &it->status);
+        if (group->is_watched && float_control() != plan->control) { /* an FMU must not change the numbers of others */
+            fesetenv(&plan->floats);
+            it->disturber = group->begin - plan->calls;
+        }
         if (call < group->end) {
             it->failed = call - plan->calls;
             it->rank = group->rank + (int32_t)(call - group->begin);
@@ -197,7 +201,7 @@ static void remember(Plan *plan)
 
 Outcome outcome_of(const Block *block)
 {
-    return (Outcome){.failed = -1, .wait = block->every - block->first % block->every};
+    return (Outcome){.failed = -1, .disturber = -1, .wait = block->every - block->first % block->every};
 }
 
 int has_next(const Block *block, const Outcome *outcome, Advance *it)
@@ -212,6 +216,7 @@ int has_next(const Block *block, const Outcome *outcome, Advance *it)
     it->step = block->step;
     it->is_due = is_due;
     it->failed = -1;
+    it->disturber = -1;
     return 1;
 }
 
@@ -234,6 +239,7 @@ Outcome take_block(Plan *plan, const Hand *hand, const Block *block)
     Advance it;
     while (has_next(block, &outcome, &it)) {
         take_part(hand, 0, outcome.done == 0 ? block->from : 0, &it);
+        outcome.disturber = it.disturber < 0 ? outcome.disturber : it.disturber;
         if (it.failed >= 0) {
             outcome.failed = it.failed;
             outcome.status = it.status;

@@ -55,6 +55,7 @@ static int all_succeeded(Team *team)
     const Advance *worst = NULL;
     for (int n = 0; n < team->count; n++) {
         const Advance *it = &team->steps[n];
+        team->outcome.disturber = it->disturber < 0 ? team->outcome.disturber : it->disturber;
         if (it->failed >= 0 && (worst == NULL || it->rank < worst->rank)) {
             worst = it;
         }

@@ -1,6 +1,6 @@
 /* A small FMU of FMPy's headers, dy/dt = k + u - y by Euler's method, that insists on the order of calls. By value
-   reference: 0 y (output), 1 u (input), 2 k (parameter). What ON_INSTANTIATE, ON_RESET, ON_GET, ON_STEP and ON_RESTORE are
-   defined as is done there; with -DSHARED_STATE=1 all instances have one state. */
+   reference: 0 y (output), 1 u (input), 2 k (parameter). What ON_INSTANTIATE, ON_RESET, ON_GET, ON_STEP, ON_RESTORE and
+   ON_FREE are defined as is done there, BEFORE stands before all; with -DSHARED_STATE=1 all instances have one state. */
 
 #include <stdlib.h>
 #include <string.h>
@@ -10,6 +10,9 @@ typedef struct { double t, y, u, k; int phase; fmi2CallbackLogger log; } Model;
 #define SHARED_STATE 0
 #endif
 static double shared;
+#ifdef BEFORE
+BEFORE
+#endif
 #define M ((Model *)c)
 #define Y (*(SHARED_STATE ? &shared : &M->y))
 const char *fmi2GetTypesPlatform(void) { return "default"; }
@@ -24,7 +27,7 @@ fmi2Component fmi2Instantiate(fmi2String name, fmi2Type type, fmi2String guid, f
     c->log = functions->logger;
     return c;
 }
-void fmi2FreeInstance(fmi2Component c) { free(c); }
+void fmi2FreeInstance(fmi2Component c) { ON_FREE free(c); }
 fmi2Status fmi2SetupExperiment(fmi2Component c, fmi2Boolean a, fmi2Real b, fmi2Real start, fmi2Boolean d, fmi2Real e)
 { M->t = start; Y = 0.0; return fmi2OK; }
 static fmi2Status go(fmi2Component c, int from) { if (M->phase != from) return fmi2Error; M->phase++; return fmi2OK; }

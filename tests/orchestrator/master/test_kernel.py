@@ -49,9 +49,9 @@ def call(arguments, **changed):
 
 
 def test_a_sound_plan(arguments):
-    assert call(arguments) == (4, 4, -1, 0, 1)
+    assert call(arguments) == (4, 4, -1, 0, 1, -1)
     assert list(arguments["rows"][:4, 0]) == [0.25, 0.5, 0.75, 1.0]
-    assert call(arguments, count=0) == (0, 0, -1, 0, 1)
+    assert call(arguments, count=0) == (0, 0, -1, 0, 1, -1)
 
 
 def test_a_block_ends_where_there_is_no_room_for_a_row(arguments):

@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 from railcosim.orchestrator.errors import FmuError, ScenarioError, StoppedError
 from railcosim.orchestrator.fmi.binding import libraries as module
-from railcosim.orchestrator.fmi.binding import loaded
+from railcosim.orchestrator.fmi.binding import messages
 from railcosim.orchestrator.fmi.binding.fmi2 import FmuSlave
 from railcosim.orchestrator.fmi.binding.libraries import forget_paths
 from railcosim.orchestrator.fmi.models import load_fmu, load_models
@@ -256,9 +256,9 @@ def test_a_library_that_does_not_load(workspace, foreign, xml, tmp_path):
 
 def test_a_long_line_of_a_log_is_cut_and_the_rest_is_counted():
     log = deque()
-    loaded._LOGS[b"a"] = log
+    messages.LOGS[b"a"] = log
     try:
-        assert loaded.keep_message([b"a"], 3, b"x" * 1000 + b"\nshort")
+        assert messages.keep_message([b"a"], 3, b"x" * 1000 + b"\nshort")
     finally:
-        del loaded._LOGS[b"a"]
+        del messages.LOGS[b"a"]
     assert list(log) == ["[error] " + "x" * 492 + "... (508 more characters)", "[error] short"]
