@@ -29,6 +29,8 @@ from .references import read_arguments, resolve
 from .toolchain import CompilerError
 
 _LOG = logging.getLogger(__name__)
+_PROGRAMS = (b"\x7fELF", b"#!")
+"""How programs begin: in the resources of an FMU they may be run."""
 _EPOCH = (1980, 1, 1, 0, 0, 0)
 """The earliest time a zip can hold: archives of equal content are equal files."""
 
@@ -218,7 +220,8 @@ def _archive(contents: Mapping[str, bytes]) -> bytes:
             entry = zipfile.ZipInfo(path, _EPOCH)
             entry.create_system = 3  # what Unix writes, everywhere
             entry.compress_type = zipfile.ZIP_DEFLATED
-            entry.external_attr = 0o644 << 16
+            is_program = path.startswith("resources/") and contents[path].startswith(_PROGRAMS)
+            entry.external_attr = (0o755 if is_program else 0o644) << 16
             fmu.writestr(entry, contents[path])
     return stream.getvalue()
 

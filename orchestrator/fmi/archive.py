@@ -128,6 +128,7 @@ def _extract(path: Path, target: Path) -> tuple[str, ...]:
             members = list_members(path, archive)
             extract(archive, members, target)
     except FmuFileError:
+        shutil.rmtree(target, ignore_errors=True)
         raise
     except Exception as error:  # damaged, encrypted, unwritable (a file where a folder stands): all kinds are raised
         shutil.rmtree(target, ignore_errors=True)

@@ -33,6 +33,8 @@ _METHODS = (zipfile.ZIP_STORED, zipfile.ZIP_DEFLATED)
 _OTHER_METHODS = {zipfile.ZIP_BZIP2: "bzip2", zipfile.ZIP_LZMA: "lzma"}
 """What FMI allows. Of others `zipfile` unpacks whole blocks in memory, whatever size an entry says it has."""
 _DESCRIPTION = "modelDescription.xml"
+_POINTER = b"version https://git-lfs"
+_HEAD = len(_POINTER)
 _PROGRAMS = (b"\x7fELF", b"#!")
 """How programs begin. An archive made on Windows doesn't say which of its files may be run."""
 
@@ -91,10 +93,13 @@ def extract(archive: zipfile.ZipFile, members: Members, target: Path) -> None:
         place.parent.mkdir(parents=True, exist_ok=True)
         with archive.open(entry) as source, place.open("xb") as copy:
             shutil.copyfileobj(source, copy)
-        mode = entry.external_attr >> 16
         with place.open("rb") as stream:
-            is_program = bool(mode & 0o111) or (not mode and stream.read(4).startswith(_PROGRAMS))
-        if is_program:
+            head = stream.read(_HEAD)
+        if head.startswith(_POINTER):
+            what = f"holds a Git LFS pointer in place of {name!r}; fetch that with 'git lfs pull' and pack it again"
+            raise FmuFileError(f"{archive.filename} {what}")
+        mode = entry.external_attr >> 16
+        if mode & 0o111 or (not mode and head.startswith(_PROGRAMS)):
             place.chmod(0o755)
 
 

@@ -81,8 +81,9 @@ def pack(system: System, path: Path, *, expose: Sequence[str] = (), platforms: S
         problems += _refused(system, checked, platforms)
         if problems:
             raise ScenarioError(list(dict.fromkeys(problems)))
-        files = {name: _file(system, name, model, platforms) for name, model in checked.models.items()}
         with tempfile.TemporaryDirectory(dir=workspace.folder) as folder:
+            given = Path(folder) / "given"
+            files = {name: _file(system, name, model, platforms, given) for name, model in checked.models.items()}
             archive, references = _container(system, checked, exposed, files, Path(folder))
     archive["documentation/index.html"] = page(system, checked, exposed).encode()
     archive["documentation/licenses/fmu_manipulation_toolbox.txt"] = _license()
@@ -164,13 +165,22 @@ def _refused_link(link: Link) -> Iterator[Problem]:
 # -------------------------------------------------------------------- the container
 
 
-def _file(system: System, name: str, model: Model, platforms: Sequence[str]) -> Path:
-    """The FMU of an instance: of a component, with a binary for every platform asked for."""
+def _file(system: System, name: str, model: Model, platforms: Sequence[str], given: Path) -> Path:
+    """The FMU of an instance: of a component, with a binary for every platform asked for.
+
+    One that was given is archived anew: the toolbox does not put right what was put right when it was unpacked.
+    """
     instance = system.instances[name]
-    if platforms and not is_fmu_name(instance.model):
+    if not is_fmu_name(instance.model):
+        assert model.path is not None  # only plain components have none
+        if not platforms:
+            return model.path
         return build(instance.model, instance.build, kind="native", platforms=tuple(platforms))
-    assert model.path is not None  # only plain components have none
-    return model.path
+    anew = given / model.digest / f"{Path(instance.model).stem}.fmu"
+    if not anew.exists():
+        found = (path for path in model.folder.rglob("*") if path.is_file())
+        write_archive({path.relative_to(model.folder).as_posix(): path.read_bytes() for path in found}, anew)
+    return anew
 
 
 def _container(

@@ -235,3 +235,9 @@ def test_a_password(refused, tmp_path, xml):
     content[content.index(b"PK\x01\x02") + 8] |= 1
     path.write_bytes(content)
     assert "'modelDescription.xml' is encrypted; pack it without a password" in refused(path)
+
+
+def test_a_pointer_in_place_of_a_library(refused, tmp_path, xml):
+    pointer = "version https://git-lfs.github.com/spec/v1\noid sha256:4d7a\nsize 12345\n"
+    path = xml["write_archive"](tmp_path / "a.fmu", DESCRIPTION | {"binaries/linux64/a.so": pointer})
+    assert "holds a Git LFS pointer in place of 'binaries/linux64/a.so'; fetch that" in refused(path)

@@ -256,6 +256,23 @@ def test_python_fmus_are_refused(tmp_path):
         pack(system, tmp_path / "one.fmu")
 
 
+def test_what_was_put_right_in_a_given_fmu_is_right_in_the_packed_one(tmp_path):
+    """Paths with backslashes, and a helper that may be run, from a file that ends in capitals."""
+    path = tmp_path / "Their Train.FMU"
+    with zipfile.ZipFile(build("PointMassTrain", kind="native")) as ours, zipfile.ZipFile(path, "w") as theirs:
+        for name in ours.namelist():
+            theirs.writestr(name.replace("/", "\\"), ours.read(name))
+        theirs.writestr("resources\\help.sh", "#!/bin/sh\n")
+    system = System(stop_time=0.2, step=0.1)
+    system.add("train", str(path), force=0.0)
+    packed = pack(system, tmp_path / "one.FMU")
+    assert packed.platforms == (fmpy.platform,)
+    with zipfile.ZipFile(packed.path) as made:
+        (helper,) = (entry for entry in made.infolist() if entry.filename.endswith("/help.sh"))
+    assert helper.external_attr >> 16 == 0o755
+    simulate(packed.path, system)
+
+
 def test_a_platform_without_a_runtime_is_refused(tmp_path):
     with pytest.raises(ScenarioError, match="no container runtime for aarch64-linux"):
         pack(train(), tmp_path / "one.fmu", platforms=["aarch64-linux"])
