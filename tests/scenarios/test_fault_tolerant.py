@@ -27,12 +27,12 @@ def nominal():
     return run(load("fault_tolerant_cruise", preset="nominal"), figures=False)
 
 
-def all_well(result):
-    """Every requirement passes and every known value is reproduced."""
+def all_well(result, judged=True):
+    """Every requirement passes and every known value that is judged is reproduced."""
     assert {v.name: (v.verdict, v.margin) for v in result.requirements if v.verdict != "pass"} == {}
     values = [*result.published, *result.references]
     assert {p.metric: (p.measured, p.value) for p in values if p.verdict in BAD} == {}
-    assert any(p.verdict == "reproduced" for p in values)
+    assert any(p.verdict == "reproduced" for p in values) is judged
 
 
 def metric(result, name):
@@ -119,7 +119,7 @@ def test_presets_without_known_values(preset):
 def test_the_baseline_leaves_a_residual(nominal, preset):
     """Its known values; without noise its fault error is more than 1000 times the observer's."""
     result = run(load("fault_tolerant_baseline", preset=preset), figures=False)
-    all_well(result)
+    all_well(result, judged=preset != "noise-pole-10")  # whose one known value is the random numbers'
     if preset.startswith("pole"):
         assert metric(result, "fault_error") > 1000.0 * metric(nominal, "fault_error")
 
