@@ -14,6 +14,7 @@ import shutil
 import subprocess
 import sys
 from pathlib import Path
+from typing import get_args
 
 import pytest
 
@@ -166,6 +167,20 @@ def test_own_controller_keeps_its_promise_of_less_than_forty_lines() -> None:
     lines = [line for content in code for line in content.splitlines() if line.strip() and not line.startswith("# ")]
     assert f"in {len(lines)} lines of code" in page.read_text(encoding="utf-8")
     assert len(lines) < 40
+
+
+def test_the_page_on_components_explains_every_declaration_method_and_key_of_a_line() -> None:
+    from railcosim.components import declarations
+    from railcosim.components.component import Method
+    from railcosim.components.environment.line import SECTIONS
+
+    text = (ROOT / "docs" / "write_a_component.md").read_text(encoding="utf-8")
+    abstract = {"Declaration", "Variable"}
+    kinds = [x for x in vars(declarations).values() if isinstance(x, type) and issubclass(x, declarations.Declaration)]
+    rows = re.findall(r"^\| `(\w+)", text, re.MULTILINE)
+    keys = [column.name for column in SECTIONS.columns]
+    wanted = [*(kind.__name__ for kind in kinds if kind.__name__ not in abstract), *get_args(Method), *keys]
+    assert sorted(rows) == sorted(wanted)
 
 
 @pytest.mark.parametrize("page", PAGES, ids=lambda page: page.name)
