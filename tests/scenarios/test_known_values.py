@@ -4,8 +4,11 @@ A tolerance is what rounding costs, and what was measured of sampling and noise;
 would pass.
 """
 
+import re
 import tomllib
+from collections import Counter
 from decimal import Decimal
+from pathlib import Path
 
 import pytest
 from railcosim.components import ComfortCruise
@@ -15,6 +18,7 @@ from railcosim.orchestrator.evaluation import BAD
 from railcosim.orchestrator.scenario import shipped
 from railcosim.orchestrator.scenario.loading import find
 
+ROOT = Path(__file__).parents[2]
 MOST_SAMPLING, MOST_NOISE = 0.06, 0.13  # of the value
 DIGITS_LOST = 0.001  # energies and forces are printed in kWh and kN: their last digit is not one of the value in SI
 native = pytest.mark.skipif(bool(native_problem(ComfortCruise)), reason="needs native FMUs")
@@ -57,14 +61,21 @@ def test_tolerances_are_rounding_and_what_was_measured():
     assert wrong == []
 
 
-def test_every_origin_is_told_apart():
-    """As many values of each origin as there are; a value that moves from one to another is a claim that changes."""
+def test_every_origin_is_told_and_counted_apart():
+    """The pages say how many there are: a value that moves from one origin to another is a claim that changes."""
+    counts, departs = Counter(), Counter()
     for name, _ in shipped():
         judged = load(name).judged
-        assert all("where" in entry for entry in [*judged.published, *judged.references])
-        assert all("claim" in entry for entry in judged.published), name
-        assert not any("paper" in entry["where"] or "et al." in entry["where"] for entry in judged.references)
-        assert all("integration" not in entry["where"] for entry in judged.published)
+        assert all(entry["where"] and entry["claim"] for entry in judged.published), name
+        assert all("et al." not in entry["where"] and "Hou" not in entry["where"] for entry in judged.references), name
+        for entry in [*judged.published, *judged.references]:
+            origin = entry.get("origin", "reference")
+            counts[origin] += 1
+            departs[origin] += "departs" in entry
+    readme, claims = ((ROOT / page).read_text(encoding="utf-8") for page in ("README.md", "docs/claims.md"))
+    for origin, count in counts.items():
+        assert f"| {origin} | {count} | {departs[origin] or ''}".rstrip() in claims
+        assert re.search(rf"\b{count} (values are |more are )?\*{origin}s?\*", readme), origin
 
 
 @pytest.mark.parametrize("name", [name for name, _ in shipped()])
