@@ -58,6 +58,8 @@ class Connection:
         source: ``"cruise[1].force"``; a whole array by its bare name.
         target: ``"train[1].force"``.
         delay: how many communication points older the value is than it would be without.
+        threshold: by what the value is made one that is no Real: a Boolean is true above it, a whole number rounded up
+            above this fraction.
         scale: 1 where it is not given; one that is given also says that units which do not convert are taken care of.
         optional: whether it stands for nothing where one of its ends has no such variable: an element that a pattern
             may or may not mean.
@@ -70,6 +72,7 @@ class Connection:
     scale: float | None = None
     offset: float = 0.0
     optional: bool = False
+    threshold: float | None = None
     origin: str = field(default="", compare=False)
 
 
@@ -257,10 +260,17 @@ class System:
         return self.instances[name]
 
     def connect(
-        self, source: str, target: str, delay: int = 0, scale: float | None = None, offset: float = 0.0
+        self,
+        source: str,
+        target: str,
+        delay: int = 0,
+        scale: float | None = None,
+        offset: float = 0.0,
+        *,
+        threshold: float | None = None,
     ) -> None:
         """Let an input follow an output; both are written ``"instance.variable"``."""
-        self.connections.append(Connection(source, target, delay, scale, offset))
+        self.connections.append(Connection(source, target, delay, scale, offset, threshold=threshold))
 
 
 _Part = TypeVar("_Part", Stepping, Judged, Provenance)

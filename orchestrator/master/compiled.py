@@ -27,6 +27,8 @@ HAS_KERNEL = kernel is not None
 HAS_THREADS = HAS_KERNEL and bool(kernel.HAS_THREADS)
 _CHANGE = 3
 """The kernel's number for what an event does to values that have been read; the others are `Operation`."""
+_AS_IT_IS, _TRUE_ABOVE, _ROUNDED_UP = 0, 1, 2
+"""The kernel's numbers for what a threshold does."""
 _DISCARD = 2
 _BLOCK_SECONDS = 0.05
 """Wall time a block is meant to take: short enough for Ctrl-C and a progress bar, long enough to cost nothing."""
@@ -37,11 +39,23 @@ _MOST_VALUES = 4_000_000
 
 _CHANNEL = np.dtype([("function", "u8"), ("component", "u8"), ("begin", "i8"), ("count", "i8"), ("is_real", "i8")])
 _INSTANCE = np.dtype([("function", "u8"), ("component", "u8")])
-_ENTRY = np.dtype([("place", "i8"), ("age", "i8"), ("change", "i8"), ("scale", "f8"), ("offset", "f8")])
+_ENTRY = np.dtype(
+    [
+        ("place", "i8"),
+        ("age", "i8"),
+        ("change", "i8"),
+        ("scale", "f8"),
+        ("offset", "f8"),
+        ("whole", "i8"),
+        ("threshold", "f8"),
+    ]
+)
 _CHANGES = np.dtype(
     [("active", "i8"), ("place", "i8"), ("is_real", "i8"), *((n, "f8") for n in ("scale", "offset", "slope", "since"))]
 )
 _OPERATION = np.dtype([(name, "i4") for name in ("kind", "index", "period", "phase", "rank", "is_watched")])
+
+_Entry = tuple[int, int, int, float, float, int, float]
 
 
 class CompiledLoop:
@@ -58,7 +72,7 @@ class CompiledLoop:
         self._coupling = coupling
         self._exchange = coupling.exchange
         self._channels: list[tuple[int, int, int, int, int]] = []
-        self._entries: list[tuple[int, int, int, float, float]] = []
+        self._entries: list[_Entry] = []
         self._references: list[int] = []
         self._operations: list[tuple[int, int, int, int]] = []
         self._culprits: list[tuple[FmuSlave | None, str]] = []
@@ -112,17 +126,19 @@ class CompiledLoop:
             entries = []
             for k, source in enumerate(feed.sources):
                 age, slot = feed.ages[k], feed.changes[k] if feed.changes else None
-                # What is no real number is never scaled.
-                scale, offset = (feed.scales[k], feed.offsets[k]) if feed.is_real else (1.0, 0.0)
+                threshold = feed.thresholds[k]
+                whole = _AS_IT_IS if threshold is None else _TRUE_ABOVE if feed.kind == "Boolean" else _ROUNDED_UP
                 change = -1 if slot is None else self._add_change(slot, -1, feed.is_real)
-                entries.append((source, -1 if age is None else age, change, scale, offset))
+                place = (source, -1 if age is None else age, change)
+                entries.append((*place, feed.scales[k], feed.offsets[k], whole, threshold or 0.0))
             assert isinstance(feed.channel, FmuChannel)
             self._add_channel(Operation.SET, slave, feed.channel, entries, feed.is_real, due=(rate, 0))
 
     def _add_gets(self, slave: FmuSlave, rate: int) -> None:
         for part in self._exchange.yields[slave.name]:
             due = (rate, 0 if part.direct else rate - 1)
-            entries = [(place, -1, -1, 1.0, 0.0) for place in range(part.begin, part.end)]
+            whole = _TRUE_ABOVE if part.kind == "Boolean" else _AS_IT_IS
+            entries = [(place, -1, -1, 1.0, 0.0, whole, 0.0) for place in range(part.begin, part.end)]
             assert isinstance(part.channel, FmuChannel)
             self._add_channel(Operation.GET, slave, part.channel, entries, part.is_real, due=due)
             for place, change in self._exchange.output_changes.items():
@@ -139,7 +155,7 @@ class CompiledLoop:
         kind: int,
         slave: FmuSlave,
         channel: FmuChannel,
-        entries: list[tuple[int, int, int, float, float]],
+        entries: list[_Entry],
         is_real: bool,
         *,
         due: tuple[int, int],
@@ -229,6 +245,9 @@ class CompiledLoop:
         if call == "fmi2DoStep" and status == _DISCARD and self.threads <= 1:
             slave.resume(time, period * step, status, final=True)
             return
+        if call.startswith("fmi2Set") and 0 <= status <= 1:  # a number that C's int does not hold
+            slave.time = time
+            self._exchange.write(slave.name, time)
         slave.time = time + (period - phase) * step if call.startswith("fmi2Get") else time
         slave.check(call, status)
         self._exchange.check_finite(slave)

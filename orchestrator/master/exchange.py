@@ -55,6 +55,7 @@ class Feed:
     plain: bool
     scales: tuple[float, ...]
     offsets: tuple[float, ...]
+    thresholds: tuple[float | None, ...]
     ages: tuple[int | None, ...]
     ages_at_point: tuple[int | None, ...]
     changes: list[Change | None] = field(default_factory=list)
@@ -163,9 +164,10 @@ class Exchange:
                     kind=kind,
                     targets=tuple(link.target[1] for link in links),
                     sources=tuple(self.places[link.source] for link in links),
-                    plain=all((x.scale, x.offset, x.delay) == (1.0, 0.0, 0) for x in links),
+                    plain=all((x.scale, x.offset, x.delay, x.threshold) == (1.0, 0.0, 0, None) for x in links),
                     scales=tuple(link.scale for link in links),
                     offsets=tuple(link.offset for link in links),
+                    thresholds=tuple(link.threshold for link in links),
                     ages=tuple(self.age(link) for link in links),
                     ages_at_point=tuple(self._age_at_point(link) for link in links),
                 )
@@ -203,12 +205,15 @@ class Exchange:
                 feed.channel.set(self.inputs(feed, time))
 
     def inputs(self, feed: Feed, time: float) -> list[Any]:
-        """Input values with delay, scale and offset applied, and what events make of them."""
+        """Input values with delay, scale, offset and threshold applied, and what events make of them."""
         result = []
         ages = feed.ages_at_point if self.is_at_point else feed.ages
         for k, scale, offset, age in zip(feed.sources, feed.scales, feed.offsets, ages, strict=True):
             value = self.values[k] if age is None else self._aged(age, k)
-            result.append(scale * value + offset if feed.is_real and (scale, offset) != (1.0, 0.0) else value)
+            result.append(scale * value + offset if (scale, offset) != (1.0, 0.0) else value)
+        for k, threshold in enumerate(feed.thresholds):
+            if threshold is not None:
+                result[k] = made_whole(result[k], threshold, feed.kind)
         for k, change in enumerate(feed.changes):
             if change is not None and change.active:
                 result[k] = change.apply(result[k], feed.kind, time)
@@ -284,6 +289,19 @@ class Exchange:
                 feed.changes[k] = slot
                 return slot
         raise KeyError(variable)
+
+
+def made_whole(value: float, threshold: float, kind: Type) -> int:
+    """A number as one that is no Real: true above the threshold, or rounded up above that fraction."""
+    if kind == "Boolean":
+        return int(value > threshold)
+    if not math.isfinite(value):  # before anything has settled, or astronomic: no FMU takes what comes of that
+        return 0 if math.isnan(value) else int(math.copysign(_BEYOND, value))
+    return math.ceil(value - threshold)
+
+
+_BEYOND = 2.0**64
+"""More than any whole number of an FMU's."""
 
 
 def types_of(kinds: Iterable[Type]) -> tuple[Type, ...]:

@@ -106,7 +106,7 @@ def _chosen(platforms: Sequence[str]) -> tuple[str, ...]:
 
 
 def _refused(system: System, checked: Checked, platforms: Sequence[str]) -> list[Problem]:
-    problems = [problem for link in checked.wiring.links for problem in _refused_link(link)]
+    problems = [problem for link in checked.wiring.links for problem in _refused_link(link, checked)]
     lost = {
         f"algorithm = {system.stepping.algorithm}": not issubclass(ALGORITHMS[system.stepping.algorithm], Explicit),
         f"extrapolation = {system.stepping.extrapolation}": bool(system.stepping.extrapolation),
@@ -148,12 +148,15 @@ def _refused(system: System, checked: Checked, platforms: Sequence[str]) -> list
     return problems
 
 
-def _refused_link(link: Link) -> Iterator[Problem]:
+def _refused_link(link: Link, checked: Checked) -> Iterator[Problem]:
     connection = link.connection
     where, ends = described(connection), (link.target, link.source)
+    types = [checked.models[name].interface.variables[variable].type for name, variable in (link.source, link.target)]
     if link.delay:
         delay = f"delay = {link.delay} cannot be packed: a container hands values on without delay"
         yield Problem(where, delay, names=ends)
+    if len(set(types)) > 1 or link.threshold is not None:
+        yield Problem(where, f"a {types[0]} that feeds a {types[1]} cannot be packed", names=ends)
     if (link.scale, link.offset) == (1.0, 0.0):
         return
     what = f"scale {link.scale:g} and offset {link.offset:g}"

@@ -47,7 +47,7 @@ TOP_KEYS = (
     "figures",
 )
 INSTANCE_KEYS = ("component", "fmu", "count", *OPTION_KEYS, "swapped", "build", "start")
-CONNECTION_KEYS = ("from", "delay", "scale", "offset", "optional")
+CONNECTION_KEYS = ("from", "delay", "scale", "offset", "threshold", "optional")
 
 
 class Reader:
@@ -348,6 +348,8 @@ class Reader:
             made.delay = delay
         if "scale" in value:
             made.scale = number(self.entry(value["scale"], *path, "scale"), self.problems, 1.0)
+        if "threshold" in value:
+            made.threshold = number(self.entry(value["threshold"], *path, "threshold"), self.problems, 0.5)
         if "optional" in value:
             made.optional = truth(self.entry(value["optional"], *path, "optional"), self.problems)
         made.offset = number(self.entry(value.get("offset", 0.0), *path, "offset"), self.problems)

@@ -83,7 +83,7 @@ def _instance(instance: Instance) -> Iterator[str]:
 
 
 def _options(connection: Connection) -> str | dict[str, Any]:
-    keys = ("delay", "scale", "offset", "optional")
+    keys = ("delay", "scale", "offset", "threshold", "optional")
     given = {key: value for key in keys if (value := getattr(connection, key)) != getattr(Connection, key)}
     return {"from": connection.source, **given} if given else connection.source
 

@@ -8,14 +8,17 @@ from ..fmi import Interface, Type, Variable
 from ..system import Connection
 from .units import relate
 
-_COMPATIBLE: dict[Type, tuple[Type, ...]] = {
-    "Real": ("Real", "Integer"),
-    "Integer": ("Integer", "Enumeration"),
-    "Enumeration": ("Enumeration", "Integer"),
+_AS_IT_IS: dict[Type, tuple[Type, ...]] = {
+    "Real": ("Real", "Integer", "Enumeration", "Boolean"),
+    "Integer": ("Integer", "Enumeration", "Boolean"),
+    "Enumeration": ("Enumeration", "Integer", "Boolean"),
     "Boolean": ("Boolean",),
     "String": ("String",),
 }
 """For an input's type, the output types it may follow without losing anything."""
+_AS_NUMBER: dict[Type, str] = {"Boolean": "false as 0, true as 1", "Enumeration": "the number of its item"}
+_MAKES: dict[Type, str] = {"Boolean": "threshold = 0.5 makes it true above 0.5"}
+_ROUNDS = "threshold = 0.5 takes the nearest whole number"
 
 
 @dataclass(frozen=True)
@@ -31,15 +34,39 @@ class Conversion:
 def fit(a: Variable, of_a: Interface, b: Variable, of_b: Interface, connection: Connection) -> Conversion:
     """How output ``a`` feeds input ``b``; the connection's scale and offset apply after the conversion of units."""
     scale, offset = 1.0 if connection.scale is None else connection.scale, connection.offset
-    if a.type not in _COMPATIBLE[b.type]:
-        return Conversion(problem=f"a {a.type} output cannot feed a {b.type} input")
-    if b.type != "Real" and (scale, offset) != (1.0, 0.0):
-        return Conversion(problem=f"scale and offset apply to Real inputs, not to {b.type}")
+    if problem := _misfit(a.type, b.type, connection, is_changed=(scale, offset) != (1.0, 0.0)):
+        return Conversion(problem=problem)
     found = relate(a, of_a, b, of_b)
     if connection.scale is not None or offset:  # whoever gives one has taken care of what is not known
         note = (
             f"{found.refused.partition(';')[0]}; what is given there is applied to the values" if found.refused else ""
         )
         found = found._replace(refused="", undefined="", note=note or found.note)
-    note = found.undefined or found.note
+    note = found.undefined or found.note or _told(a.type, b.type, connection.threshold)
     return Conversion(found.scale * scale, found.offset * scale + offset, found.refused, note)
+
+
+def _misfit(a: Type, b: Type, connection: Connection, *, is_changed: bool) -> str:
+    """Why types do not go together, with the way out."""
+    threshold = connection.threshold
+    if "String" in (a, b) and a != b:
+        return f"a {a} output cannot feed a {b} input"
+    if b == "String" and (is_changed or threshold is not None):
+        return "scale, offset and threshold apply to numbers, not to String"
+    if b == "Real" and threshold is not None:
+        return "a threshold is for inputs that are no Real"
+    if threshold is None and (a not in _AS_IT_IS[b] or (is_changed and b != "Real")):
+        what = "scale and offset lead" if a in _AS_IT_IS[b] else f"a {a} output leads"
+        return f"{what} to a {b} input only with a threshold: {_MAKES.get(b, _ROUNDS)}"
+    if threshold is not None and b in ("Integer", "Enumeration") and not 0.0 <= threshold < 1.0:
+        return f"for a {b} input the threshold is the fraction above which it is rounded up: from 0 to below 1"
+    return ""
+
+
+def _told(a: Type, b: Type, threshold: float | None) -> str:
+    """What a user should know of a value that changes its type."""
+    if threshold is not None and (a, b) != ("Boolean", "Boolean"):
+        how = f"true above {threshold:g}" if b == "Boolean" else f"rounded up above a fraction of {threshold:g}"
+        return f"a {a} is given to a {b}, {how}"
+    is_number = b == "Real" or (b != "Boolean" and a == "Boolean")
+    return f"a {a} is given to a {b}, {_AS_NUMBER[a]}" if is_number and a in _AS_NUMBER else ""

@@ -21,6 +21,8 @@ _MOST_COMPARED = 50_000
 class Link:
     """One scalar connection: target = scale * source + offset, ``delay`` communication points late.
 
+    With a ``threshold`` that becomes true above it, or is rounded up above that fraction.
+
     Attributes:
         source, target: scalar variables.
         direct: whether the source output depends directly on an input of its FMU.
@@ -34,6 +36,11 @@ class Link:
     delay: int
     direct: bool
     connection: Connection
+
+    @property
+    def threshold(self) -> float | None:
+        """By what a number is made a truth value or a whole number."""
+        return self.connection.threshold
 
 
 @dataclass

@@ -98,6 +98,7 @@ def _changed(one: Connection) -> str:
     parts = [
         "" if one.scale is None or one.scale == 1.0 else f"times {one.scale:g}",
         f"plus {one.offset:g}" if one.offset else "",
+        "" if one.threshold is None else f"whole by the threshold {one.threshold:g}",
         f"{counted(one.delay, 'point')} later" if one.delay else "",
     ]
     return ", ".join(filter(None, parts))

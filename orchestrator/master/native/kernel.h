@@ -18,6 +18,8 @@
 
 enum { OPERATION_SET = 0, OPERATION_STEP = 1, OPERATION_GET = 2, OPERATION_CHANGE = 3 };
 
+enum { AS_IT_IS = 0, TRUE_ABOVE = 1, ROUNDED_UP = 2 };
+
 /* ------------------------------------------------------------------------------------- the plan, as Python writes it */
 
 typedef struct {
@@ -39,6 +41,8 @@ typedef struct {
     int64_t change; /* what events may do to it on the way; -1: nothing */
     double scale;
     double offset;
+    int64_t whole; /* what the threshold makes of it: of a truth value read, 1 or 0 */
+    double threshold;
 } Entry;
 
 /* What an event makes of a value, while it is active; `place` is that of an output. */

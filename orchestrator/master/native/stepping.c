@@ -5,6 +5,7 @@
 
 #include "kernel.h"
 
+#include <limits.h>
 #include <math.h>
 #include <string.h>
 
@@ -41,11 +42,16 @@ static double read_entry(const Plan *plan, const Entry *entry, double time)
     if (entry->scale != 1.0 || entry->offset != 0.0) {
         value = entry->scale * value + entry->offset;
     }
+    if (entry->whole == TRUE_ABOVE) {
+        value = value > entry->threshold;
+    } else if (entry->whole == ROUNDED_UP) {
+        value = ceil(value - entry->threshold);
+    }
     return entry->change < 0 ? value : changed(&plan->changes[entry->change], value, time);
 }
 
 /* Each of these takes a group's calls; it returns the one that failed, or the end. A failure with a status that is none is
-   a value that is not finite. */
+   a value that is not finite, or none that C's int holds. */
 
 static const Call *take_steps(const Group *group, double time, double step, int *status)
 {
@@ -97,7 +103,12 @@ static const Call *set_integers(const Hand *hand, const Group *group, double tim
     SetInteger set = (SetInteger)group->function;
     for (const Call *call = group->begin; call < group->end; call++) {
         for (size_t k = 0; k < group->count; k++) {
-            hand->integers[k] = (int)read_entry(hand->plan, &call->entries[k], time);
+            double value = read_entry(hand->plan, &call->entries[k], time);
+            if (!(value >= INT_MIN && value <= INT_MAX)) {
+                *status = 0;
+                return call;
+            }
+            hand->integers[k] = (int)value;
         }
         *status = set(call->component, group->references, group->count, hand->integers);
         if (is_failure(*status)) {
@@ -136,7 +147,8 @@ static const Call *get_integers(const Hand *hand, const Group *group, int *statu
             return call;
         }
         for (size_t k = 0; k < group->count; k++) {
-            call->values[k] = (double)hand->integers[k];
+            int value = hand->integers[k];
+            call->values[k] = (double)(call->entries[k].whole == TRUE_ABOVE ? value != 0 : value);
         }
     }
     return group->end;

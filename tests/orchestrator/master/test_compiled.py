@@ -13,7 +13,7 @@ from railcosim.orchestrator import load
 from railcosim.orchestrator.fmi.slave import STATUS
 from railcosim.orchestrator.master import compiled
 from railcosim.orchestrator.run.execution import run
-from railcosim.orchestrator.system import System
+from railcosim.orchestrator.system import Event, System
 
 GCC = shutil.which("gcc")
 pytestmark = [
@@ -40,6 +40,46 @@ def test_a_whole_scenario(both, used, algorithm, kind):
     assert result.status == "completed"
     assert len(result.time) == 3501
     assert len(used) > 1
+
+
+@ALGORITHMS
+@pytest.mark.parametrize("delay", [0, 2])
+def test_types_that_change_on_the_way(both, odd, mine, algorithm, delay):
+    """Each type to each other, scaled and with events on the way; against the same by NumPy."""
+    system = System(stop_time=4.0, step=0.25, algorithm=algorithm)
+    system.add("wave", mine("Wave"))
+    for name in ("a", "b", "c"):
+        system.add(name, odd)
+    system.connect("wave.y", "a.m", scale=5.0, offset=0.2, threshold=0.5)
+    system.connect("wave.y", "a.on", threshold=0.25)
+    system.connect("a.off", "b.u", delay=delay)
+    system.connect("a.off", "b.v", scale=-2.0, offset=0.3, delay=delay)
+    system.connect("a.off", "b.m", scale=7.0, threshold=0.0, delay=delay)
+    system.connect("a.n", "b.on", threshold=1.0, delay=delay)
+    system.connect("a.n", "c.u", scale=0.5)
+    system.connect("b.off", "c.m", delay=delay)
+    system.connect("b.off", "c.v")
+    system.events = [Event("a.on", "override", 2.0, value=True, duration=0.5), Event("b.v", "bias", 1.0, value=4.0)]
+    result = both(system)
+    wave = 5.0 * np.sin(3.0 * result.time[:-1]) + 0.2
+    assert list(result["a.n"][1:]) == list(np.rint(wave) + 1)
+    assert set(result["a.off"][1:]) == {0, 1}
+    assert set(result["b.n"][1:]) == {1, 8}
+    assert set(result["c.n"][1:]) == {1, 2}
+
+
+@ALGORITHMS
+def test_a_number_that_no_whole_one_holds(both, odd, mine, algorithm):
+    """An error in both, by the input's name."""
+    system = System(stop_time=4.0, step=0.25, algorithm=algorithm)
+    system.add("course", mine("Course"), a=0.0, b=1.0)
+    system.add("a", odd)
+    system.connect("course.y", "a.m", scale=1e9, threshold=0.5)
+    result = both(system)
+    assert result.status == "failed"
+    assert "'m' cannot become 2250000000: its type Integer holds -2147483648 to 2147483647" in str(result.error)
+    assert result.error.instance == "a"
+    assert result.time[-1] == 2.25
 
 
 @ALGORITHMS

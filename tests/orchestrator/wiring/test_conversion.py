@@ -69,8 +69,45 @@ def test_what_does_not_convert_is_refused_unless_a_scale_is_given():
         assert found.note == f"{what}; what is given there is applied to the values"
 
 
-def test_types():
+def test_types_that_pass_as_they_are():
     whole, real, gear = end("A", kind="Integer"), end("B", "K", K), end("C", kind="Enumeration")
+    truth, word = end("D", kind="Boolean"), end("E", kind="String")
     assert between(whole, real) == between(gear, whole) == between(whole, gear) == Conversion()
-    assert between(real, whole).problem == "a Real output cannot feed a Integer input"
-    assert between(gear, whole, scale=2.0).problem == "scale and offset apply to Real inputs, not to Integer"
+    assert between(truth, truth) == between(word, word) == Conversion()
+    assert between(truth, real) == Conversion(note="a Boolean is given to a Real, false as 0, true as 1")
+    assert between(truth, whole) == Conversion(note="a Boolean is given to a Integer, false as 0, true as 1")
+    assert between(gear, real) == Conversion(note="a Enumeration is given to a Real, the number of its item")
+    scaled = between(truth, real, scale=10.0, offset=-5.0)
+    assert (scaled.scale, scaled.offset) == (10.0, -5.0)
+
+
+def test_types_that_need_a_threshold():
+    whole, real, gear = end("A", kind="Integer"), end("B", "K", K), end("C", kind="Enumeration")
+    truth = end("D", kind="Boolean")
+    nearest = "threshold = 0.5 takes the nearest whole number"
+    for source in (real, whole, gear):
+        kind = source[0].type
+        asked = (
+            f"a {kind} output leads to a Boolean input only with a threshold: threshold = 0.5 makes it true above 0.5"
+        )
+        assert between(source, truth).problem == asked
+        note = f"a {kind} is given to a Boolean, true above -2.5"
+        assert between(source, truth, threshold=-2.5) == Conversion(note=note)
+    for target in (whole, gear):
+        kind = target[0].type
+        asked = f"a Real output leads to a {kind} input only with a threshold: {nearest}"
+        assert between(real, target).problem == asked
+        asked = f"scale and offset lead to a {kind} input only with a threshold: {nearest}"
+        assert between(whole, target, scale=2.0).problem == between(truth, target, offset=1.0).problem == asked
+        found = between(real, target, scale=2.0, offset=1.0, threshold=0.0)
+        assert found == Conversion(2.0, 1.0, note=f"a Real is given to a {kind}, rounded up above a fraction of 0")
+        for wrong in (-0.1, 1.0):
+            assert "from 0 to below 1" in between(real, target, threshold=wrong).problem
+
+
+def test_types_that_do_not_go_together():
+    real, word = end("B"), end("E", kind="String")
+    assert between(real, word).problem == "a Real output cannot feed a String input"
+    assert between(word, real, threshold=0.5).problem == "a String output cannot feed a Real input"
+    assert between(word, word, scale=2.0).problem == "scale, offset and threshold apply to numbers, not to String"
+    assert between(real, real, threshold=0.5).problem == "a threshold is for inputs that are no Real"

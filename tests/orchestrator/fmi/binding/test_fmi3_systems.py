@@ -46,6 +46,34 @@ def test_a_closed_loop_of_all_versions(by_hand, odd, algorithm):
     assert np.abs(found - expected).max() < 1e-13
 
 
+@pytest.mark.parametrize("isolate", [False, True])
+def test_numbers_of_every_type_become_each_other(by_hand, odd, mine, isolate):
+    """Reals by a threshold to whole numbers of 8 and 64 bits, to an item and to a truth value, and all of them back."""
+    system = System(stop_time=2.0, step=0.25)
+    system.add("course", mine("Course"), a=0.6, b=1.0)
+    system.add("third", str(by_hand(3)))
+    system.instances["third"].isolate = isolate
+    for name in ("p", "q", "r"):
+        system.add(name, mine("Pass"))
+    system.connect("course.y", "third.ui8", scale=10.0, offset=4.0, threshold=0.5)
+    system.connect("course.y", "third.i64", scale=3e9, threshold=0.0)
+    system.connect("course.y", "third.gear", threshold=0.75)
+    system.connect("course.y", "third.on", threshold=1.5)
+    system.connect("third.uo8", "p.u", scale=0.1)
+    system.connect("third.o64", "q.u")
+    system.connect("third.off", "r.u", scale=-2.0, offset=1.0)
+    system.stepping.order = ["course", "third", "p", "q", "r"]
+    result = run(system)
+    y = result["course.y"][1:]
+    assert list(result["third.uo8"][1:]) == list(np.ceil(10.0 * y + 4.0 - 0.5))
+    assert list(result["third.o64"][1:]) == list(np.ceil(3e9 * y))
+    assert list(result["third.shown"][1:]) == list(np.ceil(y - 0.75))
+    assert list(result["third.off"][1:]) == list((y <= 1.5).astype(int))
+    assert result["p.y"] == pytest.approx(0.1 * result["third.uo8"], rel=1e-15)
+    assert np.array_equal(result["q.y"], result["third.o64"].astype(float))
+    assert np.array_equal(result["r.y"], 1.0 - 2.0 * result["third.off"])
+
+
 def test_every_type_goes_from_version_to_version(by_hand, odd, components):
     """Whole numbers, booleans, texts and enumerations, through the three versions and a component of ours."""
     echo = components(
