@@ -16,6 +16,8 @@ from .reader import check_count, flatten, place_of
 from .simulation import SIMULATION_KEYS, set_tolerance
 from .toml_source import Source, parse_value
 
+_NAME = re.compile(r"(?:'(?:[^'\\]|\\.)*'|[^=])*+", re.DOTALL)
+"""What stands before the sign of an assignment; a quoted name may hold one itself."""
 _BUILD = re.compile(r"[A-Za-z_]\w*(?:\[[^\[\]]*\])?\.build\.[^.]+")
 
 
@@ -157,7 +159,7 @@ def _preset_lines(table: Mapping[str, Any], path: tuple[str, ...] = ()) -> Itera
 def apply_settings(draft: Draft, settings: Sequence[str], problems: list[Problem], option: str = "--set") -> None:
     """Apply `--set train[4].speed=10` (or `--with train.carriages=8`); values are TOML, or the text as it is."""
     for text in settings:
-        key, equals, value = text.partition("=")
+        key, equals, value = _assignment(text)
         entry = Entry(parse_value(value.strip()), f"{option} {text}")
         if not equals or not key.strip() or not value.strip():
             example = "train[4].speed=10" if option == "--set" else "train.carriages=8"
@@ -166,6 +168,14 @@ def apply_settings(draft: Draft, settings: Sequence[str], problems: list[Problem
         if not is_plain(entry.value, tables=option == "--with" or key.strip() == "simulation.tolerances"):
             entry = Entry(value.strip(), entry.origin)
         change(draft, key.strip() if option == "--set" else _build_key(key.strip()), entry, os.getcwd(), problems)
+
+
+def _assignment(text: str) -> tuple[str, str, str]:
+    """``a.'x = y' = 3`` taken apart at the right sign."""
+    match = _NAME.match(text)
+    if match is None or match.end() == len(text):  # all of it, where a quote is just a letter
+        return text.partition("=")
+    return match[0], "=", text[match.end() + 1 :]
 
 
 def _build_key(key: str) -> str:

@@ -36,7 +36,8 @@ def relate(a: Variable, of_a: Interface, b: Variable, of_b: Interface) -> Relati
     if ua is None or ub is None or ua.exponents is None or ub.exponents is None:
         model, unit = (of_a.model, a.unit) if ua is None or ua.exponents is None else (of_b.model, b.unit)
         why = f"{unit!r} is not defined in SI units by {model}: what is in {a.unit!r} is taken for {b.unit!r} as it is"
-        remedy = "where they differ, give the connection a scale"
+        known = _known(a.unit, b.unit)
+        remedy = "where they differ, give the connection a scale" + (f", such as scale = {known!r}" if known else "")
         return Relation(undefined="" if a.unit == b.unit else f"{why}; {remedy}")
     if a.unit == b.unit:
         note = f"{of_a.model} and {of_b.model} define the unit {a.unit!r} differently: values pass as they are"
@@ -68,20 +69,20 @@ def _refusal(a: Unit, of_a: Interface, b: Unit, of_b: Interface) -> str:
     if (a.exponents or ())[:-1] != (b.exponents or ())[:-1]:
         return f"{what}: they are of different dimensions; if the values fit, give the connection a scale (scale = 1.0)"
     said = f"{of_a.model} gives {a.name!r} the exponent {in_a} of rad, {of_b.model} gives {b.name!r} {in_b}"
-    scale = _known(a, b) or convert(a, b)[0]
+    scale = _known(a.name, b.name) or convert(a, b)[0]
     return f"{what}: {said}; give the connection a scale (if they are what they are called, scale = {scale!r})"
 
 
 def _doubt(a: Unit, b: Unit, scale: float) -> str:
     """What to say of definitions that make something else of an angle than its name does: 1 Hz is not 1 rad/s."""
-    known = _known(a, b)
+    known = _known(a.name, b.name)
     if known is None or abs(scale - known) <= 1e-3 * known:
         return ""
     made = f"as the FMUs define them, 1 {a.name} is {scale:g} {b.name}, not {known:g}"
     return f"{made}; if they are what they are called, give the connection scale = {known / scale!r}"
 
 
-def _known(a: Unit, b: Unit) -> float | None:
+def _known(a: str, b: str) -> float | None:
     """The scale between two units of angle or of rotation by their names."""
-    table = next((table for table in (_ANGLES, _RATES) if a.name in table and b.name in table), None)
-    return None if table is None else table[a.name] / table[b.name]
+    table = next((table for table in (_ANGLES, _RATES) if a in table and b in table), None)
+    return None if table is None else table[a] / table[b]

@@ -257,3 +257,17 @@ def test_a_preset_says_what_it_is():
         assert loads(dump(system)).provenance.description == said
     with pytest.raises(ScenarioError, match=r"presets.gentle.description: takes a text, not 3"):
         loads(text.replace('"gentler gains"', "3"))
+
+
+@pytest.mark.parametrize(
+    ("text", "name", "value"),
+    [
+        ("target.'x = y'=3", "'x = y'", 3),
+        ("target.'my var'=[1, 2]", "'my var'", [1, 2]),
+        ("target.o'neil=it's", "o'neil", "it's"),
+        ("target.k[0]=5", "k[0]", 5),
+        ("target.m[1, 2]='a=b'", "m[1, 2]", "a=b"),
+    ],
+)
+def test_names_of_other_makers(text, name, value):
+    assert loads(EXAMPLE, settings=[text]).instances["target"].start[name] == value

@@ -115,3 +115,8 @@ def test_units_that_nobody_defined(undefined):
         "give the connection a scale"
     )
     assert relate(*a, *a) == Relation()
+
+
+def test_of_undefined_units_of_angle_the_scale_is_told():
+    undefined = relate(*end("A", "Hz", None), *end("B", "rad/s", None)).undefined
+    assert float(undefined.rpartition("scale = ")[2]) == 2.0 * math.pi
