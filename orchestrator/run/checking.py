@@ -215,6 +215,8 @@ def _notes(system: System, models: Mapping[str, Model], wiring: Wiring, order: O
             notes[
                 f"{model} lists no dependencies of {', '.join(silent[:4])}; {taken} direct feed-through is assumed"
             ] = None
+        if not interface.of("output"):
+            notes[f"{model} has no outputs: nothing of it is recorded but what is connected"] = None
         if interface.needs_tool and not interface.annotation:
             notes[f"{model} says that it needs the tool it was made with ({interface.generator or 'unnamed'})"] = None
     delays = loop_delays(system, interfaces, wiring, order.sequence)

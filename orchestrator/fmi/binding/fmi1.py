@@ -5,7 +5,7 @@ from __future__ import annotations
 import ctypes
 import math
 from collections.abc import Sequence
-from ctypes import c_bool, c_char_p, c_double, c_int, c_size_t, c_void_p
+from ctypes import c_bool, c_char_p, c_double, c_int, c_size_t, c_uint8, c_void_p
 from pathlib import Path
 from typing import Any
 
@@ -42,7 +42,7 @@ _TYPES: dict[str, tuple[str, Any]] = {
     "Real": ("Real", c_double),
     "Integer": ("Integer", c_int),
     "Enumeration": ("Integer", c_int),
-    "Boolean": ("Boolean", c_bool),  # a char; what is not zero is true
+    "Boolean": ("Boolean", c_uint8),  # a byte, of which any bit is true
     "String": ("String", c_char_p),
 }
 

@@ -6,7 +6,7 @@ import ctypes
 import math
 import os
 from collections.abc import Sequence
-from ctypes import c_bool, c_char_p, c_double, c_int, c_size_t, c_void_p
+from ctypes import c_bool, c_char_p, c_double, c_int, c_size_t, c_uint8, c_void_p
 from pathlib import Path
 from typing import Any
 
@@ -70,7 +70,7 @@ _SIGNATURES: Signatures = {
 _TYPES: dict[str, tuple[str, Any]] = {
     **{name: (name, c_type) for name, c_type in _NUMBERS.items()},
     "Enumeration": ("Int64", ctypes.c_int64),
-    "Boolean": ("Boolean", c_bool),
+    "Boolean": ("Boolean", c_uint8),  # a byte, of which any bit is true
     "String": ("String", c_char_p),
 }
 

@@ -24,6 +24,9 @@ typedef struct {
     Logger logger;
 } First;
 
+#ifndef TRUE
+#define TRUE 1 /* any char but 0 */
+#endif
 #define EXPORT(name) First_##name
 
 static int tell(First *s, int status, const char *text)
@@ -124,7 +127,7 @@ int EXPORT(fmiSetBoolean)(void *c, const unsigned *vr, size_t count, const char 
 int EXPORT(fmiGetBoolean)(void *c, const unsigned *vr, size_t count, char *values)
 {
     for (size_t k = 0; k < count; k++) {
-        values[k] = ((First *)c)->flags[vr[k]];
+        values[k] = ((First *)c)->flags[vr[k]] ? TRUE : 0;
     }
     return 0;
 }

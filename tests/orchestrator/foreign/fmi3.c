@@ -14,6 +14,9 @@
 #include <stdlib.h>
 #include <string.h>
 
+#ifndef TRUE
+#define TRUE 1 /* any byte but 0 */
+#endif
 #ifndef EVENTS
 #define EVENTS 0
 #endif
@@ -159,7 +162,22 @@ EXCHANGE(Int32, int32_t, i32)
 EXCHANGE(UInt32, uint32_t, u32)
 EXCHANGE(Int64, int64_t, i64)
 EXCHANGE(UInt64, uint64_t, u64)
-EXCHANGE(Boolean, bool, truth)
+
+int fmi3SetBoolean(void *c, const unsigned *vr, size_t count, const unsigned char *values, size_t size)
+{
+    for (size_t k = 0; k < count; k++) {
+        ((Third *)c)->now.truth[vr[k] % 10] = values[k] != 0;
+    }
+    return count == size ? 0 : 3;
+}
+
+int fmi3GetBoolean(void *c, const unsigned *vr, size_t count, unsigned char *values, size_t size)
+{
+    for (size_t k = 0; k < count; k++) {
+        values[k] = ((Third *)c)->now.truth[vr[k] % 10] ? TRUE : 0;
+    }
+    return count == size ? 0 : 3;
+}
 
 int fmi3SetString(void *c, const unsigned *vr, size_t count, const char *const *values, size_t size)
 {

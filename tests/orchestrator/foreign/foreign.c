@@ -24,6 +24,9 @@
 #include "fmi2.h"
 
 #define REALS 12000
+#ifndef TRUE
+#define TRUE 1 /* any number but 0 */
+#endif
 
 typedef struct {
     double reals[REALS];
@@ -259,7 +262,7 @@ int fmi2GetBoolean(void *c, const unsigned *vr, size_t count, int *values)
     Foreign *s = c;
     s->truths[1] = !s->truths[0];
     for (size_t k = 0; k < count; k++) {
-        values[k] = s->truths[vr[k]];
+        values[k] = s->truths[vr[k]] ? TRUE : 0;
     }
     return 0;
 }
