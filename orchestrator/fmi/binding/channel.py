@@ -40,7 +40,7 @@ class Owner(Protocol):
 class FmuChannel:
     """Some variables of one type of an FMU: value references and a buffer, prepared once.
 
-    ``calls`` names the functions that set and get; ``is_truth``: the values are booleans.
+    ``calls`` names the functions that set and get.
 
     Args:
         slave: the instance.
@@ -59,7 +59,7 @@ class FmuChannel:
         self.references: Sequence[int] = references[:]
         more = (count,) if slave.COUNTS_VALUES else ()
         self._arguments = (slave.pointer, references, len(references), self._values, *more)
-        self._text, self.is_truth = kind == "String", kind == "Boolean"
+        self._text, self._truth = kind == "String", kind == "Boolean"
         self._limits = slave.interface.variables[names[0]].whole_range if names else None
 
     def set(self, values: Sequence[Any]) -> None:
@@ -68,7 +68,7 @@ class FmuChannel:
             self._check_limits(values, *self._limits)
         if self._text:
             values = [v.encode() for v in values]
-        self._values[:] = [1 if v else 0 for v in values] if self.is_truth else values
+        self._values[:] = [1 if v else 0 for v in values] if self._truth else values
         status = (self._set or self._slave.function(self.calls[0]))(*self._arguments)
         if ONE + SMALL != ONE or ONE - SMALL != ONE or TINY * ONE == 0.0:
             self._slave.mend()
@@ -92,7 +92,7 @@ class FmuChannel:
         if self._text:
             return [(v or b"").decode(errors="replace") for v in self._values]
         # A boolean is 0 or 1 here; in C it is true with any bit that is set.
-        return [1 if v else 0 for v in self._values] if self.is_truth else list(self._values)
+        return [1 if v else 0 for v in self._values] if self._truth else list(self._values)
 
 
 class MixedChannel:
