@@ -1,6 +1,7 @@
 """FMUs to keep: kinds, platforms, what is told, checksums, and that nothing half stays behind."""
 
 import hashlib
+import os
 import shutil
 import subprocess
 import sys
@@ -185,15 +186,14 @@ def test_two_components_of_one_name_are_refused(components, tmp_path):
 def test_an_interrupted_release_leaves_whole_files_and_no_stale_checksums(tmp_path, monkeypatch, failure):
     release(["Gust", "Schedule"], {}, tmp_path, kind="python", checksums=True)
     before = (tmp_path / "Schedule.fmu").read_bytes()
-    whole = shutil.copyfile
+    whole = os.replace
 
-    def copyfile(source, target):
-        if Path(source).name == "Schedule.fmu":
-            Path(target).write_bytes(b"half")
+    def replace(source, target):
+        if Path(target) == tmp_path / "Schedule.fmu":
             raise failure
-        return whole(source, target)
+        whole(source, target)
 
-    monkeypatch.setattr(shutil, "copyfile", copyfile)
+    monkeypatch.setattr(os, "replace", replace)
     with pytest.raises(type(failure)):
         release(["Gust", "Schedule"], {}, tmp_path, kind="python", checksums=True)
     assert sorted(path.name for path in tmp_path.iterdir()) == ["Gust.fmu", "Schedule.fmu"]
