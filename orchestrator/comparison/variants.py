@@ -66,7 +66,7 @@ class Row:
     """One metric, or one index of it, over all variants; NaN where a variant has none.
 
     ``winners`` are the places of the best values, of variants that can win; empty where there is no better, or all are
-    equal.
+    equal. ``truth`` says that 1 is true and 0 false.
     """
 
     metric: str
@@ -75,6 +75,7 @@ class Row:
     better: Better
     values: tuple[float, ...]
     winners: tuple[int, ...]
+    truth: bool = False
 
     @property
     def name(self) -> str:
@@ -254,18 +255,18 @@ def _folders(names: Sequence[str]) -> list[str]:
 
 def _rows(columns: Sequence[Variant], directions: Mapping[str, Better]) -> list[Row]:
     """One row for each metric and index that any variant has, in the order in which they first occur."""
-    known: dict[tuple[str, int | None], tuple[str, Better]] = {}
+    known: dict[tuple[str, int | None], tuple[str, Better, bool]] = {}
     for variant in columns:
         for metric in variant.run.metrics if variant.run and variant.run.status == "completed" else ():
             for index in metric.values:
                 direction = directions.get(metric.name) or better(metric.expression)
-                known.setdefault((metric.name, index), (metric.unit, direction))
+                known.setdefault((metric.name, index), (metric.unit, direction, metric.truth))
     order = {name: k for k, name in enumerate(dict.fromkeys(name for name, _ in known))}
     barred = [k for k, variant in enumerate(columns) if variant.spoiled]
     rows = []
-    for (name, index), (unit, direction) in sorted(known.items(), key=lambda item: order[item[0][0]]):
+    for (name, index), (unit, direction, truth) in sorted(known.items(), key=lambda item: order[item[0][0]]):
         values = tuple(variant.value(name, index) for variant in columns)
-        rows.append(Row(name, index, unit, direction, values, winners(values, direction, barred)))
+        rows.append(Row(name, index, unit, direction, values, winners(values, direction, barred), truth))
     return rows
 
 

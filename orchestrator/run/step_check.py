@@ -11,7 +11,7 @@ from ..evaluation import compare_metrics
 from .outcome import Run
 
 RELATIVE = 0.01
-"""What may change of a metric that no known value gives a tolerance, of its own size."""
+"""What may change of a metric, of its own size; more where a known value's tolerance is wider."""
 ABSOLUTE = 1e-3
 """And of the largest metric of its unit: a speed error of 1 mm/s need not be known to 1 % in a run at 80 m/s."""
 
@@ -58,8 +58,8 @@ class StepCheck:
 def check_step(outcome: Run, half: Run) -> StepCheck:
     """Judge the step of a run by the same run at half of it.
 
-    A value that is known beforehand may change by its tolerance; any other by `RELATIVE` of itself or `ABSOLUTE` of the
-    largest metric of its unit, a time by one recorded point as well.
+    A value may change by `RELATIVE` of itself, by `ABSOLUTE` of the largest metric of its unit, a time by one recorded
+    point, and what is known beforehand by its tolerance: by the largest of these.
 
     Args:
         outcome: the run.
@@ -74,16 +74,18 @@ def check_step(outcome: Run, half: Run) -> StepCheck:
     for metric in outcome.metrics:
         sizes = [abs(value) for value in metric.values.values() if np.isfinite(value)]
         largest[metric.unit] = max([*sizes, largest.get(metric.unit, 0.0)])
+    truths = {metric.name for metric in outcome.metrics if metric.truth}
     changes = []
     for found in compare_metrics(outcome.metrics, half.metrics):
         if np.isnan(found.value) and np.isnan(found.other):
             continue
-        allowed = known.get((found.name, found.index))
-        if allowed is None:
-            size = abs(found.value) if np.isfinite(found.value) else 0.0
-            allowed = max(RELATIVE * size, ABSOLUTE * largest[found.unit] if found.unit else 0.0)
-            if found.unit == "s":
-                allowed = max(allowed, 1.001 * (outcome.system.stepping.record or outcome.system.stepping.step))
+        size = abs(found.value) if np.isfinite(found.value) else 0.0
+        bounds = [RELATIVE * size, known.get((found.name, found.index), 0.0)]
+        bounds += [ABSOLUTE * largest[found.unit]] if found.unit else []
+        bounds += (
+            [1.001 * (outcome.system.stepping.record or outcome.system.stepping.step)] if found.unit == "s" else []
+        )
+        allowed = 0.0 if found.name in truths else max(bounds)
         changes.append(StepChange(found.name, found.index, found.difference, allowed, found.unit))
     changes.sort(key=lambda change: -change.share if np.isfinite(change.share) else -np.inf)
     verdicts = {verdict.name: verdict.verdict for verdict in half.requirements}

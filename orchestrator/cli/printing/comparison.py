@@ -64,7 +64,7 @@ def _metrics(comparison: Comparison, heads: Sequence[str]) -> Table:
     made = table("Metrics", ("metric", *heads, "unit", "better", "winner"), right=heads, fold=("metric",))
     for row in comparison.rows:
         scale, unit = prefixed(row.unit, row.values)
-        texts = [number(value, row.unit, scale) for value in row.values]
+        texts = [number(value, row.unit, scale, truth=row.truth) for value in row.values]
         cells = [Text(text, style=_BEST if k in row.winners else "") for k, text in enumerate(texts)]
         direction = "" if row.better == "none" else row.better
         best = ", ".join(heads[k] for k in row.winners)

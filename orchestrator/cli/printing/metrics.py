@@ -35,9 +35,7 @@ def show_metrics(out: Console, metrics: Sequence[Metric], comparisons: Sequence[
 def _number(value: float, metric: Metric, scale: float) -> str:
     if metric.comfort and math.isfinite(value):
         return f"{value:.3f} ({', '.join(map(str, comfort_levels(value)))})"
-    if metric.truth and not math.isnan(value):
-        return "true" if value else "false"
-    return number(value, metric.unit, scale)
+    return number(value, metric.unit, scale, truth=metric.truth)
 
 
 def _long_table(metrics: Sequence[Metric], comparisons: Sequence[MetricChange]) -> Table:

@@ -74,12 +74,12 @@ def _step_line(found: StepCheck) -> str:
     beyond = found.beyond
     if not beyond and not found.requirements:
         worst = next(iter(found.changes), None)
-        if worst is None:
-            return f"{line}: half of it changes no requirement's verdict, and there are no metrics"
+        if worst is None or not worst.change:
+            return f"{line}: half of it changes no metric and no requirement's verdict"
         return f"{line}: half of it changes {worst.name} most, by {_of_allowed(worst)}"
     told = [f"{change.name} by {_of_allowed(change)}" for change in beyond[:_SHOWN]]
     told += [f"the verdict of requirement {name}" for name in found.requirements]
-    more = f", and {len(beyond) - _SHOWN} more values" if len(beyond) > _SHOWN else ""
+    more = f", and {counted(len(beyond) - _SHOWN, 'more value')}" if len(beyond) > _SHOWN else ""
     return f"{line}: half of it changes {', '.join(told)}{more}"
 
 

@@ -74,10 +74,12 @@ def prefixed(unit: str, values: Iterable[float]) -> tuple[float, str]:
     return next((scale, prefix + unit) for scale, prefix in _PREFIXES if size >= scale)
 
 
-def number(value: float, unit: str, scale: float = 1.0) -> str:
-    """A metric's value, divided by `scale`; no time is ``never``, and no value a dash."""
+def number(value: float, unit: str, scale: float = 1.0, *, truth: bool = False) -> str:
+    """A metric's value, divided by `scale`, or its `truth`; no time is ``never``, and no value a dash."""
     if math.isnan(value):
         return "-"
+    if truth:
+        return "true" if value else "false"
     return "never" if math.isinf(value) and unit == "s" else f"{value / scale:.6g}"
 
 

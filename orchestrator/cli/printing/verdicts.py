@@ -12,7 +12,7 @@ from rich.text import Text
 
 from ...evaluation import BAD, REFERENCE, UNJUDGED_RUN, ComparedValue, Verdict, count_values
 from .console import say
-from .tables import PLAIN, prefixed, show_reasons, table, verdict
+from .tables import PLAIN, number, prefixed, show_reasons, table, verdict
 
 _SMALLEST_CLAIM = 16
 
@@ -62,7 +62,8 @@ def _value_table(heads: Sequence[str], widths: Sequence[int], rows: Sequence[Com
 
 def _cells(row: ComparedValue) -> list[str]:
     if row.judges_truth:
-        known, measured, tolerance, unit = _truth(row.value), _truth(row.measured), "", ""
+        known, measured = (number(math.nan if x is None else x, "", truth=True) for x in (row.value, row.measured))
+        tolerance, unit = "", ""
     else:
         scale, unit = prefixed(row.unit, [row.measured, math.nan if row.value is None else row.value])
         known = "in words" if row.value is None else f"{row.value / scale:.8g}"
@@ -76,10 +77,6 @@ def _cells(row: ComparedValue) -> list[str]:
         unit,
         row.verdict,
     ]
-
-
-def _truth(value: float | None) -> str:
-    return "-" if value is None or math.isnan(value) else "true" if value else "false"
 
 
 def by_source(rows: Sequence[ComparedValue]) -> dict[str, list[ComparedValue]]:

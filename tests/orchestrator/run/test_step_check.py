@@ -2,6 +2,7 @@
 
 import json
 import math
+from dataclasses import replace
 
 import pytest
 from railcosim.orchestrator import System
@@ -16,8 +17,8 @@ def ended(values, requirements=(), references=(), step=0.1):
     return Run(system, None, "completed", None, metrics=metrics, requirements=made, references=list(references))
 
 
-def known(metric, tolerance, **more):
-    return ComparedValue(metric, None, "", None, 1.0, 1.0, tolerance, "m", "", "reference", "reproduced", **more)
+def known(metric, tolerance):
+    return ComparedValue(metric, None, "", None, 1.0, 1.0, tolerance, "m", "", "reference", "reproduced")
 
 
 @pytest.mark.parametrize(
@@ -49,13 +50,18 @@ def test_small_values_beside_large_ones_of_their_unit():
 
 
 def test_a_known_value_may_change_by_its_tolerance():
-    before, after = {"x": (100.0, "m")}, {"x": (100.5, "m")}
-    assert check_step(ended(before), ended(after)).verdict == "fine"
-    tight = check_step(ended(before, references=[known("x", 0.1), known("x", 0.4)]), ended(after))
-    assert tight.verdict == "too coarse"
-    assert [(c.name, c.change, c.allowed) for c in tight.beyond] == [("x", 0.5, 0.4)]
-    truth = known("x", 0.0, judges_truth=True)
-    assert check_step(ended(before, references=[truth]), ended(before)).verdict == "fine"
+    before, after = {"x": (100.0, "m")}, {"x": (101.5, "m")}
+    assert check_step(ended(before), ended(after)).verdict == "too coarse"
+    assert check_step(ended(before, references=[known("x", 0.1), known("x", 1.6)]), ended(after)).verdict == "fine"
+    tight = check_step(ended(before, references=[known("x", 1.2)]), ended(after))
+    assert [(c.name, c.change, c.allowed) for c in tight.beyond] == [("x", 1.5, 1.2)]
+
+
+def test_what_is_true_stays_true():
+    before, after = (ended({"x": (value, "")}) for value in (1.0, 0.0))
+    before.metrics = [replace(metric, truth=True) for metric in before.metrics]
+    assert [change.allowed for change in check_step(before, after).beyond] == [0.0]
+    assert check_step(before, ended({"x": (1.0, "")})).verdict == "fine"
 
 
 def test_a_requirement_that_comes_out_differently():
