@@ -351,6 +351,10 @@ def _check_declarations(cls: type[Component]) -> None:
             )
         if isinstance(declaration, Noise) and cls.declarations.get(declaration.hold.name) is not declaration.hold:
             raise ComponentError(f"{where}: hold must be a Parameter of the same component")
+        if isinstance(declaration, Input) and declaration.flag is not None:
+            flag = cls.declarations.get(declaration.flag.name)
+            if not isinstance(flag, Input) or flag.type is not bool or flag.shape:
+                raise ComponentError(f"{where}: its flag must be a boolean Input of the same component, not an array")
         if isinstance(declaration, State | Tape) and declaration.type is not float:
             raise ComponentError(f"{where}: a {type(declaration).__name__} is a real number")
         taken = name in Component.__annotations__ or hasattr(Component, name)

@@ -128,11 +128,24 @@ class Parameter(Variable):
 
 
 class Input(Variable):
-    """A signal from outside, constant during a communication step. ``optional`` ones may stay unconnected."""
+    """A signal from outside, constant during a communication step. ``optional`` ones may stay unconnected.
 
-    def __init__(self, unit: str | Data = "1", start: Any = 0.0, *, optional: bool = False, **rest: Any) -> None:
+    With a ``flag``, a boolean input of the same component, the equations read it only where that is true: it may stay
+    unconnected while the flag is false, and whoever connects it says what the flag is.
+    """
+
+    def __init__(
+        self,
+        unit: str | Data = "1",
+        start: Any = 0.0,
+        *,
+        optional: bool = False,
+        flag: Input | None = None,
+        **rest: Any,
+    ) -> None:
         super().__init__(unit, start, **rest)
-        self.optional = optional
+        self.optional = optional or flag is not None
+        self.flag = flag
 
 
 class Output(Variable):

@@ -27,6 +27,7 @@ class Annotation:
         note: what a user must know.
         requires: packages that it imports.
         optional_inputs: names of inputs that may stay unconnected.
+        flags: for inputs that are read only where a boolean input is true, its name.
         unused_inputs: names of inputs that nothing is computed from: a port has them, this component does without.
         recommended_step: longest advisable communication step in s.
         sampled: whether it acts at samples.
@@ -41,6 +42,7 @@ class Annotation:
     note: str = ""
     requires: tuple[str, ...] = ()
     optional_inputs: tuple[str, ...] = ()
+    flags: Mapping[str, str] = field(default_factory=dict)
     unused_inputs: tuple[str, ...] = ()
     recommended_step: float | None = None
     sampled: bool = False
@@ -59,6 +61,7 @@ def write(annotation: Annotation, root: Any) -> None:
         "note": annotation.note,
         "requires": " ".join(annotation.requires),
         "optionalInputs": " ".join(annotation.optional_inputs),
+        "flags": json.dumps(annotation.flags, sort_keys=True) if annotation.flags else "",
         "unusedInputs": " ".join(annotation.unused_inputs),
         "recommendedStep": "" if step is None else repr(float(step)),
         "sampled": "true" if annotation.sampled else "",
@@ -77,6 +80,7 @@ def read(root: Any) -> Annotation | None:
     if element is None:
         return None
     step, arguments = element.get("recommendedStep"), json.loads(element.get("arguments", "{}"))
+    flags = json.loads(element.get("flags", "{}"))
     return Annotation(
         component=element.get("name", ""),
         arguments=arguments if isinstance(arguments, dict) else {},
@@ -87,6 +91,7 @@ def read(root: Any) -> Annotation | None:
         note=element.get("note", ""),
         requires=tuple(element.get("requires", "").split()),
         optional_inputs=tuple(element.get("optionalInputs", "").split()),
+        flags={str(k): str(v) for k, v in flags.items()} if isinstance(flags, dict) else {},
         unused_inputs=tuple(element.get("unusedInputs", "").split()),
         recommended_step=float(step) if step else None,
         sampled=element.get("sampled") == "true",

@@ -119,6 +119,11 @@ class Interface:
         return frozenset(self.annotation.optional_inputs if self.annotation else ())
 
     @cached_property
+    def flags(self) -> Mapping[str, str]:
+        """For inputs of one of our own FMUs that are read only where a boolean input is true, its name."""
+        return self.annotation.flags if self.annotation else {}
+
+    @cached_property
     def unused_inputs(self) -> frozenset[str]:
         """Inputs that one of our own FMUs computes nothing from."""
         return frozenset(self.annotation.unused_inputs if self.annotation else ())

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Container, Iterable, Iterator, Mapping, Sequence
 
 from ..fmi import Interface, Variable
 from ..names import SignalName
@@ -32,9 +32,32 @@ def check_inputs(system: System, interfaces: Mapping[str, Interface], wiring: Wi
         ]
         if interface.annotation:
             origin = system.instances[instance].origin
+            flagged = _flagged(instance, interface, fed, wiring)
+            wiring.problems += [problem.at(origin) for problem in flagged if problem.names[0] not in broken]
             wiring.problems += [_unfed(SignalName(instance, variable.name)).at(origin) for variable in open_inputs]
         else:
             wiring.notes += _kept(instance, open_inputs)
+
+
+def _flagged(
+    instance: str, interface: Interface, fed: Container[tuple[str, str, int]], wiring: Wiring
+) -> Iterator[Problem]:
+    """Inputs that a flag makes matter though nothing feeds them, and fed ones whose flag nobody thought of."""
+    given, variables = wiring.starts[instance], interface.variables
+    for name, flag in interface.flags.items():
+        if name in interface.unused_inputs or not {name, flag} <= variables.keys():
+            continue
+        signal, driver = SignalName(instance, name), SignalName(instance, flag)
+        is_fed, is_driven = (_slot(instance, variables[one]) in fed for one in (name, flag))
+        is_set = is_driven or bool(given.get(flag, variables[flag].start))
+        if is_set and not is_fed and name not in given:
+            what = "is connected" if is_driven else "is true"
+            way_out = f"leave {driver} unconnected" if is_driven else f"set {driver} = false"
+            message = f"{signal} is read, because {driver} {what}, and nothing feeds it"
+            yield Problem("", message, f"connect it, or {way_out}", (signal, driver))
+        elif is_fed and not is_set and flag not in given:
+            message = f"{signal} is connected, but {driver} is false by itself, so that it is not read"
+            yield Problem("", message, f"set {driver} = true, or = false if that is meant", (signal, driver))
 
 
 def _targets(system: System, interfaces: Mapping[str, Interface]) -> Iterable[SignalName]:

@@ -214,6 +214,14 @@ def test_a_size_too_small_for_an_array_says_so():
     assert message(lambda: Pairs(cars=1)) == "Pairs: cars = 1 leaves an array of length -1; take at least 2"
 
 
+@pytest.mark.parametrize("flag", [Input("1", 0.0), Input("1", False, shape=(2,)), Input("1", False)])
+def test_a_flag_is_a_boolean_input_of_the_same_component(flag):
+    """The last one is such an input, but of no component."""
+    names = {"flag": flag} if flag.shape or flag.type is float else {}
+    with pytest.raises(ComponentError, match=r"Case\.u: its flag must be a boolean Input of the same component"):
+        type("Case", (Component,), names | {"u": Input("m", flag=flag)})
+
+
 def test_equations_cannot_assign(samples):
     text = message(lambda: setattr(samples.Counter(), "total", 1.0))
     assert text.startswith("Counter.total cannot be assigned: the methods are pure")

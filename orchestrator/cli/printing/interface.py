@@ -37,6 +37,7 @@ def _show_variables(out: Console, title: str, variables: Sequence[Variable], int
         cells = [v.name, v.fmi_type or v.type, v.unit or ""]
         cells += ["" if v.start is None else _start(v.start)] if starts else []
         hint = "optional" if v.name in interface.optional_inputs else ""
+        hint = f"read where {interface.flags[v.name]}" if v.name in interface.flags else hint
         hint = f"{hint}, not used".strip(", ") if v.name in interface.unused_inputs else hint
         hint = "tunable" if v.causality == "parameter" and v.variability == "tunable" else hint
         hint = ", ".join([*([hint] if hint else []), *(f"{name} = {value}" for name, value in v.choices)])

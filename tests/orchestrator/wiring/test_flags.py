@@ -1,0 +1,83 @@
+"""Inputs that a flag makes matter, and those whose flag was forgotten; declared by the component, of any name."""
+
+import pytest
+from railcosim.orchestrator.system import System
+
+BODY = """
+from railcosim.components.maths import where
+
+
+class Source(Base):
+    y = Output("m")
+    on = Output("1", bool)
+
+    def outputs(self):
+        return {"y": 1.0, "on": True}
+
+
+class Listener(Base):
+    there = Input("1", False, optional=True)
+    near = Input("1", True, optional=True)
+    signal = Input("m", flag=there)
+    row = Input("m", shape=(2,), flag=there)
+    ignored = Input("m", flag=there)
+    close = Input("m", flag=near)
+    y = Output("m")
+
+    def outputs(self):
+        signal = where(self.there, self.signal + self.row[0] + self.row[1], 0.0)
+        return {"y": signal + where(self.near, self.close, 0.0)}
+"""
+
+
+@pytest.fixture
+def told(components, resolve):
+    """The problems of a listener with these start values and connections, as text."""
+    mine = components(BODY)
+
+    def run(starts, connections=()):
+        system = System()
+        system.add("source", mine("Source"))
+        system.add(
+            "b",
+            mine("Listener"),
+            **{name: value for name, value in ({"near": False} | starts).items() if value is not None},
+        )
+        for output, target in connections:
+            system.connect(f"source.{output}", f"b.{target}")
+        return [str(problem) for problem in resolve(system).problems]
+
+    return run
+
+
+def test_a_true_flag_makes_its_inputs_matter(told):
+    """All that are used: `ignored` is not."""
+    assert told({"there": True}) == [
+        f"b.{name} is read, because b.there is true, and nothing feeds it; connect it, or set b.there = false"
+        for name in ("signal", "row[1]", "row[2]")
+    ]
+    assert told({"there": True, "row": 0.0}, [("y", "signal")]) == []
+
+
+def test_a_flag_that_is_true_by_itself_does_too(told):
+    (problem,) = told({"near": None})
+    assert problem.startswith("b.close is read, because b.near is true, and nothing feeds it")
+    assert told({"near": None, "close": 3.0}) == []
+
+
+def test_a_connected_flag_may_be_true(told):
+    problems = told({"row": 0.0}, [("on", "there")])
+    assert problems == [
+        "b.signal is read, because b.there is connected, and nothing feeds it; connect it, or leave b.there unconnected"
+    ]
+
+
+def test_a_forgotten_flag_is_told_and_one_that_is_meant_is_not(told):
+    (problem,) = told({}, [("y", "signal")])
+    assert problem.startswith("b.signal is connected, but b.there is false by itself, so that it is not read; set ")
+    assert told({"there": False}, [("y", "signal")]) == []
+    assert told({}, [("y", "ignored")]) == []
+
+
+def test_nothing_is_said_of_what_is_left_alone(told):
+    assert told({}) == []
