@@ -61,7 +61,7 @@ def write(annotation: Annotation, root: Any) -> None:
         "note": annotation.note,
         "requires": " ".join(annotation.requires),
         "optionalInputs": " ".join(annotation.optional_inputs),
-        "flags": json.dumps(annotation.flags, sort_keys=True) if annotation.flags else "",
+        "flags": json.dumps(annotation.flags) if annotation.flags else "",
         "unusedInputs": " ".join(annotation.unused_inputs),
         "recommendedStep": "" if step is None else repr(float(step)),
         "sampled": "true" if annotation.sampled else "",

@@ -40,7 +40,7 @@ def check_inputs(system: System, interfaces: Mapping[str, Interface], wiring: Wi
 
 
 def _flagged(
-    instance: str, interface: Interface, fed: Container[tuple[str, str, int]], wiring: Wiring
+    instance: str, interface: Interface, fed: Container[tuple[str, str, int, int]], wiring: Wiring
 ) -> Iterator[Problem]:
     """Inputs that a flag makes matter though nothing feeds them, and fed ones whose flag nobody thought of."""
     given, variables = wiring.starts[instance], interface.variables
