@@ -84,6 +84,10 @@ def cut(line: str, length: int = 500) -> str:
     return line if len(line) <= length else f"{line[:length]}... ({len(line) - length} more characters)"
 
 
+class RollbackError(FmuError):
+    """An FMU that discarded a step does not go on from where it is: it may if it is restored first."""
+
+
 class LostError(FmuError):
     """The process of an isolated FMU is gone: it crashed, hung or used too much memory."""
 

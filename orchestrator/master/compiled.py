@@ -64,7 +64,9 @@ class CompiledLoop:
     @classmethod
     def of(cls, coupling: Coupling, algorithm: Explicit) -> CompiledLoop | None:
         """One that takes these steps, where the kernel is there and can do all that is asked for."""
-        able = kernel is not None and all(isinstance(slave, FmuSlave) for slave in coupling.slaves.values())
+        able = kernel is not None and all(
+            isinstance(x, FmuSlave) and not x.rolls_back for x in coupling.slaves.values()
+        )
         held = not coupling.settings.stepping.extrapolation and coupling.loops is None and coupling.refresher is None
         return cls(coupling, algorithm) if able and held and "String" not in coupling.exchange.kinds else None
 

@@ -2,22 +2,24 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Collection, Iterator
 from contextlib import contextmanager
 
 from ..fmi import Slave
+from ..fmi.binding import LoadedSlave
 from ..isolation import instantiate
 from ..master import Master, Settings
 from .checking import Checked
 
 
 @contextmanager
-def assembled(checked: Checked, *, threads: int = 1) -> Iterator[Master]:
+def assembled(checked: Checked, *, threads: int = 1, restoring: Collection[str] = ()) -> Iterator[Master]:
     """A master of all instances, each in a process of its own if it asks for that; they are freed at the end.
 
     Args:
         checked: the system, found fit to run.
         threads: how many step instances in parallel.
+        restoring: instances that are restored after steps that they discard.
 
     Raises:
         FmuError: an instance cannot be loaded or instantiated.
@@ -26,7 +28,9 @@ def assembled(checked: Checked, *, threads: int = 1) -> Iterator[Master]:
     slaves: dict[str, Slave] = {}
     try:
         for name, model in checked.models.items():
-            slaves[name] = instantiate(model, system.instances[name])
+            slaves[name] = slave = instantiate(model, system.instances[name])
+            if name in restoring and isinstance(slave, LoadedSlave):
+                slave.rolls_back = True
         yield Master(
             slaves,
             checked.order.sequence,

@@ -7,7 +7,7 @@ import signal
 import threading
 import time as clock
 from collections.abc import Callable, Iterator, Mapping
-from contextlib import contextmanager
+from contextlib import AbstractContextManager, contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -15,7 +15,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ..errors import RunError, ScenarioError, StoppedError
+from ..errors import RollbackError, RunError, ScenarioError, StoppedError
 from ..fmi import Interface, Kind, Slave
 from ..master import ALGORITHMS, Master, Rows
 from . import record as record_file
@@ -77,6 +77,8 @@ class Session:
         self._watching: Watching | None = None
         self._slaves: Mapping[str, Slave] = {}
         self._stopped = threading.Event()
+        self._restoring: list[str] = []
+        self._is_complete = False
 
     def run(self, begin: float, complete: Callable[[], None]) -> None:
         """Run from the first to the last point; a failing model is no exception here but a status.
@@ -90,23 +92,39 @@ class Session:
         """
         with _interruptible(self._stopped):
             try:
-                with self._ending(), assembled(self.checked, threads=self.job.threads) as master:
-                    self._slaves = master.slaves
-                    with self._ending():
-                        self._simulate(master, begin)
-                    complete()
-                    return
+                while not self._attempt(begin, complete):
+                    pass
             except BaseException as error:  # initial values that do not settle
                 if self.job.directory is not None:
                     record_file.abandon(self.job.directory, error)
                 raise
-        complete()
+        if not self._is_complete:
+            complete()
+
+    def _attempt(self, begin: float, complete: Callable[[], None]) -> bool:
+        """Run; False where it has to be begun anew, with an instance restored after steps that it discards."""
+        try:
+            with self._ending(), self._assembled() as master:
+                self._slaves = master.slaves
+                with self._ending():
+                    self._simulate(master, begin)
+                complete()
+                self._is_complete = True
+        except RollbackError as error:
+            self._restoring.append(error.instance)
+            return False
+        return True
+
+    def _assembled(self) -> AbstractContextManager[Master]:
+        return assembled(self.checked, threads=self.job.threads, restoring=self._restoring)
 
     @contextmanager
     def _ending(self) -> Iterator[None]:
         """Make a status of what ends a run."""
         try:
             yield
+        except RollbackError:
+            raise
         except StoppedError as error:
             self.status, self.error = "terminated", error
         except RunError as error:
@@ -123,6 +141,10 @@ class Session:
             if self._recorder is not None:
                 self._recorder.close()
             self.coupling = master.report()
+            if self._restoring:
+                names = ", ".join(self._restoring)
+                told = f"{names} discards steps, and is restored before it goes on: the run was begun anew for that"
+                self.coupling["rollback"] = {"instances": list(self._restoring), "summary": told}
         master.terminate()
 
     def disturbances(self) -> list[str]:

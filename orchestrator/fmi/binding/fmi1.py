@@ -14,8 +14,9 @@ from fmpy.logging import addLoggerProxy
 from lxml import etree
 
 from .libraries import Signatures
-from .loaded import DISCARD, OK, WARNING, LoadedSlave
+from .loaded import LoadedSlave
 from .messages import LOGGER
+from .stepping import DISCARD, OK, WARNING
 
 _LAST_SUCCESSFUL_TIME = 2
 """What fmiGetRealStatus is asked for."""

@@ -14,8 +14,9 @@ from fmpy.logging import addLoggerProxy
 
 from .channel import FmuChannel
 from .libraries import Signatures
-from .loaded import DISCARD, OK, WARNING, LoadedSlave
+from .loaded import LoadedSlave
 from .messages import LOGGER
+from .stepping import DISCARD, OK, WARNING
 
 __all__ = ["FmuChannel", "FmuSlave"]
 

@@ -14,8 +14,9 @@ from fmpy import fmi3
 
 from .arrays import whole_arrays
 from .libraries import Signatures
-from .loaded import DISCARD, OK, WARNING, LoadedSlave
+from .loaded import LoadedSlave
 from .messages import keep_message
+from .stepping import DISCARD, OK, WARNING
 
 _MOST_UPDATES = 1000
 """Updates of discrete states at one event, after which they count as never settling."""

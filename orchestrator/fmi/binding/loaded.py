@@ -1,4 +1,4 @@
-"""What FMUs of every version of FMI share when they are loaded into this process: log, statuses, steps in parts.
+"""What FMUs of every version of FMI share when they are loaded into this process: log, statuses, saved states.
 
 The versions differ in names and arguments of their functions: see `fmi1`, `fmi2` and `fmi3`.
 """
@@ -9,26 +9,23 @@ import ctypes
 import math
 import os
 import struct
-from abc import ABC, abstractmethod
+from abc import abstractmethod
 from collections import deque
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any, ClassVar
 
-from ...errors import FmuError, StoppedError
+from ...errors import FmuError
 from ..interface import Interface, Type
 from ..slave import STATUS, Channel
 from .arrays import prepared
 from .channel import MixedChannel, NegatedChannel
 from .libraries import Signatures, close_library, library, open_library, threads
 from .messages import LOGS, without_head
-from .surroundings import FLOATS, ONE, SMALL, TINY, are_floats_disturbed, kept, mend_floats
+from .stepping import FATAL, OK, PENDING, WARNING, Stepping
+from .surroundings import FLOATS, ONE, SMALL, TINY, kept, mend_floats
 
-OK, WARNING, DISCARD, FATAL, PENDING = 0, 1, 2, 4, 5
-_SHORTEST_PART = 1e-6
-"""The smallest part of a communication step in which an FMU that discards it is asked to take it."""
-_MOST_PARTS = 10_000
 _LOG_LINES = 50
 _NO_INSTANCE = ", and says nothing; the library may belong to another modelDescription.xml, or miss a file or a licence"
 _TIME = struct.Struct("=d")
@@ -36,7 +33,7 @@ STATE_HEAD = _TIME.size
 """Bytes of ours before the FMU's own in a serialized state: the time."""
 
 
-class LoadedSlave(ABC):
+class LoadedSlave(Stepping):
     """An FMU loaded into this process.
 
     Args:
@@ -72,7 +69,7 @@ class LoadedSlave(ABC):
     ) -> None:
         self.name = name
         self.interface = interface
-        self.time = 0.0
+        self.time, self.rolls_back = 0.0, False
         self.log: deque[str] = deque(maxlen=_LOG_LINES) if log is None else log
         self._dead = False
         self._events = events
@@ -228,83 +225,6 @@ class LoadedSlave(ABC):
     @abstractmethod
     def exit_initialization(self) -> None:
         """Leave initialization mode."""
-
-    # ---------------------------------------------------------------- steps
-
-    def step(self, time: float, length: float, *, final: bool = True) -> None:
-        """Advance from ``time`` by ``length``, both in s; not ``final`` where an older state may be restored."""
-        self.time = time
-        status = self._attempt(time, length, final, again=False)
-        if ONE + SMALL != ONE or ONE - SMALL != ONE or TINY * ONE == 0.0:
-            self.mend()
-        if status or self._is_cut_short():
-            self.resume(time, length, status, final)
-        self.time = time + length
-
-    def resume(self, time: float, length: float, status: int, final: bool) -> None:
-        """Go on after a step returned something else than ok: an FMU that discarded it may take it in parts.
-
-        The standard (FMI 2.0, 4.2.2) lets an FMU stop early, at its last successful time, or refuse a step that is too
-        long for it. The rest, or half of it, is then tried with the inputs held.
-
-        Raises:
-            StoppedError: it asks for the end of the simulation.
-            FmuError: it failed, or does not get on.
-        """
-        self.time, end, part, shortest = time, time + length, length, _SHORTEST_PART * length
-        for _ in range(_MOST_PARTS):
-            reached = self._reached(time + part, status)
-            if self._stops(status):
-                when = time if reached is None else reached
-                raise StoppedError("asks for the end of the simulation", instance=self.name, time=when)
-            if reached is None:
-                break
-            if reached > end + shortest:
-                raise self._failure(f"says that it got to t = {reached:g} s in the step to t = {end:g} s", status)
-            on = reached > time + shortest
-            time, part = (reached, end - reached) if on else (time, 0.5 * part)
-            self.time = time
-            if time >= end - shortest:
-                return
-            if part < shortest or not self.interface.variable_step:
-                break
-            status = self._attempt(time, part, final, again=not on)
-            if are_floats_disturbed():
-                self.mend()
-        if status in (OK, WARNING, DISCARD):
-            raise self._failure(f"discarded the step{self._why(reached, part)}", DISCARD)
-        self.check(self.DO_STEP, status)
-
-    def _why(self, reached: float | None, part: float) -> str:
-        """Why what is left of a discarded step is not taken in parts, and what a user can do."""
-        if reached is None:
-            return " and does not say how far it got, so that nothing else can be tried"
-        if not self.interface.variable_step:
-            return ", and takes steps of one length only: choose another step"
-        return f", and takes none from there on, not even one of {part:.2g} s"
-
-    def _reached(self, end: float, status: int) -> float | None:
-        """How far a step that was to reach ``end`` came; None if it failed."""
-        if status in (OK, WARNING):
-            reached = self._last_successful_time() if self._is_cut_short() else None
-            return end if reached is None else reached
-        return self._last_successful_time() if status == DISCARD else None
-
-    @abstractmethod
-    def _attempt(self, time: float, part: float, final: bool, *, again: bool) -> int:
-        """Try a step or a part of one; ``again`` where a longer one from the same point was discarded."""
-
-    @abstractmethod
-    def _is_cut_short(self) -> bool:
-        """Whether the last step, though it succeeded, ended before its end."""
-
-    @abstractmethod
-    def _last_successful_time(self) -> float | None:
-        """How far a step came that was discarded or cut short; None if the FMU does not say."""
-
-    @abstractmethod
-    def _stops(self, status: int) -> bool:
-        """Whether the FMU asks for the end of the simulation."""
 
     # ---------------------------------------------------------------- saved states
 

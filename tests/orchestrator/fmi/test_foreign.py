@@ -56,6 +56,40 @@ def test_a_warning_is_no_failure(fmu, go):
     assert (found.code, found.record["status"], found.results["it.x"][-1]) == (0, "completed", 10.0)
 
 
+SAVES = 'canHandleVariableCommunicationStepSize="true" canGetAndSetFMUstate="true"'
+
+
+@BOTH_LOOPS
+@pytest.mark.parametrize("mode", [19, 14])
+def test_one_that_has_to_be_restored_after_a_discarded_step(fmu, go, mode):
+    """Whether it says how far it would get or not; all of the run is there, and how it came about is told."""
+    found = go(fmu(simulation=SAVES), {"it": {"mode": mode, "u": 1.0, "longest": 0.2}})
+    assert (found.code, found.record["status"]) == (0, "completed")
+    assert list(found.results.time) == [0.5 * k for k in range(21)]
+    assert found.results["it.x"] == pytest.approx(found.results.time, abs=1e-12)
+    assert found.results["it.now"] == pytest.approx(found.results.time, abs=1e-12)
+    told = found.record["coupling"]["rollback"]
+    assert told["instances"] == ["it"]
+    assert told["summary"] == "it discards steps, and is restored before it goes on: the run was begun anew for that"
+
+
+@BOTH_LOOPS
+@pytest.mark.parametrize(
+    ("mode", "message"),
+    [
+        (2, "status discard: discarded the step, and takes none from there on, not even one of 4.8e-07 s"),
+        (3, "status error: fmi2DoStep failed"),
+        (4, "status fatal: fmi2DoStep failed"),
+    ],
+)
+def test_to_be_restored_does_not_help_all(fmu, go, mode, message):
+    found = go(fmu(simulation=SAVES), {"it": {"mode": mode, "u": 1.0}})
+    assert (found.code, found.record["status"], found.record["time_reached"]) == (3, "failed", 5.0)
+    assert found.errors[0] == f"error: an FMU failed: it, t = 5 s, {message}"
+    assert list(found.results.time) == [0.5 * k for k in range(11)]
+    assert ("rollback" in found.record["coupling"]) == (mode == 2)
+
+
 @BOTH_LOOPS
 @pytest.mark.parametrize(
     ("mode", "calls"),

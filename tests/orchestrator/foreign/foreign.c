@@ -13,6 +13,8 @@
    10 to 18 discarded steps: 10 gets three fifths of the step done, once; 11 refuses more than `longest`; 12 asks for the
             end; 13 does not say how far it got; 14 is 11 without a word of how far; 15 gets next to nothing done each
             time; 16 claims to be far past the end; 17 is 12 without a word of when; 18 says that it got to NaN
+   19       is 11, but what it got done of a longer step has to be taken back: it says how far it would get, and refuses
+            every step until a saved state is restored
    20 to 24 values: 20, 21, 22: y is NaN, infinite, minus infinite; 23: said has ends of lines; 24: said is no text
    30, 31   the end of the process: a segmentation fault, exit(7)
    40, 50   40 takes 2 ms for each step; 50 refuses a step past the stop time, be it by a rounding error
@@ -198,6 +200,16 @@ int fmi2DoStep(void *c, double time, double step, int final)
     case 11:
     case 14:
         return step > s->reals[6] * (1.0 + 1e-9) ? discard(s, step, 0.0) : advance(s, step);
+    case 19:
+        if (s->stuck) {
+            return tell(s, 3);
+        }
+        if (step > s->reals[6] * (1.0 + 1e-9)) {
+            discard(s, step, s->reals[6] / step);
+            s->stuck = 1;
+            return 2;
+        }
+        return advance(s, step);
     case 12:
     case 17:
         s->ends = 1;
