@@ -75,17 +75,28 @@ def _entry(x: Any, text: str, label: str, entry: int, signals: Signals) -> list[
             (across[row], y[row], _label(expression, resolved, index, row, len(y)), unit) for row in range(len(y))
         ]
     alone, family = len(drawn) == 1, re.sub(r"\W*\{i\}", "", label) or _short(text)
-    return [
-        Curve(abscissa, y, named, entry, member, alone, unit, family, named if alone else _thing(own, member))
-        for member, (abscissa, y, own, unit) in enumerate(drawn)
-        for named in (_named(label, own, alone, member),)
+    things = _things([own for _, _, own, _ in drawn])
+    curves = []
+    for member, (abscissa, y, own, unit) in enumerate(drawn):
+        named = _named(label, own, alone, member)
+        curves.append(Curve(abscissa, y, named, entry, member, alone, unit, family, named if alone else things[member]))
+    return curves
+
+
+def _things(labels: Sequence[str]) -> list[tuple[int, ...]]:
+    """The numbers in the lines' own labels, without those that all of them share.
+
+    Of a range of numbers the last counts: a gap belongs to the train behind it.
+    """
+    found = [
+        tuple(int(number.split("–")[-1].split(",")[-1]) for number in re.findall(r"\d+(?:[–,]\d+)*", label))
+        for label in labels
     ]
-
-
-def _thing(own: str, member: int) -> tuple[int, ...]:
-    """The numbers in a line's own label; of a range of them the last, as the gap belongs to the train behind."""
-    numbers = tuple(int(found.split("–")[-1].split(",")[-1]) for found in re.findall(r"\d+(?:[–,]\d+)*", own))
-    return numbers or (member + 1,)
+    if len(set(map(len, found))) != 1:
+        return [(k + 1,) for k in range(len(found))]
+    telling = [k for k, numbers in enumerate(zip(*found, strict=True)) if len(set(numbers)) > 1]
+    things = [tuple(numbers[k] for k in telling) for numbers in found]
+    return things if len(set(things)) == len(things) else [(k + 1,) for k in range(len(found))]
 
 
 def _across(x: Any, signals: Signals, index: int | None, constants: Mapping[str, Any]) -> Array:

@@ -6,7 +6,7 @@ from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
 
 from .curves import Curve
-from .style import COLOURS, colour
+from .style import colour
 
 Figure = Sequence[Sequence[Curve]]
 """The curves of a figure, panel by panel."""
@@ -36,19 +36,12 @@ class Palette:
 
 
 def ranks(figure: Figure) -> dict[tuple[int, ...], tuple[int, int]]:
-    """The rank of each numbered thing of a figure, and among how many: those with as many numbers.
-
-    Where these are more than there are colours, things that one panel alone shows are ranked there.
-    """
-    shown = [{c.thing for c in panel if isinstance(c.thing, tuple)} for panel in figure]
+    """The rank of each numbered thing of a figure, and among how many: those with as many numbers."""
     found: dict[tuple[int, ...], tuple[int, int]] = {}
-    for length in {len(thing) for things in shown for thing in things}:
-        alike = [{thing for thing in things if len(thing) == length} for things in shown]
-        groups = [set().union(*alike)]
-        if len(groups[0]) > len(COLOURS) and sum(map(len, alike)) == len(groups[0]):
-            groups = alike
-        for group in groups:
-            found |= {thing: (rank, len(group)) for rank, thing in enumerate(sorted(group))}
+    shown = {c.thing for panel in figure for c in panel if isinstance(c.thing, tuple)}
+    for length in {len(thing) for thing in shown}:
+        alike = sorted(thing for thing in shown if len(thing) == length)
+        found |= {thing: (rank, len(alike)) for rank, thing in enumerate(alike)}
     return found
 
 

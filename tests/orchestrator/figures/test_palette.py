@@ -23,12 +23,16 @@ def test_numbers_of_cars_and_of_trains_are_things_apart(drawn):
     assert len(set(cars.values())) == 4
 
 
-def test_more_things_than_colours_are_told_apart_in_their_own_panels(drawn):
-    """Nine cars in three panels of their own three, but twelve in one panel along a scale."""
-    axes = drawn(panels=[{"y": [f"car[{k}:{k + 2}].speed"]} for k in (1, 4, 7)])
-    assert [list(colours(ax).values()) for ax in axes] == [list(COLOURS[:3])] * 3
-    axes = drawn(panels=[{"y": ["car[:].speed"]}, {"y": ["car[1:3].speed"]}])
-    every, some = map(colours, axes)
+def test_numbers_that_all_lines_of_an_entry_share_tell_nothing(drawn):
+    """The cars of one consist are cars as those of the other; the first car of each consist stands for the consist."""
+    first, second = map(colours, drawn(panels=[{"y": [f"consist[{k}].force[:]"]} for k in (1, 2)]))
+    assert list(first.values()) == list(second.values()) == list(COLOURS[:2])
+    trains, heads = map(colours, drawn(panels=[{"y": ["train[1:2].speed"]}, {"y": ["consist[:].force[1]"]}]))
+    assert list(trains.values()) == list(heads.values())
+
+
+def test_more_things_than_colours_are_told_apart_along_a_scale(drawn):
+    every, some = map(colours, drawn(panels=[{"y": ["car[:].speed"]}, {"y": ["car[1:3].speed"]}]))
     assert some.items() <= every.items()
     assert len({str(colour) for colour in every.values()}) == 12
 

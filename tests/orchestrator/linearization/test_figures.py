@@ -2,6 +2,7 @@
 
 from dataclasses import replace
 
+import numpy as np
 import pytest
 from matplotlib.figure import Figure
 from railcosim.orchestrator.linearization.figures import draw_linear, unit_of_ratio
@@ -41,3 +42,25 @@ def test_a_bode_diagram_has_the_unit_of_output_over_input(a_model, tmp_path, mon
     draw_linear(model, stability(model), [], tmp_path)
     assert labels["bode.png"] == ["train speed\n|G| [s]", "phase [°]"]
     assert labels["step-u0.png"] == ["train speed [m/s]"]
+
+
+def test_figures_are_written_in_the_format_asked_for(a_model, tmp_path):
+    model = a_model([[-1.0]], [1.0], [1.0], outputs=["train.speed"])
+    paths = draw_linear(model, stability(model), [], tmp_path, format="svg", dpi=50.0)
+    assert [path.name for path in paths] == ["eigenvalues.svg", "step-u0.svg", "bode.svg"]
+    assert all(path.read_text(encoding="utf-8").startswith("<?xml") for path in paths)
+
+
+def test_a_gap_has_the_colour_of_the_train_behind_it_in_all_panels(a_model, tmp_path, monkeypatch):
+    kept = {}
+
+    def keep(figure, path, **_):
+        kept[path.name] = [{line.get_label(): line.get_color() for line in ax.lines} for ax in figure.axes]
+
+    monkeypatch.setattr(Figure, "savefig", keep)
+    names = [f"train[{i}].{what}" for what in ("position", "speed") for i in (1, 2, 3)]
+    model = a_model(-np.eye(6), [1.0] * 6, np.eye(6), outputs=names)
+    draw_linear(model, stability(model), [], tmp_path)
+    gaps, speeds = kept["step-u0.png"]
+    assert gaps == {"train 1 – 2": speeds["train 2"], "train 2 – 3": speeds["train 3"]}
+    assert len(set(speeds.values())) == 3
