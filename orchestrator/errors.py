@@ -40,6 +40,13 @@ class WindowError(ExpressionError):
     """A time window that the recorded points do not cover: a value for it would be a guess."""
 
 
+class SignalError(RailcosimError, KeyError):
+    """There is no such signal; the message names those there are."""
+
+    def __str__(self) -> str:
+        return str(self.args[0])  # not its repr, as a KeyError has it
+
+
 class FmuFileError(RailcosimError, ValueError):
     """An archive that cannot be used as an FMU."""
 

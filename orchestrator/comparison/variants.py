@@ -54,6 +54,11 @@ class Variant:
         """Whether something was found in its run with which it can win nothing."""
         return self.run is not None and any(finding.spoils for finding in self.run.findings)
 
+    def problem(self, metric: str) -> str:
+        """Why a metric of a completed run has no value; empty where it has one."""
+        metrics = self.run.metrics if self.run is not None and self.run.status == "completed" else ()
+        return next((m.problem.removeprefix(f"'{m.expression}': ") for m in metrics if m.name == metric), "")
+
     def value(self, metric: str, index: int | None) -> float:
         """A metric of a completed run, NaN where there is none."""
         if self.run is None or self.run.status != "completed":
@@ -66,7 +71,7 @@ class Row:
     """One metric, or one index of it, over all variants; NaN where a variant has none.
 
     ``winners`` are the places of the best values, of variants that can win; empty where there is no better, or all are
-    equal. ``truth`` says that 1 is true and 0 false.
+    equal. ``truth`` says that 1 is true and 0 false. ``problem`` says why a value is missing.
     """
 
     metric: str
@@ -76,6 +81,7 @@ class Row:
     values: tuple[float, ...]
     winners: tuple[int, ...]
     truth: bool = False
+    problem: str = ""
 
     @property
     def name(self) -> str:
@@ -266,13 +272,14 @@ def _rows(columns: Sequence[Variant], directions: Mapping[str, Better]) -> list[
     rows = []
     for (name, index), (unit, direction, truth) in sorted(known.items(), key=lambda item: order[item[0][0]]):
         values = tuple(variant.value(name, index) for variant in columns)
-        rows.append(Row(name, index, unit, direction, values, winners(values, direction, barred), truth))
+        problem = next(filter(None, (variant.problem(name) for variant in columns)), "")
+        rows.append(Row(name, index, unit, direction, values, winners(values, direction, barred), truth, problem))
     return rows
 
 
 def _draw(comparison: Comparison, directory: Path) -> list[Path]:
-    done = {v.name: v.run.results for v in comparison.variants if v.run and len(v.run.results)}
-    first = next((v.run for v in comparison.variants if v.run and len(v.run.results)), None)
+    done = {v.name: v.run.results for v in comparison.variants if v.run and len(v.run.time)}
+    first = next((v.run for v in comparison.variants if v.run and len(v.run.time)), None)
     return draw_compared(first.system.judged.figures, done, directory) if first else []
 
 
@@ -304,6 +311,7 @@ def write_json(comparison: Comparison, path: Path) -> None:
                 "better": row.better,
                 "values": dict(zip(comparison.names, map(_finite, row.values), strict=True)),
                 "winners": [comparison.names[k] for k in row.winners],
+                "problem": row.problem,
             }
             for row in comparison.rows
         ],

@@ -212,7 +212,7 @@ def _completed(session: Session, figures: bool) -> Run:
     outcome.notes += session.disturbances()
     evaluate(outcome)
     if job.directory is not None:
-        if figures and len(outcome.results):
+        if figures and len(outcome.time):
             outcome.figures = draw(checked.system.judged.figures, outcome.results, job.directory)
         record_file.finish(job.directory, outcome, job.kind)
     return outcome
@@ -221,7 +221,7 @@ def _completed(session: Session, figures: bool) -> Run:
 def evaluate(outcome: Run) -> None:
     """Fill in metrics, verdicts and known values from what was recorded."""
     system, results = outcome.system, outcome.results
-    if not len(results):
+    if not len(results.time):
         return
     outcome.metrics = evaluate_metrics(system.judged.metrics, results)
     outcome.requirements = judge_requirements(system.judged.requirements, results)

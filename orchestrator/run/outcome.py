@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection
+from collections.abc import Collection, Iterator, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, Literal
@@ -17,12 +17,14 @@ from .checking import Checked
 from .results import Results
 from .watching import Finding
 
+_SHOWN, _LONGEST = 3, 1500
+"""Findings, and characters of what is said of a run, that its representation has."""
 Status = Literal["completed", "terminated", "interrupted", "failed"]
 
 
-@dataclass
-class Run:
-    """What came out of a run; ``run["train[1].speed"]`` is a recorded signal over ``run.time``.
+@dataclass(eq=False, repr=False)
+class Run(Mapping[str, NDArray[Any]]):
+    """What came out of a run: a mapping from signals, such as ``"train[1].speed"``, to arrays over ``run.time``.
 
     Attributes:
         results: recorded signals. metrics, requirements: evaluated tables.
@@ -60,6 +62,34 @@ class Run:
 
     def __getitem__(self, name: str) -> NDArray[Any]:
         return self.results[name]
+
+    def __contains__(self, name: object) -> bool:
+        return name in self.results
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(self.results)
+
+    def __len__(self) -> int:
+        return len(self.results)
+
+    def __bool__(self) -> bool:
+        return True  # a run is there, whatever it recorded
+
+    def __eq__(self, other: object) -> bool:
+        return self is other
+
+    __hash__ = object.__hash__
+
+    def __repr__(self) -> str:
+        name = " ".join(filter(None, (self.system.provenance.name, self.system.provenance.preset)))
+        facts = [f"{self.status}{f': {self.error}' if self.error else ''}", f"{len(self.metrics)} metrics"]
+        passed = sum(verdict.verdict == "pass" for verdict in self.requirements)
+        facts += [f"{passed} of {len(self.requirements)} requirements pass"] if self.requirements else []
+        facts += [str(finding) for finding in self.findings[:_SHOWN]]
+        facts += [f"{len(self.findings) - _SHOWN} more findings"] if len(self.findings) > _SHOWN else []
+        facts += [f"files in {self.directory}"] if self.directory else []
+        text = "; ".join(facts)
+        return f"<Run of {name}: {text if len(text) <= _LONGEST else text[:_LONGEST] + '...'}; {self.results!r}>"
 
     def names(self) -> Collection[str]:
         """All recorded signals."""

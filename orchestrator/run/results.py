@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 import time as clock
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -12,15 +12,18 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ..errors import ScenarioError
+from ..errors import ScenarioError, SignalError
 from ..master import Rows
+from .missing import missing_signal, shortened
 from .rows import Writer, read_rows
 
 _FLUSH_SECONDS = 1.0
 
 
-class Results:
-    """Recorded points of a run; ``results["train[1].speed"]`` is an array over ``results.time``.
+class Results(Mapping[str, NDArray[Any]]):
+    """Recorded points of a run: a mapping from signals, such as ``"train[1].speed"``, to arrays over ``results.time``.
+
+    Its length is that of a mapping, the number of signals; ``len(results.time)`` is the number of points.
 
     Attributes:
         time: shape (T,), s.
@@ -56,10 +59,28 @@ class Results:
         return self._columns.keys()
 
     def __getitem__(self, name: str) -> NDArray[Any]:
-        return self._columns[name]
+        try:
+            return self._columns[name]
+        except (KeyError, TypeError):
+            raise SignalError(missing_signal(name, self._columns, self.parameters)) from None
+
+    def __contains__(self, name: object) -> bool:
+        return name in self._columns
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(self._columns)
 
     def __len__(self) -> int:
-        return len(self.time)
+        return len(self._columns)
+
+    def __eq__(self, other: object) -> bool:
+        return self is other  # arrays are not equal or unequal as a whole
+
+    __hash__ = object.__hash__
+
+    def __repr__(self) -> str:
+        span = f" from {self.time[0]:g} to {self.time[-1]:g} s" if len(self.time) else ""
+        return f"<Results of {len(self)} signals at {len(self.time)} points{span}: {shortened(self)}>"
 
     @classmethod
     def load(cls, directory: str | Path) -> Results:

@@ -290,10 +290,10 @@ def rows_before(job: Job) -> NDArray[Any] | None:
     if job.begin is None or job.directory is None:
         return None
     before, rows = Results.load(job.directory), job.begin.rows
-    if len(before) < rows:
+    if len(before.time) < rows:
         raise ScenarioError(
-            f"{job.directory} cannot be resumed: its results have {len(before)} rows, fewer than the {rows} of its "
-            "checkpoint"
+            f"{job.directory} cannot be resumed: its results have {len(before.time)} rows, fewer than the {rows} of "
+            "its checkpoint"
         )
     if len(before.names()) != job.begin.width or not before.time[rows - 1] <= job.begin.time:
         raise ScenarioError(f"{job.directory} cannot be resumed: its results and its checkpoint are of different runs")

@@ -11,7 +11,7 @@ from rich.text import Text
 from ...comparison import Comparison
 from .console import and_figures, open_console, say, show_notes
 from .findings import show_findings
-from .tables import fits, number, prefixed, table, verdict
+from .tables import fits, number, prefixed, show_reasons, table, verdict
 
 _BEST = "bold green"
 
@@ -51,6 +51,7 @@ def _show_tables(out: Console, comparison: Comparison) -> None:
         metrics = _metrics(comparison, heads)
     if comparison.rows:
         out.print(metrics)
+        show_reasons(out, "no value", ((row.name, row.problem) for row in comparison.rows if row.problem))
     if comparison.verdicts():
         out.print(_verdicts(comparison, heads))
     out.print()

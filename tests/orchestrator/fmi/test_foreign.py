@@ -101,7 +101,7 @@ def test_to_be_restored_does_not_help_all(fmu, go, mode, message):
 def test_a_discarded_step_is_taken_in_parts(fmu, go, mode, calls):
     found = go(fmu(), {"it": {"mode": mode, "u": 1.0, "longest": 0.2}})
     assert (found.code, found.record["status"]) == (0, "completed")
-    assert (found.results["it.calls"][-1], len(found.results)) == (calls, 21)
+    assert (found.results["it.calls"][-1], len(found.results.time)) == (calls, 21)
     assert found.results["it.x"] == pytest.approx(found.results.time, abs=1e-12)
     assert found.results["it.now"] == pytest.approx(found.results.time, abs=1e-12)
 
@@ -289,7 +289,7 @@ def test_several_names_of_one_variable(fmu, go, v, numbers):
 
 def test_no_variables(fmu, go):
     found = go(fmu([]))
-    assert (found.code, found.record["status"], len(found.results)) == (0, "completed", 21)
+    assert (found.code, found.record["status"], len(found.results.time)) == (0, "completed", 21)
     assert list(found.results.names()) == []
     assert "Element 'ModelVariables'" in found.notes[0]
 

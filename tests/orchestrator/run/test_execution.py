@@ -289,7 +289,7 @@ import sys
 from railcosim.orchestrator.run.execution import run
 from railcosim.orchestrator.system import System
 
-system = System(stop_time=1e6, step=1e-3)
+system = System(stop_time=3e3, step=1e-3)
 system.add("train", "PointMassTrain", speed=20.0, force=0.0)
 system.add("gust", "Gust")
 system.connect("gust.acceleration", "train.disturbance")
@@ -323,7 +323,7 @@ def endless(tmp_path):
 
 def steady(loaded):
     """Whether what was read back is the run without a gap, from its beginning on."""
-    return np.array_equal(loaded.time, np.arange(len(loaded)) * 1e-3) and loaded["train.speed"][0] == 20.0
+    return np.array_equal(loaded.time, np.arange(len(loaded.time)) * 1e-3) and loaded["train.speed"][0] == 20.0
 
 
 @BOTH
@@ -337,7 +337,7 @@ def test_ctrl_c_stops_cleanly(endless, kind):
     assert not loaded.completed
     assert record(path)["status"] == "interrupted"
     assert record(path)["time_reached"] == loaded.time[-1]
-    assert record(path)["seconds"]["steps"] == len(loaded) - 1
+    assert record(path)["seconds"]["steps"] == len(loaded.time) - 1
     assert (path / "metrics.json").exists()
 
 
@@ -347,7 +347,7 @@ def test_a_killed_run_leaves_what_was_flushed(endless):
     process.wait()
     loaded = Results.load(path)
     assert steady(loaded)
-    assert len(loaded) > 50
+    assert len(loaded.time) > 50
     assert not loaded.completed
     assert record(path)["status"] == "running"
 

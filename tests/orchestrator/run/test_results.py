@@ -2,6 +2,7 @@
 
 import json
 import math
+from collections.abc import Mapping
 
 import fmpy.util
 import numpy as np
@@ -9,7 +10,7 @@ import pandas as pd
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from railcosim.orchestrator.errors import ScenarioError
+from railcosim.orchestrator.errors import ScenarioError, SignalError
 from railcosim.orchestrator.run import results as module
 from railcosim.orchestrator.run import rows as files
 from railcosim.orchestrator.run.results import Due, Recorder, Results
@@ -129,7 +130,7 @@ def test_a_line_that_was_not_finished_is_left_out(tmp_path, cut):
 def test_a_run_without_a_point(tmp_path):
     saved(tmp_path, ["x"], [], status="failed")
     loaded = Results.load(tmp_path)
-    assert (len(loaded), list(loaded.names()), loaded.completed) == (0, ["x"], False)
+    assert (len(loaded.time), list(loaded.names()), loaded.completed) == (0, ["x"], False)
 
 
 def test_the_record_comes_along(tmp_path):
@@ -186,7 +187,7 @@ def test_what_holds_no_run(tmp_path):
 )
 def test_a_record_that_somebody_has_edited(tmp_path, key, value):
     saved(tmp_path, ["x"], [(0.0, 1.0)])
-    assert len(Results.load(tmp_path)) == 1
+    assert len(Results.load(tmp_path).time) == 1
     (tmp_path / "run.json").write_text(json.dumps(RECORD | {key: value}))
     with pytest.raises(ScenarioError, match=f"its {key} in run.json is not what a run writes there"):
         Results.load(tmp_path)
@@ -207,7 +208,7 @@ def test_rows_reach_the_disk_while_the_run_goes(tmp_path, now):
     recorder = Recorder(["x", "gear"], ["Real", "Integer"], tmp_path)
     assert not (tmp_path / "results.csv").exists(), "of an earlier run"
     assert list(Results.load(tmp_path).names()) == ["x", "gear"]
-    assert len(Results.load(tmp_path)) == 0
+    assert len(Results.load(tmp_path).time) == 0
     for k, moment in enumerate([0.2, 0.9, 1.1, 1.5, 2.0, 2.2]):
         now[0] = moment
         rows = [[float(k), k / 2, k]]
@@ -215,7 +216,7 @@ def test_rows_reach_the_disk_while_the_run_goes(tmp_path, now):
     assert list(Results.load(tmp_path)["x"]) == [0.0, 0.5, 1.0, 1.5, 2.0, 2.5]
     now[0] = 2.3
     recorder.extend([[6.0, 3.0, 6]])
-    assert len(Results.load(tmp_path)) == 6
+    assert len(Results.load(tmp_path).time) == 6
     assert not (tmp_path / "results.csv").exists()
     recorder.close()
     assert (tmp_path / "results.csv").read_text().splitlines()[-2:] == ["5.0,2.5,5", "6.0,3.0,6"]
@@ -284,6 +285,75 @@ def test_single_rows_and_blocks_keep_their_sequence():
     time, columns = recorder.columns()
     assert (list(time), list(columns["x"])) == ([0, 1, 2, 3, 4], [1, 2, 3, 4, 5])
     assert Recorder(["x"], ["Real"], None).columns()[0].shape == (0,)
+
+
+def results(*names, **how):
+    columns = {name: np.arange(3.0) for name in names}
+    parameters = {"train[1].mass": 4e5, "train[2].mass": 4e5}
+    facts = {"units": {}, "parameters": parameters, "step": 0.1, "stop_time": 1.0, "completed": True}
+    return Results(columns, np.arange(3.0), **facts | how)
+
+
+TRAINS = [f"train[{i}].{name}" for i in range(1, 5) for name in ("position", "speed")]
+NAMES = [*TRAINS, "consist.force[1]", "consist.force[2]", "target.value"]
+
+
+def test_results_are_a_mapping():
+    found = results(*NAMES)
+    assert isinstance(found, Mapping)
+    assert list(found) == list(found.keys()) == list(found.names()) == NAMES
+    assert len(found) == len(dict(found)) == len(NAMES)
+    assert "target.value" in found
+    assert "train.speed" not in found
+    assert list(found.values())[2] is found[NAMES[2]]
+    assert found.get("train.speed") is None
+    assert pd.DataFrame(dict(found), index=found.time).shape == (3, len(NAMES))
+    assert found == found  # noqa: PLR0124
+    assert found != results(*NAMES)
+    assert len({found, results()}) == 2
+
+
+@pytest.mark.parametrize(
+    ("name", "told"),
+    [
+        (
+            "train.speed",
+            "there is no signal 'train.speed'; one of each instance: train[1].speed, train[2].speed, train[3].speed, "
+            "train[4].speed",
+        ),
+        ("consist.force", "there is no signal 'consist.force'; its elements are: consist.force[1], consist.force[2]"),
+        ("train[2].sped", "there is no signal 'train[2].sped'; did you mean 'train[2].speed'?"),
+        ("train.sped", "there is no signal 'train.sped'; did you mean 'train.speed'?"),
+        ("train[5].speed", "there is no signal 'train[5].speed'; did you mean 'train[4].speed'?"),
+        (
+            "train[1].mass",
+            "there is no signal 'train[1].mass': that is a parameter, whose value stands in parameters",
+        ),
+        ("train[1].x", "there is no signal 'train[1].x'; train[1] has train[1].position, train[1].speed"),
+        ("target", "there is no signal 'target'; target has target.value"),
+        (
+            "q",
+            "there is no signal 'q'; there are train[1].position, train[1].speed, train[2].position, train[2].speed, "
+            "train[3].position, train[3].speed and 5 more",
+        ),
+        (3, "a signal is asked for by its name, not by 3"),
+        (["a"], "a signal is asked for by its name, not by ['a']"),
+    ],
+)
+def test_who_asks_for_what_is_not_there_is_told_what_is(name, told):
+    with pytest.raises(SignalError) as caught:
+        results(*NAMES)[name]
+    assert str(caught.value) == told
+    assert isinstance(caught.value, KeyError)
+
+
+def test_the_representation_of_results():
+    assert repr(results(*NAMES)) == (
+        "<Results of 11 signals at 3 points from 0 to 2 s: train[i].position, train[i].speed, consist.force[i], "
+        "target.value>"
+    )
+    many = results(*(f"thing{k}.x" for k in range(5000)))
+    assert len(repr(many)) < 200
 
 
 @pytest.mark.parametrize("every", [1, 2, 3, 7, 20])

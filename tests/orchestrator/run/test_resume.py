@@ -143,10 +143,10 @@ def test_after_a_kill_and_a_kill_while_it_was_resumed(mine, tmp_path):
     first = checkpoint.read_checkpoint(out).time
     assert json.loads((out / "run.json").read_text())["status"] == "running"
     assert (out / "results.bin").exists()
-    before = len(Results.load(out))
+    before = len(Results.load(out).time)
     killed("resume", out, first + 3.0)
     point = checkpoint.read_checkpoint(out)
-    assert len(Results.load(out)) >= max(before, point.rows)
+    assert len(Results.load(out).time) >= max(before, point.rows)
     stop = point.time + 5.0
     result = resume(out, stop_time=stop, figures=False)
     assert result.seconds["steps"] == pytest.approx(500)
@@ -174,15 +174,15 @@ def test_nothing_is_lost_whenever_a_resumed_run_is_killed(mine, tmp_path, monkey
         recorder._writer._file.close()  # as the end of its process does
         assert [path.name for path in out.glob("results*")] == ["results.bin"]
     before = Results.load(out)
-    assert len(before) > 30
+    assert len(before.time) > 30
     looks = []
 
     def look(*_):
         now = Results.load(out)
-        looks.append(len(now))
-        assert np.array_equal(now.time[: len(before)], before.time)
+        looks.append(len(now.time))
+        assert np.array_equal(now.time[: len(before.time)], before.time)
         for name in before.names():
-            assert np.array_equal(now[name][: len(before)], before[name])
+            assert np.array_equal(now[name][: len(before.time)], before[name])
 
     def looking(function):
         def wrapped(*arguments, **rest):
@@ -199,7 +199,7 @@ def test_nothing_is_lost_whenever_a_resumed_run_is_killed(mine, tmp_path, monkey
         monkeypatch.setattr(Path, name, looking(getattr(Path, name)))
     result = resume(out, progress=look, figures=False)
     assert result.status == "completed"
-    assert (looks[0], looks[-1]) == (len(before), 41)
+    assert (looks[0], looks[-1]) == (len(before.time), 41)
     assert len(set(looks)) > 5, "the new rows are seen as soon as there are more of them than before"
 
 
@@ -215,7 +215,7 @@ def test_a_stop_before_the_old_end_leaves_the_rows_up_to_there(mine, tmp_path):
 
     result = resume(out, progress=press, figures=False)
     assert result.status == "interrupted"
-    assert len(Results.load(out)) == 32
+    assert len(Results.load(out).time) == 32
     assert json.loads((out / "run.json").read_text())["time_reached"] == pytest.approx(3.1)
     assert not list(out.glob("*.new"))
 
