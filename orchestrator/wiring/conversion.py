@@ -37,12 +37,10 @@ def fit(a: Variable, of_a: Interface, b: Variable, of_b: Interface, connection: 
     if problem := _misfit(a.type, b.type, connection, is_changed=(scale, offset) != (1.0, 0.0)):
         return Conversion(problem=problem)
     found = relate(a, of_a, b, of_b)
-    if connection.scale is not None or offset:  # whoever gives one has taken care of what is not known
-        note = (
-            f"{found.refused.partition(';')[0]}; what is given there is applied to the values" if found.refused else ""
-        )
-        found = found._replace(refused="", undefined="", note=note or found.note)
-    note = found.undefined or found.note or _told(a.type, b.type, connection.threshold)
+    if connection.scale is not None or offset:  # whoever gives one has taken care
+        told = f"{found.refused.partition(';')[0]}; what is given there is applied to the values"
+        found = found._replace(refused="", doubt="", note=told if found.refused else found.note)
+    note = found.doubt or found.note or _told(a.type, b.type, connection.threshold)
     return Conversion(found.scale * scale, found.offset * scale + offset, found.refused, note)
 
 

@@ -17,14 +17,14 @@ class Relation(NamedTuple):
     """What is ``x`` in one unit is ``scale * x + offset`` in the other.
 
     Attributes:
-        refused: why there is no such scale by what the FMUs say. undefined: why that is not known, and values pass as
-            they are. note: what a user should know of it otherwise.
+        refused: why there is no such scale by what the FMUs say. doubt: why it may be another one. A connection's own
+            scale settles both. note: what a user should know of it anyhow.
     """
 
     scale: float = 1.0
     offset: float = 0.0
     refused: str = ""
-    undefined: str = ""
+    doubt: str = ""
     note: str = ""
 
 
@@ -38,7 +38,7 @@ def relate(a: Variable, of_a: Interface, b: Variable, of_b: Interface) -> Relati
         why = f"{unit!r} is not defined in SI units by {model}: what is in {a.unit!r} is taken for {b.unit!r} as it is"
         known = _known(a.unit, b.unit)
         remedy = "where they differ, give the connection a scale" + (f", such as scale = {known!r}" if known else "")
-        return Relation(undefined="" if a.unit == b.unit else f"{why}; {remedy}")
+        return Relation(doubt="" if a.unit == b.unit else f"{why}; {remedy}")
     if a.unit == b.unit:
         note = f"{of_a.model} and {of_b.model} define the unit {a.unit!r} differently: values pass as they are"
         return Relation(note="" if _is_same(ua, ub) else note)
@@ -46,7 +46,7 @@ def relate(a: Variable, of_a: Interface, b: Variable, of_b: Interface) -> Relati
         return Relation(refused=_refusal(ua, of_a, ub, of_b))
     scale, offset = convert(ua, ub)
     if not (a.relative or b.relative):
-        return Relation(scale, offset, note=_doubt(ua, ub, scale))
+        return Relation(scale, offset, doubt=_doubt(ua, ub, scale))
     note = f"one of the two is a difference (relativeQuantity), so {a.unit!r} becomes {b.unit!r} without an offset"
     return Relation(scale, note=note if offset and a.relative != b.relative else "")
 

@@ -58,6 +58,13 @@ def test_units_that_nobody_defined(undefined):
     assert between(a, b, offset=1.0) == Conversion(offset=1.0)
 
 
+def test_a_scale_settles_a_doubt():
+    rate = (0, 0, -1, 0, 0, 0, 0, 0)
+    a, b = end("A", "Hz", Unit("Hz", rate)), end("B", "rad/s", Unit("rad/s", rate))
+    assert between(a, b).note.startswith("as the FMUs define them, 1 Hz is 1 rad/s, not 6.28319")
+    assert between(a, b, scale=6.25) == Conversion(6.25)
+
+
 def test_what_does_not_convert_is_refused_unless_a_scale_is_given():
     """Nobody can mend another maker's definitions; a scale of 1 is a scale, too."""
     a, b = end("A", "deg", Unit("deg", (0,) * 7 + (1,), 0.5)), end("B", "rad", Unit("rad", (0,) * 8))

@@ -85,8 +85,8 @@ def test_an_angle_does_not_convert_to_what_is_none(a, b, scale):
 def test_definitions_that_belie_a_unit_s_name_are_told(a, b, made, scale):
     found = between(a, b)
     assert (found.scale, found.refused) == (pytest.approx(made), "")
-    assert found.note.startswith(f"as the FMUs define them, 1 {a[0]} is {made:g} {b[0]}, not ")
-    assert float(found.note.rpartition("scale = ")[2]) == pytest.approx(scale, rel=1e-15)
+    assert found.doubt.startswith(f"as the FMUs define them, 1 {a[0]} is {made:g} {b[0]}, not ")
+    assert float(found.doubt.rpartition("scale = ")[2]) == pytest.approx(scale, rel=1e-15)
 
 
 def test_other_dimensions():
@@ -110,7 +110,7 @@ def test_units_that_nobody_defined(undefined):
     a, b = end("A", "furlong", None), end("B", "K", KELVIN)
     if undefined:
         a = a[0], replace(a[1], units={"furlong": Unit("furlong", None)})
-    assert relate(*a, *b).undefined == (
+    assert relate(*a, *b).doubt == (
         "'furlong' is not defined in SI units by A: what is in 'furlong' is taken for 'K' as it is; where they differ, "
         "give the connection a scale"
     )
@@ -118,5 +118,5 @@ def test_units_that_nobody_defined(undefined):
 
 
 def test_of_undefined_units_of_angle_the_scale_is_told():
-    undefined = relate(*end("A", "Hz", None), *end("B", "rad/s", None)).undefined
-    assert float(undefined.rpartition("scale = ")[2]) == 2.0 * math.pi
+    doubt = relate(*end("A", "Hz", None), *end("B", "rad/s", None)).doubt
+    assert float(doubt.rpartition("scale = ")[2]) == 2.0 * math.pi
