@@ -40,6 +40,14 @@ class ComponentError(ValueError):
     """A component was declared, built or used wrongly; the message names it, the variable and the remedy."""
 
 
+class BuildArgumentError(ComponentError):
+    """A build argument is unusable; ``argument`` is its name."""
+
+    def __init__(self, argument: str, message: str) -> None:
+        super().__init__(message)
+        self.argument = argument
+
+
 class UnknownNameError(ComponentError, AttributeError):
     """Equations read something that their component does not have."""
 
@@ -329,9 +337,9 @@ def _build_argument(cls: type, declaration: Size | Data, given: Any) -> Any:
     try:
         return declaration.convert(given)
     except ValueError as error:
-        raise ComponentError(f"{where} is unusable: {error}") from error
+        raise BuildArgumentError(declaration.name, f"{where} is unusable: {error}") from error
     except (TypeError, AttributeError, LookupError, OverflowError) as error:
-        raise ComponentError(f"{where} is unusable: {type(error).__name__}: {error}") from error
+        raise BuildArgumentError(declaration.name, f"{where} is unusable: {type(error).__name__}: {error}") from error
 
 
 def _shown(declaration: Declaration) -> bool:

@@ -9,6 +9,8 @@ from typing import Any, Literal
 
 from .spelling import nearest
 
+FASTEST = 170.0
+"""m/s: faster than any train on wheels (574.8 km/h, 159.7 m/s); more is meant as km/h."""
 _REQUIRED: Any = object()
 _WORDS = {float: "number", int: "whole number"}
 
@@ -25,6 +27,7 @@ class Column:
         name: its key. unit: SI unit, for messages.
         type: float, int, bool, or the `Table` that stands in it.
         sign: of a number.
+        within: the bounds beyond which it cannot be meant: almost surely it is in another unit.
         after: the column whose value it must exceed: one to its left, or by its own name itself in the row before.
         default: what it is where a row leaves it out; without one it is required.
         word: a text that may stand there instead.
@@ -35,6 +38,7 @@ class Column:
     unit: str = "1"
     type: Any = float
     sign: Literal["", "positive", "non-negative"] = ""
+    within: tuple[float, float] | None = None
     after: str = ""
     default: Any = _REQUIRED
     word: str = ""
@@ -44,7 +48,7 @@ class Column:
         """A value, checked by itself; a whole number may stand for a real one.
 
         Raises:
-            ValueError: it is of another type or sign, or not a number.
+            ValueError: it is of another type or sign, beyond its bounds, or not a number.
         """
         if isinstance(self.type, Table):
             return self.type.read(value)
@@ -56,6 +60,11 @@ class Column:
         if not accepted or math.isnan(value) or (self.sign and (value < 0 or (value == 0 and self.sign == "positive"))):
             wanted = f"a {f'{self.sign} {_WORDS[self.type]}'.strip()}{'' if self.unit == '1' else f' in {self.unit}'}"
             raise ValueError(f"{self.name!r} must be {wanted}{self.word and f' or {self.word!r}'}, not {value!r}")
+        if self.within is not None and not self.within[0] <= value <= self.within[1]:
+            meant = ", ".join(text for text in (self.note, "" if self.unit == "1" else f"in {self.unit}") if text)
+            low, high = self.within
+            told = f"{self.name!r} is {value!r}{f' ({meant})' if meant else ''}"
+            raise ValueError(f"{told}, which is beyond all that runs, {low:g} to {high:g}: is it in another unit?")
         return self.type(value)
 
 

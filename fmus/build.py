@@ -25,7 +25,7 @@ from . import native_fmu, python_fmu, toolchain
 from .description import write
 from .identity import source_digest
 from .kinds import FmuKind, PackagingKind
-from .references import read_arguments, resolve
+from .references import build_with, resolve
 from .toolchain import CompilerError
 
 _LOG = logging.getLogger(__name__)
@@ -72,7 +72,7 @@ def build(
     Raises:
         ComponentError: the component or its arguments are unusable, cannot be traced, or do not compile.
     """
-    component = resolve(reference, folder)(**read_arguments(arguments))
+    component = build_with(resolve(reference, folder), arguments)
     return build_component(component, kind, platforms)
 
 
@@ -196,10 +196,9 @@ def native_problem(component: type[Component]) -> str:
 def plain(reference: str, arguments: Mapping[str, Any] | None = None, *, folder: Path | None = None) -> Plain:
     """A component to run in this process as Python objects, for a debugger."""
     cls = resolve(reference, folder)
-    given = read_arguments(arguments)
-    component = cls(**given)
+    component = build_with(cls, arguments)
     digest = source_digest(component, "python")
-    return Plain(cls, given, digest, write(component, "python", digest))
+    return Plain(cls, component.build_arguments, digest, write(component, "python", digest))
 
 
 def cache_folder() -> Path:

@@ -14,6 +14,7 @@ from types import ModuleType
 from typing import Any
 
 from ..components import CATALOGUE, Component, ComponentError
+from ..components.component import BuildArgumentError
 from ..components.spelling import did_you_mean
 
 
@@ -56,6 +57,22 @@ def read_arguments(arguments: Mapping[str, Any] | None) -> dict[str, Any]:
             except ValueError as error:
                 raise ComponentError(f"{name}: {value} is not JSON: {error}") from error
     return given
+
+
+def build_with(cls: type[Component], arguments: Mapping[str, Any] | None) -> Component:
+    """A component with its build arguments; what is wrong in one that a file holds is told with the file.
+
+    Raises:
+        ComponentError: an argument is unusable, or its file cannot be read.
+    """
+    given = dict(arguments or {})
+    try:
+        return cls(**read_arguments(given))
+    except BuildArgumentError as error:
+        file = given.get(error.argument)
+        if not isinstance(file, str) or not file.endswith(".json"):
+            raise
+        raise ComponentError(f"{file}: {error}") from error
 
 
 def _load_file(path: Path) -> ModuleType:

@@ -15,6 +15,12 @@ _CURVE = 600.0
 """m: a curve of radius R resists with 600/R newtons per kilonewton of weight."""
 _TUNNEL = 0.00013
 """1/m: a tunnel of length L resists with 0.00013 L newtons per kilonewton of weight."""
+_STEEPEST = 0.15
+"""Steeper than any adhesion railway (Lisbon's trams: 0.135); 5 is 500 %, and meant as per mille."""
+_TIGHTEST = 10.0
+"""m: tighter than any tram's curve; less is meant as km, or as a curvature."""
+_LONGEST = 1e5
+"""m: longer than any tunnel (Gotthard: 57 km)."""
 
 
 class Profile(NamedTuple):
@@ -26,6 +32,8 @@ class Profile(NamedTuple):
 
 def _section(position: float, gradient: float, radius: float, tunnel: float, further: float) -> tuple[float, float]:
     """Begin and resistance of a section."""
+    if 0.0 < radius < _TIGHTEST:
+        raise ValueError(f"'radius' is in m, 0 for straight track: {radius:g} is tighter than any curve, {_TIGHTEST:g}")
     curve = _CURVE / radius / 1000.0 if radius else 0.0
     return position, _GRAVITY * (gradient + curve + _TUNNEL * tunnel / 1000.0) + further
 
@@ -34,10 +42,10 @@ SECTIONS = Table(
     "section",
     [
         Column("position", "m", after="position", note="its begin"),
-        Column("gradient", default=0.0, note="rise over run"),
+        Column("gradient", default=0.0, within=(-_STEEPEST, _STEEPEST), note="rise over run"),
         Column("radius", "m", default=0.0, sign="non-negative"),
-        Column("tunnel", "m", default=0.0, note="its length"),
-        Column("resistance", "N/kg", default=0.0, note="further resistance"),
+        Column("tunnel", "m", default=0.0, within=(0.0, _LONGEST), note="its length"),
+        Column("resistance", "N/kg", default=0.0, within=(-1.5, 1.5), note="further resistance"),
     ],
     make=_section,
     whole=lambda sections: Profile(*map(list, zip(*sections, strict=True))),

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 
 from ..component import Component, Values
 from ..declarations import Data, Output, Parameter
-from ..tables import Column, Table
+from ..tables import FASTEST, Column, Table
 from .profile import Profile, speed_change
 
 _DEFAULT = {
@@ -29,12 +29,20 @@ def _profile(speed: float, jerk: float, changes: Sequence[tuple[float, float, fl
 
 CHANGES = Table(
     "change",
-    [Column("time", "s"), Column("change", "m/s"), Column("acceleration", "m/s2", sign="positive")],
+    [
+        Column("time", "s"),
+        Column("change", "m/s", within=(-FASTEST, FASTEST)),
+        Column("acceleration", "m/s2", sign="positive"),
+    ],
     may_be_empty=True,
 )
 PROFILE = Table(
     "profile",
-    [Column("speed", "m/s"), Column("jerk", "m/s3"), Column("changes", type=CHANGES, default=())],
+    [
+        Column("speed", "m/s", within=(0.0, FASTEST)),
+        Column("jerk", "m/s3"),
+        Column("changes", type=CHANGES, default=()),
+    ],
     make=_profile,
 )
 

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 from ..environment.profile import Phase, Profile, moved, speed_change
-from ..tables import Column, Table
+from ..tables import FASTEST, Column, Table
 
 PLAN = {
     "duration": 190.0,
@@ -82,8 +82,8 @@ PHASES = Table(
     [
         Column("begin", "s", default=None),
         Column("end", "s", default=None),
-        Column("speed", "m/s", default=None, word="solve"),
-        Column("speed_km_h", "km/h", default=None),
+        Column("speed", "m/s", default=None, within=(0.0, FASTEST), word="solve"),
+        Column("speed_km_h", "km/h", default=None, within=(0.0, 3.6 * FASTEST)),
         Column("acceleration", "m/s2", sign="positive"),
     ],
     make=_change,

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from ..maths import where
-from ..tables import Column, Table
+from ..tables import FASTEST, Column, Table
 
 _ROUNDING = 1e-6
 """s or m: a limit holds up to and with the place it changes at (Liu & Hou 2020, eq. 64), whatever is rounded."""
@@ -35,7 +35,7 @@ class SpeedLimit:
 
 STEPS = Table(
     "speed limit",
-    [Column("begin", after="begin"), Column("speed", "m/s", sign="non-negative")],
+    [Column("begin", after="begin"), Column("speed", "m/s", sign="non-negative", within=(0.0, FASTEST))],
     whole=SpeedLimit,
     by_place=True,
 )

@@ -4,7 +4,7 @@ import zipfile
 
 import pytest
 from railcosim.components import ComponentError
-from railcosim.fmus.build import build
+from railcosim.fmus.build import build, plain
 from railcosim.fmus.references import resolve
 
 USER = (
@@ -92,3 +92,14 @@ def test_a_data_file_that_cannot_be_used(tmp_path, text, complaint):
         path.write_text(text, encoding="utf-8")
     with pytest.raises(ComponentError, match=complaint):
         build("Line", {"profile": str(path)})
+
+
+def test_what_is_wrong_in_a_data_file_is_told_with_the_file(tmp_path):
+    path = tmp_path / "line.json"
+    path.write_text('[{"position": 0.0}, {"position": 100.0, "gradient": 5.0}]')
+    for make in (build, plain):
+        with pytest.raises(ComponentError) as told:
+            make("Line", {"profile": str(path)})
+        assert str(told.value).startswith(
+            f"{path}: Line: build argument 'profile' is unusable: section 2: 'gradient' is"
+        )
