@@ -64,7 +64,10 @@ def describe(
     judged and drawn.
     """
     arguments = build_arguments(builds)
-    is_fmu, is_scenario = is_fmu_name(name), name.endswith(".toml") or name in dict(shipped())
+    is_scenario = name.endswith(".toml") or name in dict(shipped())
+    # Any other file is told for what it is: an SSP, a folder with an unpacked FMU.
+    is_file = not (is_scenario or name in CATALOGUE or ".py" in name) and Path(name).exists()
+    is_fmu = is_fmu_name(name) or is_file
     if is_fmu and arguments:
         raise ScenarioError(f"{name} is built already; it takes no --with {', '.join(arguments)}")
     if is_scenario:

@@ -108,3 +108,10 @@ def test_a_name_that_is_neither_is_told_with_the_nearest_of_both(name, nearest, 
     assert call(["describe", name]) == 2
     told = f"error: there is no component or shipped scenario '{name}'; did you mean '{nearest}'?\n"
     assert capsys.readouterr().err == told
+
+
+def test_describe_tells_what_another_file_is(tmp_path, xml, capsys):
+    ssp = xml["write_archive"](tmp_path / "system.ssp", {"SystemStructure.ssd": "<x/>", "resources/a.fmu": ""})
+    for name, what in ((ssp, "is an SSP, a system of 1 FMUs; unpack it"), (tmp_path, "is a folder, not an FMU file")):
+        assert call(["describe", str(name)]) == 2
+        assert what in capsys.readouterr().err
