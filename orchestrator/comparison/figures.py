@@ -23,6 +23,7 @@ from ..figures import (
     curves_of,
     draw_curves,
     file_name,
+    heading,
     legend,
     member_colour,
     page,
@@ -66,7 +67,7 @@ def draw_compared(figures: Sequence[Mapping[str, Any]], runs: Mapping[str, Resul
         shared = share_x(panels)
         height = 4.4 if len(panels) == 1 else 0.7 + 2.6 * len(panels)
         size, dpi, colours = (9.0, height), figure.get("dpi"), _colours(_curves(found), palette)
-        with page(figure["title"], len(panels), path, size=size, share_x=shared, dpi=dpi) as axes:
+        with page(heading(figure), len(panels), path, size=size, share_x=shared, dpi=dpi) as axes:
             above: list[Any] = []
             for ax, panel, lines in zip(axes, panels, found, strict=True):
                 x_label = not shared or ax is axes[-1]

@@ -13,9 +13,10 @@ from pathlib import Path
 from typing import Any
 
 from ..errors import FmuError, RailcosimError, ScenarioError
+from ..figures import remarked
 from ..fmi import Kind
 from ..problems import Problem
-from ..run import Progress, Run, execute
+from ..run import Progress, Run, execute, swaps
 from ..scenario import load
 from ..system import System
 from .figures import draw_compared
@@ -280,7 +281,17 @@ def _rows(columns: Sequence[Variant], directions: Mapping[str, Better]) -> list[
 def _draw(comparison: Comparison, directory: Path) -> list[Path]:
     done = {v.name: v.run.results for v in comparison.variants if v.run and len(v.run.time)}
     first = next((v.run for v in comparison.variants if v.run and len(v.run.time)), None)
-    return draw_compared(first.system.judged.figures, done, directory) if first else []
+    if first is None:
+        return []
+    reconstructed = [
+        v.name
+        for v in comparison.variants
+        if v.run
+        and "(reconstructed)" in swaps(v.run.system, {n: model.interface for n, model in v.run.checked.models.items()})
+    ]
+    remark = f"reconstructed in {', '.join(reconstructed)}" if reconstructed else ""
+    figures = remarked(first.system.judged.figures, remark)
+    return draw_compared(figures, done, directory)
 
 
 # -------------------------------------------------------------------- files

@@ -4,7 +4,7 @@ from .checking import check_figures
 from .curves import Curve, bracketed, curves_of
 from .drawing import draw, draw_curves, file_name
 from .palette import Palette, member_colour, ranks
-from .panels import FIGURE_KEYS, FORMATS, PANEL_KEYS, panels_of, share_x, texts_of, written_as
+from .panels import FIGURE_KEYS, FORMATS, PANEL_KEYS, heading, panels_of, remarked, share_x, texts_of, written_as
 from .style import COLOURS, DASHES, colour, colour_and_dashes, legend, page
 
 __all__ = [
@@ -23,11 +23,13 @@ __all__ = [
     "draw",
     "draw_curves",
     "file_name",
+    "heading",
     "legend",
     "member_colour",
     "page",
     "panels_of",
     "ranks",
+    "remarked",
     "share_x",
     "texts_of",
     "written_as",

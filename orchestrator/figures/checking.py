@@ -45,7 +45,9 @@ def check_figures(
 
 
 def _file_problems(figure: Mapping[str, Any]) -> Iterator[Problem]:
-    """How the figure is to be written."""
+    """How the figure is to be written, and what is said of it."""
+    if not isinstance(figure.get("remark", ""), str):
+        yield Problem("", "remark must be text")
     if figure.get("format", "png") not in FORMATS:
         yield Problem("", f"format must be one of {', '.join(FORMATS)}, not {figure['format']!r}")
     dpi = figure.get("dpi", 100)

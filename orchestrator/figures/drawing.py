@@ -15,7 +15,7 @@ from ..problems import Problem
 from .curves import Curve, curves_of, x_label_of, y_label_of
 from .marks import draw_marks, number
 from .palette import Palette, member_colour, ranks
-from .panels import FORMATS, bands_of, numbers_in, panels_of, share_x
+from .panels import FORMATS, bands_of, heading, numbers_in, panels_of, share_x
 from .style import DASHES, colour_and_dashes, legend, page, room
 
 if TYPE_CHECKING:
@@ -79,7 +79,7 @@ def _draw_one(
     height = 4.0 if len(panels) == 1 else 0.7 + 2.3 * len(panels)
     size, dpi = (8.5, height), figure.get("dpi")
     styles = _styles(curves, palette, room(len(panels), height))
-    with page(figure["title"], len(panels), path, size=size, share_x=shared, dpi=dpi) as axes:
+    with page(heading(figure), len(panels), path, size=size, share_x=shared, dpi=dpi) as axes:
         above: dict[str, Any] = {}
         for ax, panel, styled in zip(axes, panels, styles, strict=True):
             draw_curves(ax, panel, styled, signals, x_label=not shared or ax is axes[-1])

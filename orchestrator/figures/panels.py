@@ -8,8 +8,8 @@ PANEL_KEYS = (
     *("title", "y", "x", "label", "x_label", "y_label", "x_range", "y_range", "x_log", "y_log"),
     *("bands", "marks", "scale"),
 )
-FIGURE_KEYS = ("format", "dpi")
-"""What a figure may say beside what a panel may: how it is written."""
+FIGURE_KEYS = ("remark", "format", "dpi")
+"""What a figure may say beside what a panel may: a line under its title, and how it is written."""
 X_KEYS = ("x", "x_label", "x_range", "x_log")
 """What all panels of a figure may have in common."""
 FORMATS = ("png", "svg", "pdf")
@@ -21,6 +21,17 @@ def panels_of(figure: Mapping[str, Any]) -> list[Mapping[str, Any]]:
         return [{key: value for key, value in figure.items() if key not in ("title", *FIGURE_KEYS)}]
     common = {key: figure[key] for key in X_KEYS if key in figure}
     return [{**common, **panel} for panel in figure["panels"]]
+
+
+def heading(figure: Mapping[str, Any]) -> str:
+    """What stands above a figure: its title, and its remark in a line below."""
+    return "\n".join(filter(None, (figure["title"], figure.get("remark", ""))))
+
+
+def remarked(figures: Sequence[Mapping[str, Any]], remark: str) -> list[dict[str, Any]]:
+    """The figures with another remark; none where it is empty."""
+    others = [{key: value for key, value in figure.items() if key != "remark"} for figure in figures]
+    return [figure | ({"remark": remark} if remark else {}) for figure in others]
 
 
 def share_x(panels: Sequence[Mapping[str, Any]]) -> bool:

@@ -73,6 +73,10 @@ class Variable:
         return (0, 2**bits - 1) if named and named[1] else (-(2 ** (bits - 1)), 2 ** (bits - 1) - 1)
 
 
+_RECONSTRUCTED = ("Reconstructed", "Re-derived")
+"""How the note of one of our own FMUs begins whose source had lost its formulas."""
+
+
 @dataclass(frozen=True)
 class Interface:
     """Everything the orchestrator needs to know of an FMU before it is loaded.
@@ -132,6 +136,12 @@ class Interface:
     def own_kind(self) -> FmuKind | None:
         """How one of our own FMUs is packaged."""
         return self.annotation.kind if self.annotation else None
+
+    @property
+    def label(self) -> str:
+        """The model's name, and that its equations are reconstructed where one of our own FMUs says so."""
+        reconstructed = self.annotation is not None and self.annotation.note.startswith(_RECONSTRUCTED)
+        return f"{self.model} (reconstructed)" if reconstructed else self.model
 
     @property
     def sampled(self) -> bool:

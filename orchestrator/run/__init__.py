@@ -1,7 +1,7 @@
 """One run: checked, simulated, recorded, judged, and written to a directory from which it can go on."""
 
 from .assembly import assembled
-from .checking import Checked, check, describe_stepping
+from .checking import Checked, check, describe_stepping, swaps
 from .checkpoint import CHECKPOINT_FILE, read_checkpoint
 from .execution import at_half_the_step, execute, go_on, resume, run
 from .outcome import Run
@@ -34,4 +34,5 @@ __all__ = [
     "recover_rows",
     "resume",
     "run",
+    "swaps",
 ]

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 
 from ..errors import ScenarioError
 from ..evaluation import check_metrics, check_requirements, check_values, metric_indices, split_metric
-from ..figures import check_figures
+from ..figures import check_figures, remarked
 from ..fmi import Interface, Kind, Model, Workspace, load_models
 from ..isolation import check_isolation, check_once_per_process, isolation_notes
 from ..master import ALGORITHMS, check_coupling, check_events, describe_coupling
@@ -115,13 +115,23 @@ def _without_the_missing(
     kept = system.changed(
         requirements=requirements,
         metrics=metrics,
-        figures=figures,
+        figures=remarked(figures, swaps(system, interfaces)),
         published=published,
         references=references,
         events=[event for event in system.events if event.signal not in lost],
         tolerances={signal: value for signal, value in system.stepping.tolerances.items() if signal not in lost},
     )
     return kept, notes
+
+
+def swaps(system: System, interfaces: Mapping[str, Interface]) -> str:
+    """Which models stand in the place of others: what the figures of a scenario hold then is not what it wrote."""
+    found = {
+        SignalName(instance.name).group: interfaces[instance.name].label
+        for instance in system.instances.values()
+        if instance.swapped
+    }
+    return ", ".join(f"{group}: {label}" for group, label in found.items())
 
 
 def _is_there(signal: str, interfaces: Mapping[str, Interface]) -> bool:

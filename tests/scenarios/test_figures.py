@@ -3,8 +3,12 @@
 import re
 
 import pytest
+from matplotlib.figure import Figure
 from railcosim.components import CATALOGUE
 from railcosim.orchestrator import load
+from railcosim.orchestrator.comparison import compare, variants
+from railcosim.orchestrator.fmi import Workspace
+from railcosim.orchestrator.run import check
 from railcosim.orchestrator.scenario import shipped
 
 STATED = {"Fig. 5: target speed"}
@@ -43,3 +47,22 @@ def test_fig_5_says_whose_gains_and_gust_and_shows_the_command():
     assert "{cruise[1].alpha}" in figure["panels"][0]["title"]
     assert "{gust.size}" in figure["panels"][0]["title"]
     assert figure["panels"][1]["y"] == ["cruise[:].demand"]
+
+
+def test_a_law_in_the_place_of_another_is_told_on_every_figure_and_if_it_is_reconstructed():
+    with Workspace() as workspace:
+        swapped = check(load("comfort_cruise", swaps=["cruise=RangePotentialCruise"]), workspace, "plain")
+        whole = check(load("comfort_cruise"), workspace, "plain")
+    remarks = {figure["remark"] for figure in swapped.system.judged.figures}
+    assert remarks == {"cruise: RangePotentialCruise (reconstructed)"}
+    assert not any("remark" in figure for figure in whole.system.judged.figures)
+
+
+def test_compared_figures_say_which_variant_is_reconstructed(tmp_path, monkeypatch):
+    kept = []
+    monkeypatch.setattr(Figure, "savefig", lambda self, *_, **__: kept.append(self._suptitle.get_text()))
+    laws = ("RangePotentialCruise", "ComfortCruise")
+    systems = variants(["comfort_cruise"], swaps=[f"cruise={law}" for law in laws], stop_time=1.0)
+    compare(systems, kind="plain", output=tmp_path)
+    assert kept
+    assert all(text.endswith("\nreconstructed in cruise=RangePotentialCruise") for text in kept)

@@ -59,6 +59,7 @@ def test_right_figures_have_no_problems(names):
         ({"title": "F", "y": ["1"], "x": {**X, "name": "time"}}, "x.name must be a plain word that is not taken"),
         ({"title": "F", "y": ["d"], "x": {**X, "points": 1}}, "x.points must be a whole number from 2 to 100000"),
         ({"title": "F", "y": ["time"], "format": "jpg"}, "format must be one of png, svg, pdf, not 'jpg'"),
+        ({"title": "F", "y": ["time"], "remark": 5}, "remark must be text"),
         ({"title": "F", "y": ["time"], "dpi": 5}, "dpi must be a number from 20 to 1200, not 5"),
         ({"title": "F", "y": ["time"], "y_log": 1}, "y_log must be true or false"),
         ({"title": "F", "y": ["time"], "x_log": True, "x_range": [0, 1]}, "x_range must be positive on a logarithmic"),

@@ -139,3 +139,8 @@ def test_a_title_says_the_numbers_of_the_run(drawn):
     assert ax.get_title(loc="left") == "gap over 15 km"
     (ax,) = drawn(panels=[{"title": "$x_{1}$", "y": ["target.value"]}])
     assert ax.get_title(loc="left") == "$x_{1}$"
+
+
+def test_a_remark_stands_below_the_title(drawn):
+    axes = drawn(title="Speed", remark="of a law of ours", y=["target.value"])
+    assert axes[0].figure._suptitle.get_text() == "Speed\nof a law of ours"
