@@ -156,11 +156,24 @@ class Output(Variable):
 
 
 class State(Variable):
-    """A continuous state: ``derivatives`` returns its rate. ``output = True`` makes it an output as well."""
+    """A continuous state: ``derivatives`` returns its rate. ``output = True`` makes it an output as well.
 
-    def __init__(self, unit: str | Data = "1", start: Any = 0.0, *, output: bool = False, **rest: Any) -> None:
+    ``standstill = True`` says that the rate may jump where the state is zero, as friction does where a speed turns:
+    integration steps onto exactly zero instead of across it, and ``derivatives`` decides whether it stays there.
+    """
+
+    def __init__(
+        self,
+        unit: str | Data = "1",
+        start: Any = 0.0,
+        *,
+        output: bool = False,
+        standstill: bool = False,
+        **rest: Any,
+    ) -> None:
         super().__init__(unit, start, **rest)
         self.output = output
+        self.standstill = standstill
 
 
 class Memory(Variable):

@@ -15,10 +15,16 @@ import numpy as np
 from . import noise
 from .component import Component, ComponentError, Method, Slot, Values, evaluated, pack
 from .declarations import Memory, Output, State, Tape
+from .maths import where
 from .returned import check_returned, due
 
 _KINDS = {float: "iuf", int: "iu", bool: "b", str: ""}
 """NumPy's kinds of array that hold numbers of a type without a closer look."""
+
+_HALVINGS = 40
+"""How finely a standstill is located: what is left of a step of 0.1 s is then 1e-13 s."""
+_NEAR = 1e-300
+"""What stands for just before a standstill: it has a sign, and no size."""
 
 _ROUNDING = 1e-6
 """Of an interval: a time that is a whole number of holds belongs to the new one whatever the rounding of k * step."""
@@ -42,6 +48,9 @@ class Methods:
         self._noises = tuple(component.noises.items())
         self._array_states = tuple(slot for slot in self.states if slot.shape)
         self._due = due(component)
+        stopping = [slot for slot in self.states if isinstance(slot.declaration, State) and slot.declaration.standstill]
+        self._stopping = tuple(slot.name for slot in stopping)
+        self._most_stops = 2 * sum(len(slot.scalars) for slot in stopping)
 
     def evaluate(self) -> Values:
         """All outputs."""
@@ -64,7 +73,10 @@ class Methods:
         return evaluated(self.component, "keep")
 
     def integrate(self, begin: float, length: float) -> None:
-        """Classical Runge-Kutta in equal sub-steps no longer than ``max_step``, inputs and memory held."""
+        """Classical Runge-Kutta in equal sub-steps no longer than ``max_step``, inputs and memory held.
+
+        A sub-step in which a state passes its standstill ends there, and the rest of it begins there.
+        """
         if not self.states:
             return
         longest = self.values["max_step"]
@@ -73,11 +85,8 @@ class Methods:
         x = {slot.name: self.values[slot.name] for slot in self.states}
         for k in range(count):
             t = begin + k * h
-            k1 = self._rates(t, x)
-            k2 = self._rates(t + 0.5 * h, {n: x[n] + (0.5 * h) * k1[n] for n in x})
-            k3 = self._rates(t + 0.5 * h, {n: x[n] + (0.5 * h) * k2[n] for n in x})
-            k4 = self._rates(t + h, {n: x[n] + h * k3[n] for n in x})
-            x = {n: x[n] + (h / 6.0) * (((k1[n] + 2.0 * k2[n]) + 2.0 * k3[n]) + k4[n]) for n in x}
+            end = self._runge_kutta(t, x, h)
+            x = self._to_standstill(t, x, h) if self._stopping and self._passing(x, end) else end
         self.values.update(self._cast("derivatives", x))
 
     def draw(self) -> None:
@@ -91,6 +100,58 @@ class Methods:
             index = math.floor(self.values["time"] / hold + _ROUNDING)
             shape = np.shape(self.values[name])
             self.values[name] = noise.cells(declaration.distribution, self.values["seed"], stream, index, shape)
+
+    def _runge_kutta(self, t: float, x: Values, h: float) -> Values:
+        """The states at the end of one step."""
+        k1 = self._rates(t, x)
+        k2 = self._rates(t + 0.5 * h, self._near(x, {n: x[n] + (0.5 * h) * k1[n] for n in x}))
+        k3 = self._rates(t + 0.5 * h, self._near(x, {n: x[n] + (0.5 * h) * k2[n] for n in x}))
+        k4 = self._rates(t + h, self._near(x, {n: x[n] + h * k3[n] for n in x}))
+        return {n: x[n] + (h / 6.0) * (((k1[n] + 2.0 * k2[n]) + 2.0 * k3[n]) + k4[n]) for n in x}
+
+    def _near(self, x: Values, stage: Values) -> Values:
+        """The states at a stage of a step from ``x``: not beyond a standstill but just before it.
+
+        The rates beyond would be those of another motion, and the step would be wrong by more than its end can show.
+        """
+        for name in self._stopping:
+            beyond = _passes(x[name], stage[name])
+            if np.any(beyond):
+                stage[name] = where(beyond, where(x[name] > 0.0, _NEAR, -_NEAR), stage[name])
+        return stage
+
+    def _to_standstill(self, t: float, x: Values, h: float) -> Values:
+        """The states at the end of a step that is taken in parts, each up to where a state comes to a standstill.
+
+        A state that stands when a part begins is free in it. The parts are counted: states that keep one another
+        moving could go on for ever; what would pass in the last one stands at its end.
+        """
+        done = 0.0
+        for _ in range(self._most_stops):
+            end = self._runge_kutta(t + done, x, h - done)
+            if not self._passing(x, end):
+                return end
+            low, high, before, after = 0.0, h - done, x, end
+            for _ in range(_HALVINGS):
+                middle = 0.5 * (low + high)
+                end = self._runge_kutta(t + done, x, middle)
+                if self._passing(x, end):
+                    high, after = middle, end
+                else:
+                    low, before = middle, end
+            x = self._stopped(x, before, after)
+            done = done + low
+        end = self._runge_kutta(t + done, x, h - done)
+        return self._stopped(x, end, end)
+
+    def _passing(self, x: Values, end: Values) -> bool:
+        """Whether a state passes its standstill in a step from ``x``."""
+        return any(np.any(_passes(x[name], end[name])) for name in self._stopping)
+
+    def _stopped(self, x: Values, before: Values, after: Values) -> Values:
+        """The states ``before``, with those at rest that pass their standstill from ``x`` to ``after``."""
+        stands = {name: where(_passes(x[name], after[name]), 0.0, before[name]) for name in self._stopping}
+        return before | stands
 
     def _rates(self, t: float, x: Mapping[str, Any]) -> Values:
         self.values["time"] = t
@@ -126,22 +187,29 @@ class Methods:
     def _cast_one(self, slot: Slot, value: Any, method: str) -> Any:
         """A returned value in its slot's type and shape, as a copy."""
         array = np.asarray(value, dtype=None if isinstance(value, np.ndarray) else object)
-        where = f"{self.name}.{method}: {slot.name!r}"
+        place = f"{self.name}.{method}: {slot.name!r}"
         if array.shape != slot.shape:
-            raise ComponentError(f"{where} has shape {array.shape}, declared {slot.shape}")
+            raise ComponentError(f"{place} has shape {array.shape}, declared {slot.shape}")
         elements: Any = array
         if not slot.shape or array.dtype.kind not in _KINDS[slot.type]:
             try:
                 elements = [_element(slot.type, cell) for cell in array.flat]
             except (TypeError, ValueError, OverflowError):
-                raise ComponentError(f"{where} is declared {slot.type.__name__}, not {value!r}") from None
+                raise ComponentError(f"{place} is declared {slot.type.__name__}, not {value!r}") from None
         result = pack(slot, elements if slot.shape else elements[0])
         if slot.type is float and not np.isfinite(result).all():
             shown = np.asarray(result).tolist()
             raise ComponentError(
-                f"{where} is {shown!r} at t = {self.values['time']!r} s; guard the arguments it comes from"
+                f"{place} is {shown!r} at t = {self.values['time']!r} s; guard the arguments it comes from"
             )
         return result
+
+
+def _passes(start: Any, end: Any) -> Any:
+    """Whether a state that does not stand reaches or passes zero, element by element."""
+    if isinstance(start, np.ndarray):
+        return ((start > 0.0) & (end <= 0.0)) | ((start < 0.0) & (end >= 0.0))
+    return end <= 0.0 < start or start < 0.0 <= end
 
 
 def _element(kind: type, value: Any) -> Any:

@@ -11,7 +11,10 @@ from .documentation import files as documentation
 from .toolchain import PLATFORMS, compile_library, folders
 
 _RUNTIME = Path(__file__).parent / "runtime"
-_PARTS = ("log.c", "noise.c", "tape.c", "inputs.c", "simulation.c", "fmi2.c", "values.c", "derivatives.c", "state.c")
+_PARTS = (
+    *("log.c", "noise.c", "tape.c", "inputs.c", "integration.c", "simulation.c"),
+    *("fmi2.c", "values.c", "derivatives.c", "state.c"),
+)
 
 
 def sources(component: Component, guid: str) -> dict[str, str]:

@@ -59,10 +59,9 @@ class ComfortCruise(GuardedCruise):
         bottom = self._bottom()
         limit = self.acceleration_limit
         demand = self._guarded(where(self.comfort_layer, limit * tanh(bottom / limit), bottom))
-        resistance = self._davis(self.speed) + self.line_resistance
         return {
             "demand": demand,
-            "force": self.mass * (resistance + demand),
+            "force": self.mass * (self._resistance(self.speed) + demand),
             "bottom_demand": bottom,
             "range_violated": logical_or(
                 logical_and(self.has_ahead, outside(self._gap_ahead(), self.gap_min, self.gap_max)),

@@ -36,10 +36,9 @@ class PairwiseCruise(GuardedCruise, ABC):
         # the train's own gives it the difference on top of its demand; it is exactly zero for the others.
         surplus = self._davis(self._compensated_speed()) - self._davis(self.speed)
         demand = self._guarded(law, surplus)
-        resistance = self._davis(self._compensated_speed()) + self.line_resistance
         return {
             "demand": demand,
-            "force": self.mass * (resistance + demand),
+            "force": self.mass * (self._resistance(self._compensated_speed()) + demand),
             "bottom_demand": bottom,
             "range_violated": logical_or(
                 logical_and(self.has_ahead, self._outside(self._gap_ahead())),

@@ -3,13 +3,17 @@
 from __future__ import annotations
 
 from abc import ABC
+from typing import Any
 
 from ..declarations import Input, Output, Parameter
+from ..maths import where
 from ..trains.port import DavisResistance
 
 
 class CruiseController(DavisResistance, ABC):
     """A cruise controller of one train that hears the trains ahead and behind, and the leader.
+
+    What it compensates, the resistance of train and line, turns with the motion of the train as friction does.
 
     A missing neighbour (``has_ahead`` false, and so on) contributes nothing: its position and speed are not read.
     Values that came by radio carry their age; what the shipped controllers do about old ones: `GuardedCruise`.
@@ -31,9 +35,17 @@ class CruiseController(DavisResistance, ABC):
     behind_age = Input("s", optional=True, description="how old what is known of the train behind is")
     leader_age = Input("s", optional=True, description="how old what is known of the first train is")
     line_resistance = Input("N/kg", optional=True, description="resistance of slope, curve and tunnel per mass")
+    curve_resistance = Input(
+        "N/kg", optional=True, description="part of line_resistance that opposes motion either way: curve and tunnel"
+    )
 
     mass = Parameter("kg", 400e3, minimum=1.0, description="mass of the own train")
 
     demand = Output("m/s2", description="demanded acceleration, before resistance is compensated")
     force = Output("N", description="force for the own train")
     range_violated = Output("1", bool, description="whether a gap is outside the range the controller is made for")
+
+    def _resistance(self, speed: Any) -> Any:
+        """Resistance of the train at a speed and of the line in N/kg, against running forwards."""
+        line, backward = self.line_resistance, self.line_resistance - 2.0 * self.curve_resistance
+        return self._davis(speed) + where(self.speed < 0.0, backward, line)

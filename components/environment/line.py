@@ -24,18 +24,22 @@ _LONGEST = 1e5
 
 
 class Profile(NamedTuple):
-    """Begins of the sections in m, and their specific resistances in N/kg."""
+    """Begins of the sections in m, their specific resistances in N/kg, and what of these opposes motion either way."""
 
     positions: list[float]
     resistances: list[float]
+    opposing: list[float]
 
 
-def _section(position: float, gradient: float, radius: float, tunnel: float, further: float) -> tuple[float, float]:
-    """Begin and resistance of a section."""
+def _section(
+    position: float, gradient: float, radius: float, tunnel: float, further: float
+) -> tuple[float, float, float]:
+    """Begin of a section, its resistance, and what of it is not its slope's."""
     if 0.0 < radius < _TIGHTEST:
         raise ValueError(f"'radius' is in m, 0 for straight track: {radius:g} is tighter than any curve, {_TIGHTEST:g}")
     curve = _CURVE / radius / 1000.0 if radius else 0.0
-    return position, _GRAVITY * (gradient + curve + _TUNNEL * tunnel / 1000.0) + further
+    inside = _TUNNEL * tunnel / 1000.0
+    return position, _GRAVITY * (gradient + curve + inside) + further, _GRAVITY * (curve + inside) + further
 
 
 SECTIONS = Table(
@@ -45,7 +49,7 @@ SECTIONS = Table(
         Column("gradient", default=0.0, within=(-_STEEPEST, _STEEPEST), note="rise over run"),
         Column("radius", "m", default=0.0, sign="non-negative"),
         Column("tunnel", "m", default=0.0, within=(0.0, _LONGEST), note="its length"),
-        Column("resistance", "N/kg", default=0.0, within=(-1.5, 1.5), note="further resistance"),
+        Column("resistance", "N/kg", default=0.0, within=(0.0, 1.5), note="further resistance to motion"),
     ],
     make=_section,
     whole=lambda sections: Profile(*map(list, zip(*sections, strict=True))),
@@ -58,11 +62,17 @@ class Line(Component):
     Specific resistance g (gradient + 0.6 m / radius) + resistance; the gradient is rise over run, uphill positive,
     the curve formula 600/R N/kN, a tunnel of length L adds 0.00013 L N/kN. The train is a point; before the first
     section it has the first one's resistance.
+
+    ``line_resistance`` is all of it for a train that runs forwards. ``curve_resistance`` is what of it opposes motion,
+    whichever way: curve, tunnel and further resistance. A train that is not told takes all for the slope's, and a
+    curve may then pull it back at rest.
     """
 
     source = "gradient: weight along the slope; curves: 600/R N/kN, usual in Chinese traction calculation (TB/T 1407)"
     equations = (
-        r"$r = g \left( i + 0.6\,/\,R \right) + r_0$ with a section's gradient $i$, radius $R$ in m, resistance $r_0$",
+        r"$r = g\,i + r_\mathrm{c}, \qquad r_\mathrm{c} = g \left( 0.6\,/\,R + 1.3 \cdot 10^{-7} L \right) + r_0$ with"
+        r" a section's gradient $i$, radius $R$ and tunnel $L$ in m, further resistance $r_0$; line_resistance $r$ and"
+        r" curve_resistance $r_\mathrm{c}$",
     )
 
     profile = Data([{"position": 0.0, "gradient": 0.0}], convert=SECTIONS.read, description=SECTIONS.description)
@@ -70,10 +80,12 @@ class Line(Component):
     position = Input("m", description="position of the train")
     factor = Parameter("1", 1.0, description="factor on the whole profile, to know it wrongly on purpose")
 
-    line_resistance = Output("N/kg", description="resistance of slope and curve per mass")
+    line_resistance = Output("N/kg", description="resistance of slope, curve and tunnel per mass")
+    curve_resistance = Output("N/kg", description="part of it that opposes motion either way: curve and tunnel")
 
     def outputs(self) -> Values:
-        return {
-            "line_resistance": self.factor
-            * piecewise_constant(self.position, self.profile.positions, self.profile.resistances)
-        }
+        resistance, opposing = (
+            self.factor * piecewise_constant(self.position, self.profile.positions, values)
+            for values in (self.profile.resistances, self.profile.opposing)
+        )
+        return {"line_resistance": resistance, "curve_resistance": opposing}

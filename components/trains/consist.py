@@ -8,8 +8,8 @@ from typing import Any
 
 from ..component import Values
 from ..declarations import Input, Output, Parameter, Size, State
-from ..maths import clip, where
-from .port import DavisResistance
+from ..maths import clip, maximum, where
+from .port import STARTING, DavisResistance, opposed
 
 
 class Carriages(DavisResistance, ABC):
@@ -40,7 +40,7 @@ class Carriages(DavisResistance, ABC):
         """dn/dt of each carriage in m/s3, for given accelerations."""
         pull = self._pull(speed, acceleration, 0.0)
         return [
-            (self.c1 + 2.0 * self.c2 * speed[j]) * acceleration[j] + (pull[j + 1] - pull[j]) / self.mass[j]
+            (self.c1 + 2.0 * self.c2 * abs(speed[j])) * acceleration[j] + (pull[j + 1] - pull[j]) / self.mass[j]
             for j in range(self.carriages)
         ]
 
@@ -60,8 +60,10 @@ class Consist(Carriages):
 
     Reconstructed: the source states the structure; the formulas and all numbers are re-derived or chosen here.
     dx/dt = v, M dv/dt = F - M n(x, v) + M d, tau dF/dt = -F + u + f for each carriage, with the command u (``force``),
-    the fault f and the disturbance d. At the start every actuator force balances the running resistance. The
-    resistance formula is used at every speed: a train that is pushed backwards is not modelled beyond that.
+    the fault f and the disturbance d. At the start every actuator force balances the running resistance.
+
+    The formulas are those of forward motion. Each carriage's resistance turns with its motion and holds it at rest, and
+    so does a negative actuator force, which brakes and never reverses.
     """
 
     source = "Zhang & Chen 2022 (arXiv 2211.02242), eqs. 1-3"
@@ -72,6 +74,9 @@ class Consist(Carriages):
         r"with position $x$, speed $v$, actuator_force $F$, force $u$, fault $f$, disturbance $d$, mass $M$,"
         r" actuator_lag $\tau$, coupler_stiffness $k$, coupler_damping $b$ and carriage_spacing $l$; no tension ahead"
         r" of the head and behind the tail. With limit_force, $u$ is cut off at $\pm$ force_limit.",
+        r"Backwards, $v_j < 0$: $|F_j|$ for $F_j$ and $-R(-v_j)$ for $R(v_j) = c_0 + c_1 v_j + c_2 v_j^2$. At rest: the"
+        r" acceleration of the two which sets the carriage in motion its own way, if it is more than"
+        r" starting_resistance exceeds $c_0$ by; else 0.",
     )
     note = (
         "Reconstructed: formulas and numbers are re-derived to meet the source's statements, not transcribed from it."
@@ -84,8 +89,12 @@ class Consist(Carriages):
         "m/s2", shape=(Carriages.carriages,), optional=True, description="disturbing force per mass, positive forwards"
     )
 
+    starting_resistance = Parameter("N/kg", 0.0, minimum=0.0, description=STARTING)
+
     position = State("m", 0.0, shape=(Carriages.carriages,), output=True, description="position of each carriage")
-    speed = State("m/s", 0.0, shape=(Carriages.carriages,), output=True, description="speed of each carriage")
+    speed = State(
+        "m/s", 0.0, shape=(Carriages.carriages,), output=True, standstill=True, description="speed of each carriage"
+    )
     actuator_force = State("N", 0.0, shape=(Carriages.carriages,), output=True, description="force F of each actuator")
 
     acceleration = Output("m/s2", shape=(Carriages.carriages,), description="acceleration of each carriage")
@@ -93,7 +102,8 @@ class Consist(Carriages):
     tail_speed = Output("m/s", description="speed of the last carriage")
 
     def initial(self) -> Values:
-        return {"actuator_force": [self.mass[j] * self._davis(self.speed[j]) for j in range(self.carriages)]}
+        resistances = [self._davis(self.speed[j]) for j in range(self.carriages)]
+        return {"actuator_force": [m * maximum(r, 0.0) for m, r in zip(self.mass, resistances, strict=True)]}
 
     def derivatives(self) -> Values:
         lag = self.actuator_lag
@@ -114,5 +124,13 @@ class Consist(Carriages):
         }
 
     def _acceleration(self) -> list[Any]:
-        n = self._retardation(self.position, self.speed)
-        return [self.actuator_force[j] / self.mass[j] - n[j] + self.disturbance[j] for j in range(self.carriages)]
+        pull = self._pull(self.position, self.speed, self.carriage_spacing)
+        stuck = maximum(self.starting_resistance - self.c0, 0.0)
+        found = []
+        for j in range(self.carriages):
+            v, drive = self.speed[j], self.actuator_force[j] / self.mass[j]
+            couplers = (pull[j + 1] - pull[j]) / self.mass[j]
+            forward = drive - (self._opposing(v) + couplers) + self.disturbance[j]
+            backward = abs(drive) - (couplers - self._opposing(-v)) + self.disturbance[j]
+            found.append(opposed(v, forward, backward, stuck))
+        return found

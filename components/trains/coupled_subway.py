@@ -7,7 +7,8 @@ from typing import Any
 from ..component import Values
 from ..declarations import Output, Parameter, State
 from ..maths import where
-from .multiple_unit import MultipleUnit
+from .multiple_unit import MultipleUnit, Resistance
+from .port import acting, opposed
 from .vehicles import added
 
 _vehicles = MultipleUnit.vehicles
@@ -36,6 +37,9 @@ class CoupledSubwayTrain(MultipleUnit):
         r"with vehicle_position $y_k$, vehicle_speed $v_k$, vehicle_force $F_k$, coupler_force $T_k$, coupler_stiffness"
         r" $k_c$, coupler_damping $c_c$, vehicle_length $L$, the line's resistance $w$ in N/kN, line_resistance $r$ and"
         r" disturbance $d$; position, speed and acceleration are means over the cars that measured_at names.",
+        r"Backwards: $|\mu_k F_k|$ for $\mu_k F_k$, and the opposite of what in $r_k$ and $r$ is no slope's, at $-v_k$."
+        r" At rest: the acceleration of the two which sets the vehicle in motion its own way, if its force is more than"
+        r" starting_resistance exceeds $a_k$ by; else 0.",
     )
     recommended_step = 0.01
 
@@ -53,7 +57,9 @@ class CoupledSubwayTrain(MultipleUnit):
     )
 
     vehicle_position = State("m", 0.0, shape=(_vehicles,), output=True, description="displacement since departure")
-    vehicle_speed = State("m/s", 0.0, shape=(_vehicles,), output=True, description="speed of each vehicle")
+    vehicle_speed = State(
+        "m/s", 0.0, shape=(_vehicles,), output=True, standstill=True, description="speed of each vehicle"
+    )
 
     position = Output("m", description="measured position since departure")
     speed = Output("m/s", description="measured speed")
@@ -62,7 +68,7 @@ class CoupledSubwayTrain(MultipleUnit):
         waiting = self._waiting()
         speed = self._measured(self.vehicle_speed)
         effective = self._effective(self._vehicle_forces(speed))
-        power = added([force * self.vehicle_speed[k] for k, force in enumerate(effective)])
+        power = added([acting(force, v) * v for force, v in zip(effective, self.vehicle_speed, strict=True)])
         accelerations = self._accelerations(effective)
         rates = self._drive_rates(speed, power)
         return {
@@ -83,9 +89,14 @@ class CoupledSubwayTrain(MultipleUnit):
             "applied_force": added(effective),
             "vehicle_force": forces,
             "coupler_force": self._tensions(),
-            "resistance": added(self._resistances()),
+            "resistance": added(
+                [
+                    where(v < 0.0, r.backward, r.forward)
+                    for v, r in zip(self.vehicle_speed, self._opposing(), strict=True)
+                ]
+            ),
             "resistance_parameters": self._parameters(
-                [self.vehicle_speed[k] - speed for k in range(self.vehicles)], self._line(), 0.0
+                [self.vehicle_speed[k] - speed for k in range(self.vehicles)], self._line(self._places()), 0.0
             ),
         }
 
@@ -109,24 +120,24 @@ class CoupledSubwayTrain(MultipleUnit):
         k_c, c_c = self.coupler_stiffness, self.coupler_damping
         return [k_c * (y[k] - y[k + 1]) + c_c * (v[k] - v[k + 1]) for k in range(self.vehicles - 1)]
 
-    def _line(self) -> list[Any]:
-        """Force of the line against each vehicle in N."""
-        places = [self.vehicle_position[k] - k * self.vehicle_length for k in range(self.vehicles)]
-        return [mass * self._line_resistance(x) for mass, x in zip(self._masses(), places, strict=True)]
+    def _places(self) -> list[Any]:
+        """Where on the line each vehicle is, in m."""
+        return [self.vehicle_position[k] - k * self.vehicle_length for k in range(self.vehicles)]
 
-    def _resistances(self) -> list[Any]:
-        """Davis and line resistance of each vehicle in N."""
-        rows = zip(self._weight_forces(), self._davis(self._clock()), self._line(), strict=True)
-        found = []
-        for k, (weight, davis, w) in enumerate(rows):
-            v = self.vehicle_speed[k]
-            found.append(weight * self._rolling(davis.a + davis.b * v + davis.c * v * v, v) + w)
-        return found
+    def _opposing(self) -> list[Resistance]:
+        """Davis and line resistance of each vehicle."""
+        return self._resistances(self.vehicle_speed, self.vehicle_speed, self._line(self._places()))
 
     def _accelerations(self, effective: list[Any]) -> list[Any]:
         pull = [0.0, *self._tensions(), 0.0]
-        rows = zip(effective, self._resistances(), self._masses(), strict=True)
+        drag = self._drag()
+        rows = zip(effective, self._opposing(), self._stuck(), self._masses(), strict=True)
         return [
-            (force - resistance + pull[k] - pull[k + 1]) / mass - self._drag()
-            for k, (force, resistance, mass) in enumerate(rows)
+            opposed(
+                self.vehicle_speed[k],
+                (force - resistance.forward + pull[k] - pull[k + 1]) / mass - drag.forward,
+                (abs(force) - resistance.backward + pull[k] - pull[k + 1]) / mass - drag.backward,
+                stuck / mass,
+            )
+            for k, (force, resistance, stuck, mass) in enumerate(rows)
         ]

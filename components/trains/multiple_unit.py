@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from abc import ABC
+from collections.abc import Iterable, Sequence
 from typing import Any, NamedTuple
 
 from ..component import Values
@@ -10,7 +11,7 @@ from ..declarations import Data, Input, Memory, Noise, Output, Parameter, Size, 
 from ..environment.line import SECTIONS
 from ..maths import clip, maximum, minimum, piecewise_constant, sin, where
 from .metro_line import MILD
-from .port import Train
+from .port import STARTING, Train
 from .vehicles import REPEATED, SUBWAY, VEHICLES, distribute, pattern
 
 WAITING = -1e-6
@@ -27,6 +28,17 @@ class Davis(NamedTuple):
     a: Any
     b: Any
     c: Any
+
+    def at(self, speed: Any) -> Any:
+        """Against motion at a speed in its direction, in N/kN."""
+        return self.a + self.b * speed + self.c * speed * speed
+
+
+class Resistance(NamedTuple):
+    """What a vehicle in motion meets, positive against running forwards, in N: running forwards and backwards."""
+
+    forward: Any
+    backward: Any
 
 
 class TripTrain(Train, ABC):
@@ -55,6 +67,9 @@ class MultipleUnit(TripTrain, ABC):
 
     The command passes the limits of force and power, then the lag of the drive; it is shared among the vehicles, and
     adhesion cuts what a wheel cannot transmit. Limits, adhesion and lag are off by default, as in the source.
+
+    The source's equation is that of forward motion. Davis, curve and tunnel resistance and the brake turn with the
+    motion and hold at rest; ``starting_resistance`` is in N/kN of weight.
     """
 
     vehicles = Size(6, minimum=2, description="number of vehicles")
@@ -75,6 +90,7 @@ class MultipleUnit(TripTrain, ABC):
     swing_frequency = Parameter(
         "rad/s", (0.0039, 0.002), shape=(2,), description="angular frequency of it, motor cars and trailers"
     )
+    starting_resistance = Parameter("N/kN", 0.0, minimum=0.0, description=STARTING)
     stiction = Parameter(
         "1", False, description="whether Davis resistance vanishes at standstill, as v / stiction_speed"
     )
@@ -101,7 +117,7 @@ class MultipleUnit(TripTrain, ABC):
     applied_force = Output("N", description="total force at the wheels after limits, lag and adhesion")
     vehicle_force = Output("N", shape=(vehicles,), description="force F of each vehicle; mu F acts on the train")
     coupler_force = Output("N", shape=(vehicles - 1,), description="force between vehicles k and k+1, tension positive")
-    resistance = Output("N", description="total resistance against the train")
+    resistance = Output("N", description="total resistance against the train; at rest that against a start")
     resistance_parameters = Output(
         "1", shape=(3,), description="R1 (N), R2 (N.s/m) and R3 (N.s2/m2), what a learning controller estimates"
     )
@@ -129,9 +145,14 @@ class MultipleUnit(TripTrain, ABC):
             )
         return [kinds[0] if motored else kinds[1] for motored in self._motored()]
 
-    def _line_resistance(self, position: Any) -> Any:
-        """Force per mass of the line against a vehicle at a position, in N/kg."""
-        return piecewise_constant(position, self.line.positions, self.line.resistances)
+    def _line(self, positions: Iterable[Any]) -> list[Resistance]:
+        """Force of the built-in line against each vehicle at its position in N."""
+        line, found = self.line, []
+        for mass, x in zip(self._masses(), positions, strict=True):
+            whole = mass * piecewise_constant(x, line.positions, line.resistances)
+            turning = mass * piecewise_constant(x, line.positions, line.opposing)
+            found.append(Resistance(whole, whole - 2.0 * turning))
+        return found
 
     def _weight_forces(self) -> list[Any]:
         """Weight of each vehicle in kN: times N/kN it is a force."""
@@ -141,20 +162,37 @@ class MultipleUnit(TripTrain, ABC):
         """Davis resistance with stiction, where that is asked for."""
         return where(self.stiction, resistance * clip(speed / self.stiction_speed, -1.0, 1.0), resistance)
 
-    def _parameters(self, relative: list[Any], line: list[Any], coupling: Any) -> list[Any]:
+    def _resistances(self, speeds: Sequence[Any], paces: Sequence[Any], line: Sequence[Resistance]) -> list[Resistance]:
+        """Davis and line resistance of each vehicle for its speed; its pace decides on stiction."""
+        rows = zip(self._weight_forces(), self._davis(self._clock()), speeds, paces, line, strict=True)
+        return [
+            Resistance(
+                weight * self._rolling(davis.at(v), pace) + w.forward,
+                w.backward - weight * self._rolling(davis.at(-v), -pace),
+            )
+            for weight, davis, v, pace, w in rows
+        ]
+
+    def _stuck(self) -> list[Any]:
+        """How much more than of motion the friction of each vehicle is at rest, in N."""
+        rows = zip(self._weight_forces(), self._davis(self._clock()), strict=True)
+        return [weight * maximum(self.starting_resistance - self._rolling(davis.a, 0.0), 0.0) for weight, davis in rows]
+
+    def _parameters(self, relative: list[Any], line: Sequence[Resistance], coupling: Any) -> list[Any]:
         """R1, R2 and R3 for speeds relative to the measured one, line forces in N, and what the couplers cost in N."""
         r1, r2, r3 = coupling, 0.0, 0.0
         rows = zip(self._weight_forces(), self._davis(self._clock()), relative, line, strict=True)
         for weight, davis, s, w in rows:
-            r1 = r1 + weight * (davis.a + davis.b * s + davis.c * s * s) + w
+            r1 = r1 + weight * (davis.a + davis.b * s + davis.c * s * s) + w.forward
             r2 = r2 + weight * (davis.b + 2.0 * davis.c * s)
             r3 = r3 + weight * davis.c
         return [r1, r2, r3]
 
-    def _drag(self) -> Any:
-        """Force per mass against the train that is not its own: the external line less the disturbances."""
+    def _drag(self) -> Resistance:
+        """Force per mass against the train that is not its own: the external line less the disturbances, in N/kg."""
         random = self.disturbance_size * (2.0 * self.draw - 1.0)
-        return self.line_resistance - self.disturbance - random
+        forward = self.line_resistance - self.disturbance - random
+        return Resistance(forward, forward - 2.0 * self.curve_resistance)
 
     def _limited(self, speed: Any) -> Any:
         """The command after the limits of force and power."""

@@ -8,7 +8,8 @@ from ..component import Values
 from ..declarations import Data, Parameter, State
 from ..maths import cos, sin, where
 from ..tables import Column, Table
-from .multiple_unit import MultipleUnit
+from .multiple_unit import MultipleUnit, Resistance
+from .port import acting, opposed
 from .vehicles import REPEATED, added, pattern
 
 _COUPLERS = (
@@ -37,11 +38,21 @@ class Motion(NamedTuple):
     acceleration: list[Any]
 
 
+class Balance(NamedTuple):
+    """Accelerations in m/s2, as it is and of a motion either way, and the resistance of the train and its vehicles."""
+
+    acceleration: Any
+    forward: Any
+    backward: Any
+    resistance: Resistance
+    vehicles: list[Resistance]
+
+
 class SubwayTrain(MultipleUnit):
     """A six-car subway train with prescribed coupler deformations and time-varying Davis coefficients (the paper's).
 
     M dv/dt = u - R1(t, x) - R2(t) v - R3(t) v^2 + M d, u = sum(mu_k F_k). Coefficients of the resistance are in N/kN of
-    weight. As printed, the constant part of the resistance acts at standstill too; ``stiction`` changes that.
+    weight. The source uses this formula at every speed; here what opposes motion holds the train at rest, as a whole.
     """
 
     source = "Liu & Hou 2020, eqs. 1-9, 52-59, 65; units settled, line chosen"
@@ -59,6 +70,9 @@ class SubwayTrain(MultipleUnit):
         r" (times load_factor), weights $\mu_k$, vehicle_length $L$, the line's resistance $w$ in N/kN, line_resistance"
         r" $r$, disturbance $d$, coupler deformations $s_k$, and $a_k, b_k, c_k$ each of the form $a_0 + a_1 \sin"
         r" \omega t$.",
+        r"Backwards: $|u|$ for $u$, and the opposite of what in $R_1, R_2, R_3$ and $r$ is neither slope nor coupler,"
+        r" at $-v$. At rest: the $\dot v$ of the two which sets the train in motion its own way, if its force is more"
+        r" than starting_resistance exceeds $a_k$ by; else 0.",
     )
     recommended_step = 0.01
 
@@ -69,36 +83,31 @@ class SubwayTrain(MultipleUnit):
     )
 
     position = State("m", 0.0, output=True, description="position of the leading vehicle since departure")
-    speed = State("m/s", 0.0, output=True, description="speed of the leading vehicle")
+    speed = State("m/s", 0.0, output=True, standstill=True, description="speed of the leading vehicle")
 
     def derivatives(self) -> Values:
-        waiting, motion = self._waiting(), self._deformation()
+        waiting = self._waiting()
         force = added(self._effective(self._vehicle_forces(self.speed)))
-        resistance = added(self._resistances(motion, self._line())) + self._coupling(motion)
         rates = {
             "position": self.speed,
-            "speed": self._acceleration(force, resistance),
-            **self._drive_rates(self.speed, force * self.speed),
+            "speed": self._balance(force).acceleration,
+            **self._drive_rates(self.speed, acting(force, self.speed) * self.speed),
         }
         return {name: where(waiting, 0.0, rate) for name, rate in rates.items()}
 
     def outputs(self) -> Values:
         waiting = self._waiting()
-        motion, line = self._deformation(), self._line()
         forces = [where(waiting, 0.0, force) for force in self._vehicle_forces(self.speed)]
         effective = self._effective(forces)
-        force = added(effective)
-        resistances = self._resistances(motion, line)
-        resistance = added(resistances) + self._coupling(motion)
-        acceleration = self._acceleration(force, resistance)
-        couplers = self._coupler_forces(effective, resistances, acceleration, motion)
+        balance = self._balance(added(effective))
+        motion = self._deformation()
         return {
-            "acceleration": where(waiting, 0.0, acceleration),
-            "applied_force": force,
+            "acceleration": where(waiting, 0.0, balance.acceleration),
+            "applied_force": added(effective),
             "vehicle_force": forces,
-            "coupler_force": [where(waiting, 0.0, coupler) for coupler in couplers],
-            "resistance": resistance,
-            "resistance_parameters": self._parameters(motion.speed, line, self._coupling(motion)),
+            "coupler_force": [where(waiting, 0.0, force) for force in self._coupler_forces(effective, balance, motion)],
+            "resistance": where(self.speed < 0.0, balance.resistance.backward, balance.resistance.forward),
+            "resistance_parameters": self._parameters(motion.speed, self._line(self._places()), self._coupling(motion)),
         }
 
     def update(self) -> Values:
@@ -114,36 +123,44 @@ class SubwayTrain(MultipleUnit):
             acceleration.append(acceleration[-1] - w * w * (coupler.sine * sine + coupler.cosine * cosine))
         return Motion(speed, acceleration)
 
-    def _line(self) -> list[Any]:
-        """Force of the line against each vehicle in N."""
-        places = [self.position - k * self.vehicle_length for k in range(self.vehicles)]
-        return [mass * self._line_resistance(x) for mass, x in zip(self._masses(), places, strict=True)]
+    def _places(self) -> list[Any]:
+        """Where on the line each vehicle is, in m."""
+        return [self.position - k * self.vehicle_length for k in range(self.vehicles)]
 
     def _coupling(self, motion: Motion) -> Any:
         """F_K: what the prescribed accelerations of the vehicles behind the first cost, in N."""
         terms = [mass * a for mass, a in zip(self._masses(), motion.acceleration, strict=True)]
         return added(terms[1:])
 
-    def _resistances(self, motion: Motion, line: list[Any]) -> list[Any]:
-        """Davis and line resistance of each vehicle in N."""
-        rows = zip(self._weight_forces(), self._davis(self._clock()), motion.speed, line, strict=True)
-        found = []
-        for weight, davis, s, w in rows:
-            v = self.speed + s
-            found.append(weight * self._rolling(davis.a + davis.b * v + davis.c * v * v, self.speed) + w)
-        return found
+    def _balance(self, force: Any) -> Balance:
+        """The train under a total force at the wheels in N."""
+        motion, drag, mass = self._deformation(), self._drag(), added(self._masses())
+        speeds = [self.speed + s for s in motion.speed]
+        vehicles = self._resistances(speeds, [self.speed] * self.vehicles, self._line(self._places()))
+        coupling = self._coupling(motion)
+        whole = Resistance(
+            added([r.forward for r in vehicles]) + coupling, added([r.backward for r in vehicles]) + coupling
+        )
+        forward = (force - whole.forward) / mass - drag.forward
+        backward = (abs(force) - whole.backward) / mass - drag.backward
+        acceleration = opposed(self.speed, forward, backward, added(self._stuck()) / mass)
+        return Balance(acceleration, forward, backward, whole, vehicles)
 
-    def _acceleration(self, force: Any, resistance: Any) -> Any:
-        return (force - resistance) / added(self._masses()) - self._drag()
+    def _coupler_forces(self, effective: list[Any], balance: Balance, motion: Motion) -> list[Any]:
+        """In-train forces behind each vehicle but the last, from the equations of motion of the vehicles ahead.
 
-    def _coupler_forces(
-        self, effective: list[Any], resistances: list[Any], acceleration: Any, motion: Motion
-    ) -> list[Any]:
-        """In-train forces behind each vehicle but the last, from the equations of motion of the vehicles ahead."""
-        rows = zip(effective, resistances, self._masses(), motion.acceleration, strict=True)
+        At rest friction takes what the balance needs, of every vehicle the same share.
+        """
+        width = balance.backward - balance.forward
+        share = where(width > 0.0, (balance.backward - balance.acceleration) / where(width > 0.0, width, 1.0), 1.0)
+        share = where(self.speed > 0.0, 1.0, where(self.speed < 0.0, 0.0, share))
+        rows = zip(effective, balance.vehicles, self._masses(), motion.acceleration, strict=True)
+        acceleration, drag = balance.acceleration, self._drag()
         forces: list[Any] = []
         force: Any = 0.0
         for drive, resistance, mass, relative in rows:
-            force = force + drive - resistance - mass * (acceleration + self._drag() + relative)
+            forward = force + drive - resistance.forward - mass * (acceleration + drag.forward + relative)
+            backward = force + abs(drive) - resistance.backward - mass * (acceleration + drag.backward + relative)
+            force = where(share == 1.0, forward, backward + share * (forward - backward))
             forces.append(force)
         return forces[:-1]

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from ...components.component import Component, ComponentError
-from ...components.declarations import Input, Output, Parameter, Tape
+from ...components.declarations import Input, Output, Parameter, State, Tape
 from ...components.tracing import feedthrough
 from ..variables import ScalarVariable, scalar_variables
 from .ccode import number
@@ -45,6 +45,8 @@ def model_header(component: Component, traced: Traced, guid: str) -> str:
     held = _held(component)
     texts = [v for v in variables if v.slot.type is str]
     real_inputs = [v for v in variables if v.slot.type is float and v.causality == "input"]
+    states = [v for v in variables if isinstance(v.slot.declaration, State)]
+    standstill = [k for k, v in enumerate(states) if isinstance(d := v.slot.declaration, State) and d.standstill]
     numbers = {v.reference: k for members in (texts, real_inputs) for k, v in enumerate(members)}
     scratch = max(
         layout.outputs[1] + layout.states[1],
@@ -59,6 +61,7 @@ def model_header(component: Component, traced: Traced, guid: str) -> str:
         "FIRST_STATE": layout.states[0],
         "N_STATES": layout.states[1],
         "FIRST_MEMORY": layout.memory[0],
+        "N_STANDSTILL": len(standstill),
         "N_MEMORY": layout.memory[1],
         "FIRST_TAPE": layout.tape[0],
         "N_TAPE": layout.tape[1],
@@ -84,6 +87,7 @@ def model_header(component: Component, traced: Traced, guid: str) -> str:
         _array("const Noise model_noises", _noises(component, layout.noise[0], references), "{0, 0, 0, 0, false}"),
         _array("const int model_initial_targets", [str(references[n]) for n in traced.initial], "0"),
         _array("const int model_reinitialised", [str(references[n]) for n in traced.reinitialised], "0"),
+        _array("const int model_standstill", map(str, standstill), "0"),
         _array("const bool model_held", ["true" if flag else "false" for flag in held], "false"),
         _array("const double model_tape_start", [number(x) for x in tape_start], "0.0"),
     ]

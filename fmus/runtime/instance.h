@@ -57,6 +57,15 @@ typedef void Equations(const double *clock, const double *values, double *result
 #define ALWAYS_INLINE static inline
 #endif
 
+/* For a function that is rarely called: a compiler that copies it into its callers makes the usual way slower. */
+#if defined(__GNUC__)
+#define NEVER_INLINE static __attribute__((noinline, cold))
+#elif defined(_MSC_VER)
+#define NEVER_INLINE static __declspec(noinline)
+#else
+#define NEVER_INLINE static
+#endif
+
 #include "model.h"
 
 typedef enum {

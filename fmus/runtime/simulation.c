@@ -130,44 +130,6 @@ static fmi2Status check_bounds(Instance *s, const Variable *variable, double val
 }
 
 #if N_STATES > 0
-static inline void slope(Instance *s, bool moving, double time, double elapsed, double *result)
-{
-    s->time = time;
-    if (moving) {
-        move_inputs(s, elapsed);
-    }
-    call_equations(s, MODEL_DERIVATIVES, result);
-}
-
-/* Classical Runge-Kutta in `count` sub-steps of length h, memory held. Inputs rarely move. In one copy for both cases the
-   values could not stay in registers, and a step of the point-mass train took twice its time. */
-ALWAYS_INLINE void runge_kutta(Instance *s, bool moving, double begin, double elapsed, double h, int count)
-{
-    double half = 0.5 * h, sixth = h / 6.0;
-    double *x = s->values + FIRST_STATE, *start = s->states;
-    double *k1 = s->slopes[0], *k2 = s->slopes[1], *k3 = s->slopes[2], *k4 = s->slopes[3];
-    for (int part = 0; part < count; part++) {
-        double t = begin + (double)part * h, u = elapsed + (double)part * h;
-        memcpy(start, x, N_STATES * sizeof(double));
-        slope(s, moving, t, u, k1);
-        for (int n = 0; n < N_STATES; n++) {
-            x[n] = start[n] + half * k1[n];
-        }
-        slope(s, moving, t + half, u + half, k2);
-        for (int n = 0; n < N_STATES; n++) {
-            x[n] = start[n] + half * k2[n];
-        }
-        slope(s, moving, t + half, u + half, k3);
-        for (int n = 0; n < N_STATES; n++) {
-            x[n] = start[n] + h * k3[n];
-        }
-        slope(s, moving, t + h, u + h, k4);
-        for (int n = 0; n < N_STATES; n++) {
-            x[n] = start[n] + sixth * (((k1[n] + 2.0 * k2[n]) + 2.0 * k3[n]) + k4[n]);
-        }
-    }
-}
-
 /* Equal sub-steps no longer than max_step; `elapsed` is the time from the beginning of the communication step to that of
    the integration. */
 static fmi2Status integrate(Instance *s, double begin, double elapsed, double length)

@@ -37,7 +37,7 @@ class {name}(CruiseController):
         demand = clip(bottom, -self.acceleration_limit, self.acceleration_limit)
         return {{
             "demand": demand,
-            "force": self.mass * (self._davis(self.speed) + self.line_resistance + demand),
+            "force": self.mass * (self._resistance(self.speed) + demand),
             "range_violated": False,
             "bottom_demand": bottom,
         }}

@@ -140,14 +140,14 @@ def test_feedthrough_of_the_shipped_components():
     """Reference: the design's closed loop: train and sources have none but acceleration, the controller has it."""
     train = feedthrough(PointMassTrain())
     assert train["position"] == train["speed"] == frozenset()
-    assert train["acceleration"] == {"force", "disturbance", "line_resistance"}
+    assert train["acceleration"] == {"force", "disturbance", "line_resistance", "curve_resistance"}
     assert train["applied_force"] == {"force"}
     cruise = feedthrough(ComfortCruise())
     # A neighbour's position is extrapolated from its speed over its age, so the range depends on all three.
     heard = {f"{who}_{what}" for who in ("ahead", "behind") for what in ("position", "speed", "age")}
     neighbours = heard | {"has_ahead", "has_behind"}
     assert cruise["demand"] == neighbours | {"position", "speed", "target_speed", "has_leader", "leader_speed"}
-    assert cruise["force"] == cruise["demand"] | {"line_resistance"}
+    assert cruise["force"] == cruise["demand"] | {"line_resistance", "curve_resistance"}
     assert cruise["range_violated"] == neighbours | {"position"}
     assert cruise["degraded"] == {"ahead_age", "behind_age", "leader_age", "has_ahead", "has_behind", "has_leader"}
     assert feedthrough(Gust()) == {"acceleration": frozenset()}

@@ -10,7 +10,7 @@ import pytest
 
 ca = pytest.importorskip("casadi")
 ccode = pytest.importorskip("railcosim.fmus.native.ccode")
-HEAD = "#include <math.h>\n"
+HEAD = "#include <math.h>\n#include <stdbool.h>\n#define ALWAYS_INLINE static inline\n"
 PAIRS = [(0.7, 1.9), (-1.3, 2.0), (2.0, 2.0), (0.0, -0.5), (1e-300, 1e300), (-0.0, 0.0)]
 
 

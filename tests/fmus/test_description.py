@@ -217,13 +217,16 @@ def test_point_mass_train_by_hand(model):
     found, direct, initial = variables(root), unknowns(root, "Outputs"), unknowns(root, "InitialUnknowns")
     limits = {"limit_force", "traction_limit", "braking_limit"}
     assert direct == {
-        "acceleration": {"force", "disturbance", "line_resistance"},
+        "acceleration": {"force", "disturbance", "line_resistance", "curve_resistance"},
         "applied_force": {"force"},
         "position": set(),
         "speed": set(),
     }
     assert initial == {
-        "acceleration": {"force", "disturbance", "line_resistance", "mass", "c0", "c1", "c2", "speed", *limits},
+        "acceleration": {
+            *("force", "disturbance", "line_resistance", "curve_resistance"),
+            *("mass", "c0", "c1", "c2", "starting_resistance", "speed", *limits),
+        },
         "applied_force": {"force", *limits},
     }
     assert found["position"] == {
@@ -252,7 +255,7 @@ def test_comfort_cruise_by_hand(model):
     direct = unknowns(root, "Outputs")
     heard = {"position", "speed", "target_speed", "has_ahead", "ahead_position", "ahead_speed"}
     heard |= {"has_behind", "behind_position", "behind_speed", "has_leader", "leader_speed", "ahead_age", "behind_age"}
-    assert direct["force"] == heard | {"line_resistance"}
+    assert direct["force"] == heard | {"line_resistance", "curve_resistance"}
     assert direct["demand"] == direct["bottom_demand"] == heard
     neighbours = {f"{side}_{what}" for side in ("ahead", "behind") for what in ("position", "speed", "age")}
     assert direct["range_violated"] == {"position", "has_ahead", "has_behind"} | neighbours

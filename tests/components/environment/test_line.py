@@ -8,30 +8,32 @@ PROFILE = [
     {"position": 1e3, "gradient": 0.01},
     {"position": 2e3, "gradient": -0.02, "radius": 6000.0},
     {"position": 3e3, "resistance": 0.05},
+    {"position": 4e3, "tunnel": 1500.0},
 ]
 
 
 @pytest.mark.parametrize(
-    ("position", "expected"),
+    ("position", "expected", "opposing"),
     [
-        (-5.0, 0.0),
-        (0.0, 0.0),
-        (999.9, 0.0),
-        (1000.0, 0.0981),
-        (1999.0, 0.0981),
-        (2000.0, -0.1962 + 9.81 * 1e-4),
-        (3000.0, 0.05),
-        (9e9, 0.05),
+        (-5.0, 0.0, 0.0),
+        (0.0, 0.0, 0.0),
+        (999.9, 0.0, 0.0),
+        (1000.0, 0.0981, 0.0),
+        (1999.0, 0.0981, 0.0),
+        (2000.0, -0.1962 + 9.81 * 1e-4, 9.81 * 1e-4),
+        (3000.0, 0.05, 0.05),
+        (9e9, 9.81 * 1.95e-4, 9.81 * 1.95e-4),
     ],
 )
-def test_sections(position, expected):
-    assert Line(profile=PROFILE, position=position).outputs()["line_resistance"] == pytest.approx(expected, abs=1e-12)
-    half = Line(profile=PROFILE, position=position, factor=0.5).outputs()["line_resistance"]
-    assert half == pytest.approx(0.5 * expected, abs=1e-12)
+def test_sections(position, expected, opposing):
+    both = {"line_resistance": expected, "curve_resistance": opposing}
+    assert Line(profile=PROFILE, position=position).outputs() == pytest.approx(both, abs=1e-12)
+    half = Line(profile=PROFILE, position=position, factor=0.5).outputs()
+    assert half == pytest.approx({name: 0.5 * value for name, value in both.items()}, abs=1e-12)
 
 
 def test_without_data_the_line_is_level():
-    assert Line(position=5e3).outputs() == {"line_resistance": 0.0}
+    assert Line(position=5e3).outputs() == {"line_resistance": 0.0, "curve_resistance": 0.0}
 
 
 @pytest.mark.parametrize(
@@ -44,6 +46,8 @@ def test_without_data_the_line_is_level():
         [{"position": 1.0}, {"position": 1.0}],
         [{"position": 0.0, "slope": 0.01}],
         [{"position": 0.0, "radius": -1.0}],
+        [{"position": 0.0, "tunnel": -1.0}],
+        [{"position": 0.0, "resistance": -0.01}],
         [{"position": 0.0, "gradient": "steep"}],
     ],
 )

@@ -135,7 +135,7 @@ def test_in_train_forces_carry_what_lies_ahead_of_them():
     out = train.outputs()
     motion = train._deformation()
     drive = np.array([1, 0.5, 0.4, 0.6, 1, 0.5]) * out["vehicle_force"]
-    resistance = train._resistances(motion, train._line())
+    resistance = np.array([r.forward for r in train._balance(0.0).vehicles])
     masses = np.array([32939, 32957, 27090, 34050, 33785, 33474])
     inertia = masses * (out["acceleration"] - 0.03 + np.array(motion.acceleration))
     behind = np.cumsum((drive - resistance - inertia)[::-1])[::-1]

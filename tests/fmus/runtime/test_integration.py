@@ -1,0 +1,45 @@
+"""integration.c: native trains come to rest as in plain Python, to the bit, also under inputs that move in a step."""
+
+import numpy as np
+import pytest
+from railcosim.orchestrator import System, run
+
+TRIP = {"trip": 1, "trip_time": 0.0}
+
+
+def signals(component, values, stop, step, kind):
+    """A train's position, speed and the rest of its outputs over time."""
+    system = System(stop_time=stop, step=step)
+    system.add("train", component, **values)
+    result = run(system, kind=kind)
+    names = sorted(result.names(), key=lambda name: (name != "train.position", name != "train.speed", name))
+    return np.array([result[name] for name in names])
+
+
+@pytest.mark.parametrize(
+    ("component", "values", "stop", "step"),
+    [
+        ("PointMassTrain", {"speed": 5.0, "force": -300e3}, 20.0, 1.0),
+        ("PointMassTrain", {"speed": 5.0, "force": 0.0, "line_resistance": 0.05, "max_step": 0.7}, 119.0, 1.4),
+        ("Consist", {"speed": [3.0, 2.0, 2.5], "position": [0.0, -25.0, -50.0], "force": [-1e5, 0.0, -5e4]}, 20.0, 0.1),
+        ("SubwayTrain", {"speed": 2.0, "force": -150e3, "max_step": 0.05, **TRIP}, 4.0, 0.1),
+        ("CoupledSubwayTrain", {"vehicle_speed": [0.5] * 6, "force": -150e3, "max_step": 0.01, **TRIP}, 1.5, 0.1),
+    ],
+)
+def test_a_native_train_stops_as_in_plain_python(component, values, stop, step):
+    plain, native = (signals(component, values, stop, step, kind) for kind in ("plain", "native"))
+    assert (plain == native).all()
+    assert (native[1:, -1] == 0.0).any()
+
+
+@pytest.mark.long
+def test_a_train_coasts_to_rest_and_stays_in_every_kind():
+    """2500 s from 5 m/s, at rest after 340 s: the resistance formula alone would drive it back to -15 000 m/s."""
+    found = [
+        signals("PointMassTrain", {"speed": 5.0, "force": 0.0}, 2500.0, 0.1, k) for k in ("plain", "python", "native")
+    ]
+    for signal in found[1:]:
+        assert (signal == found[0]).all()
+    speed = found[0][1]
+    assert speed.min() == 0.0
+    assert (speed[3410:] == 0.0).all()
