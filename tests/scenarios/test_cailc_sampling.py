@@ -1,7 +1,7 @@
 """CAILC under other samples, delays, loads, drives and trains: sections 5 to 9 of the specification.
 
-Expected numbers are those of `docs/models/cailc_ato.md`, from an independent NumPy implementation. Tolerances are its
-own, 2 % on trip 1 and 5 % later; wider ones, where another drive or integration is compared, stand beside the case.
+Expected numbers are those of `docs/models/cailc_ato.md`, from independent implementations in NumPy and C. Tolerances
+are theirs, 2 % on trip 1 and 5 % later; wider ones, where another drive or integration is compared, stand beside the case.
 """
 
 import runpy
@@ -31,9 +31,9 @@ def check(trips, expected, name="augmented_error", **tolerance):
 @pytest.mark.parametrize(
     ("algorithm", "step", "law", "golden"),
     [
-        ("jacobi", 0.05, {}, (0.012491809, 0.008276392)),
-        ("jacobi", 0.05, FILTERED, (0.012491809, 0.008495886)),
-        ("gauss-seidel", 0.02, {}, (0.012491043, 0.005102490)),
+        ("jacobi", 0.05, {}, (0.012491809, 0.007363353)),
+        ("jacobi", 0.05, FILTERED, (0.012491809, 0.007408978)),
+        ("gauss-seidel", 0.02, {}, (0.012491043, 0.005101132)),
     ],
 )
 def test_golden_values_of_the_three_units(algorithm, step, law, golden):
@@ -50,10 +50,10 @@ def test_golden_values_of_the_three_units(algorithm, step, law, golden):
 @pytest.mark.parametrize(
     ("step", "rows"),
     [
-        (0.005, ((0.0665, 0.0658), (0.0665, 0.0658), (0.01249, 0.00099), (0.01249, 0.00112), 0.0035, 0.0036)),
-        (0.01, ((0.0665, 0.0658), (0.0665, 0.0658), (0.01249, 0.00105), (0.01249, 0.00140), 0.0035, 0.0038)),
-        (0.02, ((0.0665, 0.0658), (0.0666, 0.0658), (0.01249, 0.00119), (0.01249, 0.00231), 0.0037, 0.0043)),
-        (0.05, ((0.0665, 0.0658), (0.0666, 0.0658), (0.01249, 0.00221), (0.01249, 0.0361), 0.0039, 0.0082)),
+        (0.005, ((0.0665, 0.0658), (0.0665, 0.0658), (0.01249, 0.00102), (0.01249, 0.00113), 0.0032, 0.0033)),
+        (0.01, ((0.0665, 0.0658), (0.0665, 0.0658), (0.01249, 0.00108), (0.01249, 0.00136), 0.0033, 0.0035)),
+        (0.02, ((0.0665, 0.0658), (0.0665, 0.0658), (0.01249, 0.00118), (0.01249, 0.00198), 0.0034, 0.0039)),
+        (0.05, ((0.0664, 0.0657), (0.0665, 0.0658), (0.01249, 0.00152), (0.01249, 0.0282), 0.0036, 0.0065)),
     ],
 )
 def test_sampling_table(step, rows):
@@ -69,7 +69,7 @@ def test_sampling_table(step, rows):
 @fast
 @pytest.mark.parametrize(
     ("step", "algorithm", "expected"),
-    [(0.05, "jacobi", 0.098), (0.1, "gauss-seidel", 0.079), (0.1, "jacobi", 0.152)],
+    [(0.05, "jacobi", 0.095), (0.1, "gauss-seidel", 0.078), (0.1, "jacobi", 0.136)],
 )
 def test_acceleration_at_the_start_of_the_sample_is_an_error_force(step, algorithm, expected):
     """Section 7, as stated without bounds; 6 %: at such steps integration within trips differs."""
@@ -124,8 +124,8 @@ def test_start_offset():
 @pytest.mark.parametrize(
     ("factor", "law", "first", "last"),
     [
-        (0.9, {}, 0.0346, 0.0009), (1.05, {}, 0.0272, 0.0011), (1.1, {}, 0.0402, 0.0013), (1.25, {}, 0.0623, 0.0017),
-        (1.4, {}, 0.180, 0.176), (1.05, AS_STATED, 0.101, None),
+        (0.9, {}, 0.0346, 0.00084), (1.05, {}, 0.0272, 0.00120), (1.1, {}, 0.0402, 0.00132),
+        (1.25, {}, 0.0623, 0.00179), (1.4, {}, 0.180, 0.176), (1.05, AS_STATED, 0.101, None),
     ],
 )  # fmt: skip
 def test_wrong_mass(factor, law, first, last):
@@ -203,15 +203,18 @@ def test_comfort_at_every_sample():
         change = np.abs(a[10:] - a[:-10]) / 0.1
         return change.max(), np.sqrt(np.mean(change**2))
 
-    assert jerk(Trips(1)) == pytest.approx((1.04, 0.170), rel=0.01)
-    assert jerk(Trips(1, plant={"stiction": True}))[0] == pytest.approx(0.93, rel=0.01)
+    assert jerk(Trips(1)) == pytest.approx((0.994, 0.170), rel=0.01)
+    assert jerk(Trips(1, plant={"stiction": True}))[0] == pytest.approx(0.879, rel=0.01)
     assert jerk(Trips(1, ato="AdaptiveAto")) == pytest.approx((23.8, 1.08), rel=0.01)
 
 
 @fast
-def test_the_printed_train_rolls_back_a_little():
-    """Section 2: a_k acts at v = 0 too, 0.035 mm at the start."""
-    assert Trips(1, law=AS_STATED).during("train.position", 1).min() == pytest.approx(-0.035e-3, abs=0.002e-3)
+def test_the_train_is_held_until_the_drive_is_stronger_than_what_resists():
+    """Section 2: as printed, a_k would push the standing train back by 0.035 mm."""
+    trips = Trips(1, law=AS_STATED)
+    position, force = trips.during("train.position", 1), trips.during("ato.force", 1)
+    assert position.min() == 0.0
+    assert force[position == 0.0].max() > 5e3
 
 
 @fast
@@ -226,7 +229,7 @@ def test_spring_damper_couplers_and_where_the_speed_is_measured():
 
 @fast
 @pytest.mark.long
-@pytest.mark.parametrize(("step", "last"), [(0.02, 0.0032), (0.05, 0.0054)])
+@pytest.mark.parametrize(("step", "last"), [(0.02, 0.0027), (0.05, 0.0034)])
 def test_spring_damper_couplers_with_delay(step, last):
     """Section 6: the mean of the motor cars, one sample of delay, filtered."""
     trips = Trips(10, train="CoupledSubwayTrain", step=step, algorithm="jacobi", law=FILTERED)

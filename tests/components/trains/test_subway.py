@@ -92,7 +92,7 @@ def test_the_train_stands_while_waiting_and_starts_anew_at_each_departure():
 
 
 def test_resistance_at_standstill_and_stiction():
-    """As printed the train rolls back while its force is small; with stiction the Davis part vanishes at standstill."""
+    """What a start must overcome; with stiction the Davis part vanishes at standstill."""
     assert SubwayTrain(line=LEVEL, couplers=[{}]).outputs()["resistance"] == pytest.approx(2439.6, abs=0.1)
     assert SubwayTrain(line=LEVEL, couplers=[{}], stiction=True).outputs()["resistance"] == 0.0
     fast = SubwayTrain(line=LEVEL, couplers=[{}], stiction=True, speed=5.0).outputs()["resistance"]
