@@ -1,7 +1,8 @@
 """CAILC under other samples, delays, loads, drives and trains: sections 5 to 9 of the specification.
 
 Expected numbers are those of `docs/models/cailc_ato.md`, from independent implementations in NumPy and C. Tolerances
-are theirs, 2 % on trip 1 and 5 % later; wider ones, where another drive or integration is compared, stand beside the case.
+are theirs, 2 % on trip 1 and 5 % later; wider ones, where another drive or integration is compared, stand beside the
+case.
 """
 
 import runpy
