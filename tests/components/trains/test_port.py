@@ -244,7 +244,7 @@ def test_a_controller_compensates_the_resistance_of_the_direction_of_travel(law)
 
 def test_the_bound_of_a_law_that_compensates_another_speed_holds_when_rolling_back():
     law = RangePotentialCruise(
-        speed=-1.0, target_speed=30.0, has_ahead=True, ahead_position=400.0, guard=True, ahead_speed=0.0
+        speed=-1.0, target_speed=30.0, has_ahead=True, ahead_position=7250.0, guard=True, ahead_speed=0.0
     )
     out = law.outputs()
     train = PointMassTrain(speed=-1.0, force=out["force"]).outputs()
