@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import inspect
+import itertools
 import math
 from abc import ABC
 from collections.abc import Callable, Iterator, Mapping
@@ -244,7 +245,13 @@ class Component(ABC):
             return convert(Slot(name, Input(), "1", np.shape(self.present_values[name]), 0.0), value, owner)
         if isinstance(self.slots[name].declaration, Output):
             raise ComponentError(f"{owner}.{name} is computed and cannot be set")
-        return convert(self.slots[name], value, owner)
+        slot = self.slots[name]
+        converted = convert(slot, value, owner)
+        if isinstance(slot.declaration, Parameter) and slot.declaration.rising:
+            flat = converted.ravel().tolist()
+            if not all(a < b for a, b in itertools.pairwise(flat)):
+                raise ComponentError(f"{owner}.{name} must rise, not {flat!r}")
+        return converted
 
     def _shape(self, shape: Shape) -> tuple[int, ...]:
         return tuple(_length(self, axis) for axis in shape)
@@ -363,6 +370,8 @@ def _check_declarations(cls: type[Component]) -> None:
             flag = cls.declarations.get(declaration.flag.name)
             if not isinstance(flag, Input) or flag.type is not bool or flag.shape:
                 raise ComponentError(f"{where}: its flag must be a boolean Input of the same component, not an array")
+        if isinstance(declaration, Parameter) and declaration.rising and not declaration.shape:
+            raise ComponentError(f"{where}: only an array can rise; give it a shape")
         if isinstance(declaration, State | Tape) and declaration.type is not float:
             raise ComponentError(f"{where}: a {type(declaration).__name__} is a real number")
         taken = name in Component.__annotations__ or hasattr(Component, name)

@@ -120,11 +120,17 @@ class Variable(Declaration, ABC):
 
 
 class Parameter(Variable):
-    """A value that does not change by itself; a ``tunable`` one may be set between steps, others before the start."""
+    """A value that does not change by itself; a ``tunable`` one may be set between steps, others before the start.
 
-    def __init__(self, unit: str | Data = "1", start: Any = 0.0, *, tunable: bool = False, **rest: Any) -> None:
+    The elements of a ``rising`` one must rise, such as breakpoints.
+    """
+
+    def __init__(
+        self, unit: str | Data = "1", start: Any = 0.0, *, tunable: bool = False, rising: bool = False, **rest: Any
+    ) -> None:
         super().__init__(unit, start, **rest)
         self.tunable = tunable
+        self.rising = rising
 
 
 class Input(Variable):

@@ -28,6 +28,7 @@ class Annotation:
         requires: packages that it imports.
         optional_inputs: names of inputs that may stay unconnected.
         flags: for inputs that are read only where a boolean input is true, its name.
+        rising: names of array parameters whose elements must rise.
         unused_inputs: names of inputs that nothing is computed from: a port has them, this component does without.
         recommended_step: longest advisable communication step in s.
         sampled: whether it acts at samples.
@@ -43,6 +44,7 @@ class Annotation:
     requires: tuple[str, ...] = ()
     optional_inputs: tuple[str, ...] = ()
     flags: Mapping[str, str] = field(default_factory=dict)
+    rising: tuple[str, ...] = ()
     unused_inputs: tuple[str, ...] = ()
     recommended_step: float | None = None
     sampled: bool = False
@@ -62,6 +64,7 @@ def write(annotation: Annotation, root: Any) -> None:
         "requires": " ".join(annotation.requires),
         "optionalInputs": " ".join(annotation.optional_inputs),
         "flags": json.dumps(annotation.flags) if annotation.flags else "",
+        "rising": " ".join(annotation.rising),
         "unusedInputs": " ".join(annotation.unused_inputs),
         "recommendedStep": "" if step is None else repr(float(step)),
         "sampled": "true" if annotation.sampled else "",
@@ -92,6 +95,7 @@ def read(root: Any) -> Annotation | None:
         requires=tuple(element.get("requires", "").split()),
         optional_inputs=tuple(element.get("optionalInputs", "").split()),
         flags={str(k): str(v) for k, v in flags.items()} if isinstance(flags, dict) else {},
+        rising=tuple(element.get("rising", "").split()),
         unused_inputs=tuple(element.get("unusedInputs", "").split()),
         recommended_step=float(step) if step else None,
         sampled=element.get("sampled") == "true",

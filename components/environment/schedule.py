@@ -25,7 +25,7 @@ class Schedule(Component):
     unit = Data("m/s", description="unit of the signal")
     points = Size(1, description="number of breakpoints")
 
-    times = Parameter("s", 0.0, shape=(points,), description="breakpoints, rising")
+    times = Parameter("s", 0.0, shape=(points,), rising=True, description="breakpoints, rising")
     values = Parameter(unit, 0.0, shape=(points,), description="value from each breakpoint on")
     interpolate = Parameter("1", False, description="straight lines between the breakpoints instead of steps")
 

@@ -128,6 +128,11 @@ class Interface:
         return self.annotation.flags if self.annotation else {}
 
     @cached_property
+    def rising(self) -> tuple[str, ...]:
+        """Array parameters of one of our own FMUs whose elements must rise."""
+        return self.annotation.rising if self.annotation else ()
+
+    @cached_property
     def unused_inputs(self) -> frozenset[str]:
         """Inputs that one of our own FMUs computes nothing from."""
         return frozenset(self.annotation.unused_inputs if self.annotation else ())

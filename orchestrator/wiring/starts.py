@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import hashlib
+import itertools
 import math
-from itertools import chain
+from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
@@ -32,7 +33,11 @@ def find_starts(system: System, instance: Instance, interface: Interface, wiring
         elif scalars is None:
             why = interface.why_left_out(name)
             valid = (v.name for v in interface.variables.values() if v.settable)
-            near = "" if why else interface.elements_beside(name) or wiring.near(name, chain(valid, interface.arrays))
+            near = (
+                ""
+                if why
+                else interface.elements_beside(name) or wiring.near(name, itertools.chain(valid, interface.arrays))
+            )
             problem = Problem(str(signal), f"{interface.model} has no such variable{why}", near, (signal,))
             wiring.problems.append(problem.at(origin))
         else:
@@ -43,7 +48,27 @@ def find_starts(system: System, instance: Instance, interface: Interface, wiring
     if dropped:
         wiring.notes.append(f"{instance.name}: {interface.model} has no {', '.join(dropped)}; dropped with the swap")
     _set_runtime(system, instance, interface, values)
+    _check_rising(system, instance, interface, wiring, values)
     return values
+
+
+def _check_rising(
+    system: System, instance: Instance, interface: Interface, wiring: Wiring, values: Mapping[str, Any]
+) -> None:
+    """Note arrays whose elements must rise and do not: with given values, or because none are given."""
+    for name in interface.rising:
+        scalars = interface.scalars(name) or ()
+        if name in instance.start and not any(scalar in values for scalar in scalars):
+            continue  # something else is wrong with it, and told
+        row = [(scalar, values.get(scalar, interface.variables[scalar].start)) for scalar in scalars]
+        wrong = next((pair for pair in itertools.pairwise(row) if pair[0][1] >= pair[1][1]), None)
+        if wrong is None:
+            continue
+        signal = SignalName(instance.name, name)
+        (_, before), (scalar, value) = wrong
+        message = f"its values must rise, and {scalar} = {value:g} follows {before:g}"
+        problem = Problem(str(signal), message, "" if name in instance.start else f"give {signal} values", (signal,))
+        wiring.problems.append(problem.at(system.provenance.origins.get(str(signal), instance.origin)))
 
 
 def _elements(

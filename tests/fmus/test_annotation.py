@@ -12,6 +12,7 @@ WHOLE = Annotation(
     note='reconstructed: "so" & so',
     requires=("scipy", "control"),
     optional_inputs=("wind", "force[1]", "force[2]"),
+    rising=("times", "places"),
     flags={"force[1]": "pushed", "force[2]": "pushed"},
     recommended_step=0.1 + 0.2,
     sampled=True,

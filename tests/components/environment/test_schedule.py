@@ -55,3 +55,9 @@ def test_the_unit_is_given_when_it_is_built():
 def test_a_wrong_number_of_values_is_refused():
     with pytest.raises(ComponentError, match=r"Schedule\.values has shape \(3,\), but the value given has \(2,\)"):
         Schedule(points=3, values=[1.0, 2.0])
+
+
+@pytest.mark.parametrize("times", [[0.0, 20.0, 10.0], [0.0, 10.0, 10.0]])
+def test_breakpoints_must_rise(times):
+    with pytest.raises(ComponentError, match=r"Schedule\.times must rise, not \[0\.0, "):
+        Schedule(points=3, times=times)

@@ -1,4 +1,4 @@
-"""Inputs that a flag makes matter, and those whose flag was forgotten; declared by the component, of any name."""
+"""What a component declares of its own variables: flags that make inputs matter, arrays that must rise."""
 
 import pytest
 from railcosim.orchestrator.system import System
@@ -81,3 +81,21 @@ def test_a_forgotten_flag_is_told_and_one_that_is_meant_is_not(told):
 
 def test_nothing_is_said_of_what_is_left_alone(told):
     assert told({}) == []
+
+
+@pytest.mark.parametrize(
+    ("starts", "said"),
+    [
+        ({"times": [0.0, 20.0, 10.0]}, ["s.times: its values must rise, and times[3] = 10 follows 20"]),
+        ({"times": [0.0, 10.0, 10.0]}, ["s.times: its values must rise, and times[3] = 10 follows 10"]),
+        ({"times[3]": 7.0}, ["s.times: its values must rise, and times[2] = 0 follows 0; give s.times values"]),
+        ({}, ["s.times: its values must rise, and times[2] = 0 follows 0; give s.times values"]),
+        ({"times": [0.0, 10.0]}, ["s.times: takes 3 values, 2 given"]),
+        ({"times": [-1.0, 10.0, 20.0]}, []),
+    ],
+)
+def test_breakpoints_that_do_not_rise_are_told(resolve, starts, said):
+    """Given as an array, one by one, or not at all; where they are wrong otherwise, that alone."""
+    system = System()
+    system.add("s", "Schedule", {"points": 3}, **starts)
+    assert [str(problem) for problem in resolve(system).problems] == said
