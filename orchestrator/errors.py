@@ -2,6 +2,7 @@
 
 from collections.abc import Iterable, Sequence
 from itertools import groupby
+from pathlib import Path
 
 from .names import SignalName
 from .problems import Problem
@@ -45,6 +46,14 @@ class SignalError(RailcosimError, KeyError):
 
     def __str__(self) -> str:
         return str(self.args[0])  # not its repr, as a KeyError has it
+
+
+class FigureError(ScenarioError):
+    """Some figures cannot be drawn; `drawn` are the files of the others."""
+
+    def __init__(self, problems: Sequence[Problem], drawn: Sequence[Path]) -> None:
+        super().__init__(problems)
+        self.drawn = list(drawn)
 
 
 class FmuFileError(RailcosimError, ValueError):

@@ -12,6 +12,8 @@ from .marks import mark_problems, mark_texts
 from .panels import FIGURE_KEYS, FORMATS, PANEL_KEYS, X_KEYS, bands_of, numbers_in, panels_of, texts_of
 
 _FUNCTION_KEYS = ("name", "from", "to", "points")
+_SET = ("title", "label", "x_label", "y_label")
+"""Keys whose texts are set as matplotlib does it."""
 _MAX_POINTS = 100_000
 _LEAST_DPI, _MOST_DPI = 20, 1200
 
@@ -29,6 +31,7 @@ def check_figures(
         if not isinstance(figure.get("title"), str) or not figure["title"].strip():
             problems.append(Problem(place, "title is missing", "it also names the file"))
         problems += [problem.at(place) for problem in _file_problems(figure)]
+        problems += [problem.at(place) for problem in _formula_problems(figure)]
         panels = figure.get("panels")
         if panels is None:
             problems += [problem.at(place) for problem in _panel_problems(figure, names, every_step)]
@@ -53,6 +56,34 @@ def _file_problems(figure: Mapping[str, Any]) -> Iterator[Problem]:
     dpi = figure.get("dpi", 100)
     if not (_is_number(dpi) and _LEAST_DPI <= dpi <= _MOST_DPI):
         yield Problem("", f"dpi must be a number from {_LEAST_DPI} to {_MOST_DPI}, not {dpi!r}")
+
+
+def _formula_problems(table: Mapping[str, Any]) -> Iterator[Problem]:
+    """Texts with mathematics between dollars that cannot be set, in a figure, its panels and their marks."""
+    for key, value in table.items():
+        if isinstance(value, list):
+            for inner in value:
+                if isinstance(inner, Mapping):
+                    yield from _formula_problems(inner)
+        if key in _SET:
+            for text in texts_of(value):
+                error = _formula_error(text)
+                if error:
+                    yield Problem("", f"{key} cannot be set: {error}", r"write \$ for a dollar sign")
+
+
+def _formula_error(text: str) -> str:
+    if "$" not in text:
+        return ""
+    from matplotlib.cbook import is_math_text  # noqa: PLC0415 (which takes a third of a second)
+    from matplotlib.mathtext import MathTextParser  # noqa: PLC0415
+
+    try:
+        if is_math_text(text):
+            MathTextParser("path").parse(text)
+    except ValueError as error:
+        return " ".join(str(error).split())
+    return ""
 
 
 def _panel_problems(panel: Mapping[str, Any], names: Collection[str], every_step: bool) -> Iterator[Problem]:

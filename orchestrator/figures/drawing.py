@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ..errors import ExpressionError, ScenarioError
+from ..errors import ExpressionError, FigureError
 from ..evaluation import Signals
 from ..problems import Problem
 from .curves import Curve, curves_of, x_label_of, y_label_of
@@ -32,7 +32,7 @@ def draw(figures: Sequence[Mapping[str, Any]], signals: Signals, directory: Path
         The files, in order.
 
     Raises:
-        ScenarioError: some figures could not be drawn; the others were.
+        FigureError: some figures could not be drawn; the others were.
     """
     paths: list[Path] = []
     problems: dict[int, list[Problem]] = {}
@@ -49,12 +49,12 @@ def draw(figures: Sequence[Mapping[str, Any]], signals: Signals, directory: Path
             _draw_one(figures[k], curves, signals, palette, path)
         except ExpressionError as error:
             problems[k] = error.at(_not_drawn(figures[k]))
-        except ValueError as error:  # mathematics in a label that matplotlib cannot set
-            problems[k] = [Problem(_not_drawn(figures[k]), str(error))]
+        except Exception as error:  # matplotlib has many reasons, a full disk is another
+            problems[k] = [Problem(_not_drawn(figures[k]), f"{type(error).__name__}: {error}")]
         else:
             paths.append(path)
     if problems:
-        raise ScenarioError([problem for k in sorted(problems) for problem in problems[k]])
+        raise FigureError([problem for k in sorted(problems) for problem in problems[k]], paths)
     return paths
 
 

@@ -24,7 +24,7 @@ from ..master import Master
 from ..system import Connection, Event, Instance, Judged, Provenance, Stepping, System
 
 CHECKPOINT_FILE = "checkpoint.zip"
-_FORMAT = 3
+_FORMAT = 4
 
 
 @dataclass(frozen=True)
@@ -38,6 +38,7 @@ class Checkpoint:
         progress: what the master carries between steps, from `Master.save`.
         states: the FMUs' serialized states, by instance.
         every: distance of checkpoints in s.
+        run: the identity of the run. checksum: of the rows, as a `Recorder` has it.
         seen: what was found on the way, from `Watching.save`.
     """
 
@@ -49,6 +50,8 @@ class Checkpoint:
     states: Mapping[str, bytes]
     every: float | None
     seen: Any
+    run: str
+    checksum: int
 
     @property
     def time(self) -> float:
@@ -71,6 +74,8 @@ class Checkpoint:
         rows: int,
         every: float | None,
         seen: Any,
+        run: str,
+        checksum: int,
     ) -> Checkpoint:
         """That of a master between two steps.
 
@@ -85,7 +90,7 @@ class Checkpoint:
             finally:
                 slave.forget(state)
         digests = {name: model.digest for name, model in models.items()}
-        return cls(system, kind, rows, digests, master.save(), states, every, seen)
+        return cls(system, kind, rows, digests, master.save(), states, every, seen, run, checksum)
 
     def write(self, directory: Path) -> None:
         """Put it in the place of the one before.
@@ -95,6 +100,8 @@ class Checkpoint:
         """
         content = {
             "format": _FORMAT,
+            "run": self.run,
+            "checksum": self.checksum,
             "system": dataclasses.asdict(self.system),
             "kind": self.kind,
             "rows": self.rows,
@@ -200,6 +207,8 @@ def read_checkpoint(directory: Path) -> Checkpoint:
             states=states,
             every=content["every"],
             seen=content["seen"],
+            run=content["run"],
+            checksum=int(content["checksum"]),
         )
         if point.rows < 1 or point.width < 0 or not math.isfinite(point.time):
             raise ValueError(f"{point.rows} rows up to {point.time} s")

@@ -5,11 +5,12 @@ from __future__ import annotations
 import logging
 import math
 import time as clock
+from contextlib import ExitStack
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-from ..errors import RailcosimError, ScenarioError
+from ..errors import FigureError, RailcosimError, ScenarioError
 from ..evaluation import evaluate_metrics, judge_requirements, judge_values
 from ..figures import draw
 from ..fmi import Kind, Workspace
@@ -20,6 +21,7 @@ from . import checkpoint
 from . import record as record_file
 from .checking import Checked, check
 from .checkpoint import check_serializable
+from .directory import RunDirectory
 from .outcome import Run
 from .session import Job, Progress, Session, rows_before
 
@@ -92,11 +94,11 @@ def execute(
     progress: Progress | None = None,
 ) -> Run:
     """As `run`, but a model that fails ends the run with ``status = "failed"`` instead of raising."""
-    directory = Path(output) if output is not None else None
+    place = RunDirectory(Path(output)) if output is not None else None
     _check_distance(checkpoint_every)
-    if checkpoint_every is not None and directory is None:
+    if checkpoint_every is not None and place is None:
         raise ScenarioError("checkpoints are files: name an output directory for them")
-    return _execute(system, Job(kind, directory, threads, checkpoint_every, None, progress), figures)
+    return _execute(system, Job(kind, place, threads, checkpoint_every, None, progress), figures)
 
 
 def resume(
@@ -145,15 +147,18 @@ def go_on(
     """As `resume`, but a model that fails ends the run with ``status = "failed"`` instead of raising."""
     directory = Path(directory)
     _check_distance(checkpoint_every)
-    point = checkpoint.read_checkpoint(directory)
-    system = _override(point.system, stop_time, None, None)
-    if not system.stepping.stop_time > point.time:
-        raise ScenarioError(
-            f"{directory}: its checkpoint is at t = {point.time:g} s; it cannot go on to an earlier stop time, "
-            f"{system.stepping.stop_time:g} s"
-        )
-    every = checkpoint_every if checkpoint_every is not None else point.every
-    return _execute(system, Job(point.kind, directory, threads, every, point, progress), figures)
+    checkpoint.read_checkpoint(directory)  # a folder without one is left as it is
+    with RunDirectory(directory) as place:
+        point = checkpoint.read_checkpoint(directory)
+        place.identity = point.run
+        system = _override(point.system, stop_time, None, None)
+        if not system.stepping.stop_time > point.time:
+            raise ScenarioError(
+                f"{directory}: its checkpoint is at t = {point.time:g} s; it cannot go on to an earlier stop time, "
+                f"{system.stepping.stop_time:g} s"
+            )
+        every = checkpoint_every if checkpoint_every is not None else point.every
+        return _execute(system, Job(point.kind, place, threads, every, point, progress), figures)
 
 
 def _check_distance(checkpoint_every: float | None) -> None:
@@ -168,41 +173,42 @@ def _check_threads(checked: Checked, threads: int) -> None:
 
 
 def _execute(system: System, job: Job, figures: bool) -> Run:
-    given, begin = job.directory, clock.perf_counter()
-    directory = None if given is None else given.absolute()  # whatever becomes of the working directory
-    job = replace(job, directory=directory)
-    with Workspace() as workspace:
+    place = job.place
+    begin = clock.perf_counter()
+    with ExitStack() as held, Workspace() as workspace:
         try:
             checked = check(system, workspace, job.kind)
             _check_threads(checked, job.threads)
             if checked.large:  # said before it fills a disk
                 _log.warning(checked.large)
-            if job.begin is not None and directory is not None:
-                job.begin.check(checked.models, directory)
+            if job.begin is not None and place is not None:
+                job.begin.check(checked.models, place.path)
             if job.checkpoint_every is not None:
                 check_serializable(checked.models)
+            if place is not None:
+                held.enter_context(place)
+                place.identity = place.identity or record_file.identity_of(checked, job.kind)
             session = Session(checked, job, rows_before(job))
-            if directory is not None:
-                _open_directory(directory, checked, job)
+            if place is not None:
+                _open_directory(place, checked, job)
             outcomes: list[Run] = []
             session.run(begin, lambda: outcomes.append(_completed(session, figures)))
         finally:
             forget_paths(workspace.folder)
-    outcome = outcomes[-1]
-    known = len(outcome.notes)
-    outcome.notes += [note for note in session.disturbances() if note not in outcome.notes]
-    if directory is not None and len(outcome.notes) > known:  # something new, while instances were given back
-        record_file.finish(directory, outcome, job.kind)
-    outcome.directory = given
+        outcome = outcomes[-1]
+        later = [note for note in session.disturbances() if note not in outcome.notes]
+        if later:  # while instances were given back
+            outcome.notes += later
+            _add_notes(outcome, place)
     return outcome
 
 
 def _completed(session: Session, figures: bool) -> Run:
-    """What came out, judged and written down."""
+    """What came out, judged, written down and drawn."""
     checked, job = session.checked, session.job
-    outcome = Run(
-        checked.system, session.results(), session.status, checked, error=session.error, directory=job.directory
-    )
+    place = job.place
+    directory = None if place is None else place.given
+    outcome = Run(checked.system, session.results(), session.status, checked, error=session.error, directory=directory)
     outcome.coupling, outcome.seconds = session.coupling, session.seconds
     outcome.findings = session.findings(outcome.results)
     if outcome.error is not None and outcome.status == "failed":
@@ -211,11 +217,27 @@ def _completed(session: Session, figures: bool) -> Run:
                 outcome.error.explain(finding.message)
     outcome.notes += session.disturbances()
     evaluate(outcome)
-    if job.directory is not None:
+    if place is not None:
+        record_file.finish(place, outcome, job.kind, session.checksum)
         if figures and len(outcome.time):
-            outcome.figures = draw(checked.system.judged.figures, outcome.results, job.directory)
-        record_file.finish(job.directory, outcome, job.kind)
+            _draw(outcome, place)
     return outcome
+
+
+def _draw(outcome: Run, place: RunDirectory) -> None:
+    """Draw the figures of a run whose record is complete: one that cannot be drawn is no more than a note."""
+    try:
+        outcome.figures = draw(outcome.system.judged.figures, outcome.results, place.path)
+    except FigureError as error:
+        outcome.figures = error.drawn
+        outcome.notes += map(str, error.problems)
+    record_file.add(place.path, figures=[path.name for path in outcome.figures])
+    _add_notes(outcome, place)
+
+
+def _add_notes(outcome: Run, place: RunDirectory | None) -> None:
+    if place is not None:
+        record_file.add(place.path, notes=[*outcome.checked.notes, *outcome.notes])
 
 
 def evaluate(outcome: Run) -> None:
@@ -269,9 +291,8 @@ def _rescaled(instance: Instance, before: float, step: float) -> Instance:
     return instance
 
 
-def _open_directory(directory: Path, checked: Checked, job: Job) -> None:
+def _open_directory(place: RunDirectory, checked: Checked, job: Job) -> None:
     try:
-        directory.mkdir(parents=True, exist_ok=True)
-        record_file.write(directory, checked, job.kind, anew=job.begin is None)
+        record_file.write(place, checked, job.kind, anew=job.begin is None)
     except OSError as error:
-        raise RailcosimError(f"the output directory {directory} cannot be used: {error.strerror or error}") from error
+        raise RailcosimError(f"the output directory {place.given} cannot be used: {error.strerror or error}") from error

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import hashlib
 import importlib.metadata
 import json
 import math
@@ -18,37 +19,49 @@ from ..system import System
 from . import rows
 from .checking import Checked
 from .checkpoint import CHECKPOINT_FILE
+from .directory import RunDirectory
 from .outcome import Run
 from .step_check import StepCheck
 
 _PACKAGES = ("railcosim", "fmpy", "pythonfmu", "numpy", "scipy")
 
 
-def write(directory: Path, checked: Checked, kind: str, *, anew: bool = True) -> None:
+def write(place: RunDirectory, checked: Checked, kind: str, *, anew: bool = True) -> None:
     """Write what is known before the first step, so that a run that is killed can be read.
 
     Args:
-        directory: where.
+        place: where.
         checked: what runs.
         kind: as which kind of model.
         anew: whether what an earlier run left there goes, so that it is not taken for this one's.
     """
+    directory = place.path
     if anew:
         for name in (rows.CSV_FILE, rows.ROWS_FILE, "metrics.json", CHECKPOINT_FILE):
             (directory / name).unlink(missing_ok=True)
-    _dump(directory / "run.json", _describe(checked.system, checked, kind) | {"status": "running"})
+    _dump(directory / "run.json", place.marks | _describe(checked.system, checked, kind) | {"status": "running"})
     _dump(directory / "units.json", {"time": "s"} | _units(checked))
+
+
+def identity_of(checked: Checked, kind: str) -> str:
+    """A digest of all that rows follow from, but for their number: runs that share it have the same rows."""
+    told = _describe(checked.system, checked, kind)
+    for key in ("stop_time", "modified"):
+        del told[key]
+    text = json.dumps(_plain(told), sort_keys=True)
+    return hashlib.sha256(text.encode(errors="surrogatepass")).hexdigest()[:32]
 
 
 def abandon(directory: Path, error: BaseException) -> None:
     """Let the record of a run that never began not say "running" for ever."""
-    path = directory / "run.json"
-    _dump(path, json.loads(path.read_text(encoding="utf-8")) | {"status": "failed", "error": str(error)})
+    add(directory, status="failed", error=str(error))
 
 
-def finish(directory: Path, outcome: Run, kind: str) -> None:
-    """Write the end of the run, and what was evaluated."""
-    record = _describe(outcome.system, outcome.checked, kind)
+def finish(place: RunDirectory, outcome: Run, kind: str, checksum: int) -> None:
+    """Write the end of the run, and what was evaluated; the checksum of its rows tells whether they are its own."""
+    directory = place.path
+    record = place.marks | _describe(outcome.system, outcome.checked, kind)
+    record["rows"] = {"count": len(outcome.time), "crc32": checksum}
     record["status"] = outcome.status
     record["error"] = None if outcome.error is None else str(outcome.error)
     record["time_reached"] = float(outcome.time[-1]) if len(outcome.time) else None
@@ -57,11 +70,11 @@ def finish(directory: Path, outcome: Run, kind: str) -> None:
     record["notes"] += outcome.notes
     record["findings"] = [dataclasses.asdict(finding) for finding in outcome.findings]
     record["values"] = count_values([*outcome.published, *outcome.references])
-    record["figures"] = [path.name for path in outcome.figures]
     _dump(directory / "run.json", record)
     _dump(
         directory / "metrics.json",
         {
+            "run": place.identity,
             "scenario": outcome.system.provenance.name,
             "preset": outcome.system.provenance.preset,
             "modified": outcome.system.provenance.modified,
@@ -82,11 +95,15 @@ def finish(directory: Path, outcome: Run, kind: str) -> None:
     )
 
 
-def add_step_check(directory: Path, found: StepCheck) -> None:
-    """Add to the record of a run what a second one at half its step showed."""
+def add(directory: Path, **entries: Any) -> None:
+    """Add to the record of a run that has ended."""
     path = directory / "run.json"
-    record = json.loads(path.read_text(encoding="utf-8"))
-    _dump(path, record | {"step_check": dataclasses.asdict(found)})
+    _dump(path, json.loads(path.read_text(encoding="utf-8")) | entries)
+
+
+def add_step_check(directory: Path, found: StepCheck) -> None:
+    """Add what a second run at half the step showed."""
+    add(directory, step_check=dataclasses.asdict(found))
 
 
 def _describe(system: System, checked: Checked, kind: str) -> dict[str, Any]:

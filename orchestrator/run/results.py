@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from ..errors import ScenarioError, SignalError
 from ..master import Rows
 from .missing import missing_signal, shortened
-from .rows import Writer, read_rows
+from .rows import Writer, add_to_checksum, read_rows
 
 _FLUSH_SECONDS = 1.0
 
@@ -92,7 +92,8 @@ class Results(Mapping[str, NDArray[Any]]):
         directory = Path(directory)
         try:
             record = json.loads((directory / "run.json").read_text(encoding="utf-8"))
-            columns = read_rows(directory, record["texts"])
+            columns = read_rows(directory, record["texts"], record.get("run", ""))
+            _check_rows(columns, record.get("rows"))
             _check_record(record)
             return cls(
                 columns,
@@ -108,6 +109,21 @@ class Results(Mapping[str, NDArray[Any]]):
             raise ScenarioError(f"{directory} holds no run that can be read: it has no {error}") from error
         except (OSError, ValueError, TypeError, RecursionError) as error:
             raise ScenarioError(f"{directory} holds no run that can be read: {error}") from error
+
+
+def _check_rows(columns: Mapping[str, NDArray[Any]], told: Mapping[str, Any] | None) -> None:
+    """Refuse rows that are not those that the record of a run that has ended tells of.
+
+    Raises:
+        ValueError: they are of another run, or were changed.
+    """
+    if told is not None and (checksum_of(list(columns.values())) != told["crc32"]):
+        raise ValueError("results.csv is not that of the run in run.json: it is of another run, or was changed")
+
+
+def checksum_of(columns: Sequence[NDArray[Any]], count: int | None = None) -> int:
+    """Of the first ``count`` rows, or all, as a `Recorder` has it."""
+    return add_to_checksum(0, np.array([column[:count] for column in columns], dtype=np.result_type(*columns)).T)
 
 
 def _check_record(record: Mapping[str, Any]) -> None:
@@ -165,6 +181,7 @@ class Recorder:
         directory: where to write; None keeps everything in memory.
         past: rows to begin with, of a run that is resumed. there: how many rows of that run are on the disk; they stay
             until there are as many new ones.
+        identity: of the run, for the files.
     """
 
     def __init__(
@@ -174,6 +191,8 @@ class Recorder:
         directory: Path | None,
         past: NDArray[Any] | None = None,
         there: int = 0,
+        *,
+        identity: str = "",
     ) -> None:
         self.names = list(names)
         whole = [k + 1 for k, kind in enumerate(kinds) if kind not in ("Real", "String")]
@@ -183,7 +202,11 @@ class Recorder:
         self._rows: list[Sequence[Any]] = []
         self._written = 0
         self._flushed = clock.monotonic()
-        self._writer = None if directory is None else Writer(directory, ["time", *names], whole, self._texts, there)
+        self._writer: Writer | None = None
+        if directory is not None:
+            self._writer = Writer(directory, ["time", *names], whole, self._texts, there, identity=identity)
+        self.checksum = 0
+        """Of the rows that were brought to the disk."""
         if past is not None:
             self.extend(past)
             self.flush()
@@ -210,6 +233,7 @@ class Recorder:
         if self._writer is not None:
             self._writer.append(self._blocks[self._written :])
             self._written = len(self._blocks)
+            self.checksum = self._writer.checksum
             self._flushed = clock.monotonic()
             if sync:
                 self._writer.sync()

@@ -16,6 +16,7 @@ import csv
 import io
 import json
 import os
+import zlib
 from collections.abc import Iterable, Iterator, Sequence
 from contextlib import suppress
 from pathlib import Path
@@ -39,14 +40,24 @@ class Writer:
         whole: columns of whole numbers, by place; they are written as such.
         texts: columns of texts.
         there: how many rows there are of the same run, if it is resumed; they go when there are as many new ones.
+        identity: of the run.
     """
 
     def __init__(
-        self, directory: Path, columns: Sequence[str], whole: Sequence[int], texts: Sequence[int], there: int = 0
+        self,
+        directory: Path,
+        columns: Sequence[str],
+        whole: Sequence[int],
+        texts: Sequence[int],
+        there: int = 0,
+        *,
+        identity: str = "",
     ) -> None:
         self._directory = directory
         self._columns, self._whole, self._texts = columns, whole, texts
         self._left = there
+        self.checksum = 0
+        """Of the rows so far, as `add_to_checksum` has it."""
         self._file: IO[Any]
         for name in (CSV_FILE, ROWS_FILE):
             if not there:
@@ -57,7 +68,8 @@ class Writer:
         if texts:
             write_csv(self._file, columns, whole, ())
         else:
-            self._file.write(json.dumps({"columns": list(columns), "whole": list(whole)}).encode() + b"\n")
+            head = {"run": identity, "columns": list(columns), "whole": list(whole)}
+            self._file.write(json.dumps(head).encode() + b"\n")
         self._file.flush()
 
     def _open(self, mode: str) -> None:
@@ -74,6 +86,7 @@ class Writer:
             else:
                 self._file.write(np.ascontiguousarray(block, _FLOAT).data)
             self._left -= len(block)
+            self.checksum = add_to_checksum(self.checksum, block)
         self._file.flush()
         if self._left <= 0 and self._path.suffix == _NEW:
             self._file.close()
@@ -101,14 +114,29 @@ class Writer:
             self._take_place()
 
 
-def read_rows(directory: Path, texts: Iterable[str]) -> dict[str, NDArray[Any]]:
+def add_to_checksum(checksum: int, rows: NDArray[Any]) -> int:
+    """A checksum that goes on with some rows: the same for numbers in memory, in a binary file and in text."""
+    if rows.dtype != object:
+        return zlib.crc32(np.ascontiguousarray(rows, _FLOAT).data, checksum)
+    cells = (cell if isinstance(cell, str) else repr(float(cell)) for row in rows for cell in row)
+    return zlib.crc32("".join(f"{cell}\0" for cell in cells).encode(errors="surrogatepass"), checksum)
+
+
+def read_rows(directory: Path, texts: Iterable[str], identity: str = "") -> dict[str, NDArray[Any]]:
     """The columns of a run by name, those named in ``texts`` as objects; what was half written is left out.
 
+    Args:
+        directory: of the run.
+        texts: the columns that hold texts.
+        identity: of the run, if it is known.
+
     Raises:
-        OSError, ValueError, KeyError, TypeError: there is nothing that can be read.
+        OSError, ValueError, KeyError, TypeError: there is nothing that can be read, or it is of another run.
     """
     if (directory / ROWS_FILE).exists():
-        columns, _, table = _read_binary(directory / ROWS_FILE)
+        found, columns, _, table = _read_binary(directory / ROWS_FILE)
+        if identity and found != identity:
+            raise ValueError(f"{ROWS_FILE} and run.json are of different runs")
         return dict(zip(columns, np.ascontiguousarray(table.T), strict=True))
     with (directory / CSV_FILE).open(newline="", encoding="utf-8") as stream:
         header, *rows = list(_lines(stream)) or [[]]
@@ -135,18 +163,19 @@ def recover_rows(directory: Path) -> Path:
     Raises:
         OSError, ValueError, KeyError, TypeError: there is nothing that can be read.
     """
-    columns, whole, table = _read_binary(directory / ROWS_FILE)
+    _, columns, whole, table = _read_binary(directory / ROWS_FILE)
     return _write_text(directory, columns, whole, [table])
 
 
-def _read_binary(path: Path) -> tuple[list[str], list[int], NDArray[np.float64]]:
+def _read_binary(path: Path) -> tuple[str, list[str], list[int], NDArray[np.float64]]:
     with path.open("rb") as stream:
         header = json.loads(stream.readline())
         numbers = np.fromfile(stream, _FLOAT)
     columns = header["columns"]
     if not columns:
         raise ValueError(f"{path.name} has no columns")
-    return columns, header["whole"], numbers[: len(numbers) // len(columns) * len(columns)].reshape(-1, len(columns))
+    rows = numbers[: len(numbers) // len(columns) * len(columns)].reshape(-1, len(columns))
+    return header.get("run", ""), columns, header["whole"], rows
 
 
 def _write_text(directory: Path, columns: Sequence[str], whole: Sequence[int], blocks: Iterable[NDArray[Any]]) -> Path:

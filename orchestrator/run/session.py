@@ -9,7 +9,6 @@ import time as clock
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import AbstractContextManager, contextmanager
 from dataclasses import dataclass
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -22,8 +21,9 @@ from . import record as record_file
 from .assembly import assembled
 from .checking import Checked
 from .checkpoint import Checkpoint
+from .directory import RunDirectory
 from .outcome import Status
-from .results import Due, Recorder, Results
+from .results import Due, Recorder, Results, checksum_of
 from .watching import Finding, Watching
 
 Progress = Callable[[float, float], None]
@@ -36,7 +36,7 @@ class Job:
 
     Attributes:
         kind: how components become models.
-        directory: where the files go; None keeps everything in memory.
+        place: where the files go; None keeps everything in memory.
         threads: that step instances in parallel.
         checkpoint_every: distance of checkpoints in s, if there are any.
         begin: the checkpoint to begin at, if the run goes on.
@@ -44,7 +44,7 @@ class Job:
     """
 
     kind: Kind
-    directory: Path | None = None
+    place: RunDirectory | None = None
     threads: int = 1
     checkpoint_every: float | None = None
     begin: Checkpoint | None = None
@@ -95,8 +95,8 @@ class Session:
                 while not self._attempt(begin, complete):
                     pass
             except BaseException as error:  # initial values that do not settle
-                if self.job.directory is not None:
-                    record_file.abandon(self.job.directory, error)
+                if self.job.place is not None:
+                    record_file.abandon(self.job.place.path, error)
                 raise
         if not self._is_complete:
             complete()
@@ -163,7 +163,7 @@ class Session:
         )
         self._watching = Watching(system, self._interfaces, self.checked.wiring, master.signals)
         if self.job.begin is None or self._past is None:
-            self._recorder = Recorder(master.signals, master.kinds, self.job.directory)
+            self._recorder = self._new_recorder(master)
             first = [[system.stepping.start_time, *master.values]]
             self._recorder.extend(first)
             self._watching.see(first)
@@ -171,7 +171,12 @@ class Session:
             self.job.begin.restore(master)
             self._watching.restore(self.job.begin.seen)
             past, there = self._past[: self.job.begin.rows], len(self._past)
-            self._recorder = Recorder(master.signals, master.kinds, self.job.directory, past, there)
+            self._recorder = self._new_recorder(master, past, there)
+
+    def _new_recorder(self, master: Master, past: NDArray[Any] | None = None, there: int = 0) -> Recorder:
+        place = self.job.place
+        directory, identity = (None, "") if place is None else (place.path, place.identity)
+        return Recorder(master.signals, master.kinds, directory, past, there, identity=identity)
 
     def _step(self, master: Master) -> bool:
         """The communication steps, with checkpoints between them; True unless they were interrupted."""
@@ -232,7 +237,7 @@ class Session:
     def _keep(self, master: Master) -> None:
         """Write a checkpoint of the present point, and first the rows up to it."""
         job, recorder = self.job, self._recorder
-        assert job.directory is not None
+        assert job.place is not None
         assert recorder is not None
         assert self._watching is not None
         recorder.flush(sync=True)
@@ -244,8 +249,10 @@ class Session:
             rows=recorder.count,
             every=job.checkpoint_every,
             seen=self._watching.save(),
+            run=job.place.identity,
+            checksum=recorder.checksum,
         )
-        point.write(job.directory)
+        point.write(job.place.path)
 
     @property
     def _interfaces(self) -> dict[str, Interface]:
@@ -254,6 +261,11 @@ class Session:
     def findings(self, results: Results) -> list[Finding]:
         """What was found on the way, given what was recorded."""
         return [] if self._watching is None else self._watching.findings(results, self.error)
+
+    @property
+    def checksum(self) -> int:
+        """Of the rows that are on the disk."""
+        return 0 if self._recorder is None else self._recorder.checksum
 
     def results(self) -> Results:
         """What was recorded."""
@@ -287,17 +299,18 @@ def rows_before(job: Job) -> NDArray[Any] | None:
     Raises:
         ScenarioError: the results are not those of the checkpoint.
     """
-    if job.begin is None or job.directory is None:
+    if job.begin is None or job.place is None:
         return None
-    before, rows = Results.load(job.directory), job.begin.rows
+    directory = job.place.path
+    before, rows = Results.load(directory), job.begin.rows
     if len(before.time) < rows:
         raise ScenarioError(
-            f"{job.directory} cannot be resumed: its results have {len(before.time)} rows, fewer than the {rows} of "
-            "its checkpoint"
+            f"{directory} cannot be resumed: its results have {len(before.time)} rows, fewer than the {rows} of its "
+            "checkpoint"
         )
-    if len(before.names()) != job.begin.width or not before.time[rows - 1] <= job.begin.time:
-        raise ScenarioError(f"{job.directory} cannot be resumed: its results and its checkpoint are of different runs")
     columns = [before.time, *(before[name] for name in before.names())]
+    if len(columns) != job.begin.width + 1 or checksum_of(columns, rows) != job.begin.checksum:
+        raise ScenarioError(f"{directory} cannot be resumed: its results and its checkpoint are of different runs")
     return np.array(columns, dtype=np.result_type(*columns)).T
 
 

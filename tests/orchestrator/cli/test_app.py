@@ -134,7 +134,7 @@ def test_run_prints_metrics_verdicts_and_where_the_files_are(small: Path) -> Non
 
 def test_run_leaves_results_metrics_record_and_figures(small: Path) -> None:
     names = sorted(path.name for path in (small / "out").iterdir())
-    assert names == ["metrics.json", "results.csv", "run.json", "speed.png", "units.json"]
+    assert names == [".lock", "metrics.json", "results.csv", "run.json", "speed.png", "units.json"]
     rows = list(csv.reader((small / "out/results.csv").read_text().splitlines()))
     assert rows[0][0] == "time"
     assert len(rows) == 1 + 21

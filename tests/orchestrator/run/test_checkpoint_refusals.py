@@ -85,7 +85,7 @@ def test_another_fmu_of_the_same_name(tmp_path, foreign, xml):
     point = run(system, kind="python", output=tmp_path / "out")
     assert point.status == "completed"
     models = point.checked.models
-    taken = checkpoint.Checkpoint(system, "python", 1, {n: m.digest for n, m in models.items()}, {}, {}, 1.0, [])
+    taken = checkpoint.Checkpoint(system, "python", 1, {n: m.digest for n, m in models.items()}, {}, {}, 1.0, [], "", 0)
     taken.check(models, tmp_path)
     foreign([v("u", "input", start=1.0), v("y", "output")], **how)
     other = run(system, kind="python").checked.models
@@ -93,19 +93,31 @@ def test_another_fmu_of_the_same_name(tmp_path, foreign, xml):
         taken.check(other, tmp_path)
 
 
+def forget_the_end(directory):
+    """Let the record be that of a run that was killed, which does not tell of its rows."""
+    record = json.loads((directory / "run.json").read_text())
+    del record["rows"]
+    (directory / "run.json").write_text(json.dumps(record))
+
+
 def test_results_with_too_few_rows(made):
+    forget_the_end(made)
     path = made / "results.csv"
     path.write_text("".join(path.read_text().splitlines(keepends=True)[:21]))
     assert refusal(made) == (f"{made} cannot be resumed: its results have 20 rows, fewer than the 21 of its checkpoint")
 
 
 def test_results_of_another_run(made, tmp_path):
+    forget_the_end(made)
     lines = (made / "results.csv").read_text().splitlines()
     wanted = f"{made} cannot be resumed: its results and its checkpoint are of different runs"
     (made / "results.csv").write_text("\n".join(line.rpartition(",")[0] for line in lines) + "\n")
     assert refusal(made) == wanted
     longer = ["time" + lines[0][4:], *(f"{float(x.partition(',')[0]) * 2},{x.partition(',')[2]}" for x in lines[1:])]
     (made / "results.csv").write_text("\n".join(longer) + "\n")
+    assert refusal(made) == wanted
+    other = [lines[0], *(f"{line.rpartition(',')[0]},{k}" for k, line in enumerate(lines[1:]))]
+    (made / "results.csv").write_text("\n".join(other) + "\n")
     assert refusal(made) == wanted
     (made / "results.csv").unlink()
     assert "holds no run that can be read" in refusal(made)

@@ -154,7 +154,7 @@ def test_after_a_kill_and_a_kill_while_it_was_resumed(mine, tmp_path):
     run(system, kind="plain", output=tmp_path / "whole", figures=False)
     assert (out / "results.csv").read_bytes() == (tmp_path / "whole/results.csv").read_bytes()
     assert sorted(path.name for path in out.iterdir()) == [
-        "checkpoint.zip", "metrics.json", "results.csv", "run.json", "units.json",
+        ".lock", "checkpoint.zip", "metrics.json", "results.csv", "run.json", "units.json",
     ]  # fmt: skip
 
 
@@ -168,7 +168,8 @@ def test_nothing_is_lost_whenever_a_resumed_run_is_killed(mine, tmp_path, monkey
     interrupted(system, 3.0, out, every=1.3)
     if ended == "killed" and not words:  # a run with texts has its results as text from the beginning
         columns = Results.load(out)
-        recorder = results.Recorder(list(columns.names()), ["Real"] * 2, out)
+        identity = json.loads((out / "run.json").read_text())["run"]
+        recorder = results.Recorder(list(columns.names()), ["Real"] * 2, out, identity=identity)
         recorder.extend(np.array([columns.time, *(columns[name] for name in columns.names())]).T)
         recorder.flush()
         recorder._writer._file.close()  # as the end of its process does
