@@ -47,6 +47,8 @@ def _against_threads(system: System, models: Mapping[str, Model], wiring: Wiring
         yield "there is one instance"
     if system.stepping.extrapolation:
         yield "inputs are extrapolated in Python"
+    if system.stepping.refresh:
+        yield "feed-through is refreshed in Python"
     interfaces = {name: model.interface for name, model in models.items()}
     if system.stepping.algebraic_loops == "solve" and find_loops(interfaces, wiring.links, doubtful=True):
         yield "algebraic loops are solved in Python"

@@ -17,6 +17,7 @@ _AS_IT_IS: dict[Type, tuple[Type, ...]] = {
 }
 """For an input's type, the output types it may follow without losing anything."""
 _AS_NUMBER: dict[Type, str] = {"Boolean": "false as 0, true as 1", "Enumeration": "the number of its item"}
+_A: dict[Type, str] = {kind: f"a{'n' * (kind[0] in 'EI')} {kind}" for kind in _AS_IT_IS}
 _MAKES: dict[Type, str] = {"Boolean": "threshold = 0.5 makes it true above 0.5"}
 _ROUNDS = "threshold = 0.5 takes the nearest whole number"
 
@@ -48,16 +49,16 @@ def _misfit(a: Type, b: Type, connection: Connection, *, is_changed: bool) -> st
     """Why types do not go together, with the way out."""
     threshold = connection.threshold
     if "String" in (a, b) and a != b:
-        return f"a {a} output cannot feed a {b} input"
+        return f"{_A[a]} output cannot feed {_A[b]} input"
     if b == "String" and (is_changed or threshold is not None):
         return "scale, offset and threshold apply to numbers, not to String"
     if b == "Real" and threshold is not None:
         return "a threshold is for inputs that are no Real"
     if threshold is None and (a not in _AS_IT_IS[b] or (is_changed and b != "Real")):
-        what = "scale and offset lead" if a in _AS_IT_IS[b] else f"a {a} output leads"
-        return f"{what} to a {b} input only with a threshold: {_MAKES.get(b, _ROUNDS)}"
+        what = "scale and offset lead" if a in _AS_IT_IS[b] else f"{_A[a]} output leads"
+        return f"{what} to {_A[b]} input only with a threshold: {_MAKES.get(b, _ROUNDS)}"
     if threshold is not None and b in ("Integer", "Enumeration") and not 0.0 <= threshold < 1.0:
-        return f"for a {b} input the threshold is the fraction above which it is rounded up: from 0 to below 1"
+        return f"for {_A[b]} input the threshold is the fraction above which it is rounded up: from 0 to below 1"
     return ""
 
 
@@ -65,6 +66,6 @@ def _told(a: Type, b: Type, threshold: float | None) -> str:
     """What a user should know of a value that changes its type."""
     if threshold is not None and (a, b) != ("Boolean", "Boolean"):
         how = f"true above {threshold:g}" if b == "Boolean" else f"rounded up above a fraction of {threshold:g}"
-        return f"a {a} is given to a {b}, {how}"
+        return f"{_A[a]} is given to {_A[b]}, {how}"
     is_number = b == "Real" or (b != "Boolean" and a == "Boolean")
-    return f"a {a} is given to a {b}, {_AS_NUMBER[a]}" if is_number and a in _AS_NUMBER else ""
+    return f"{_A[a]} is given to {_A[b]}, {_AS_NUMBER[a]}" if is_number and a in _AS_NUMBER else ""

@@ -273,10 +273,14 @@ class Adaptive(VariableStep):
     def _fail(self, time: float, length: float, error: float, place: int) -> None:
         relative, absolute = self.tolerances[place]
         name = self.exchange.signals[place]
+        lists = ""
+        if place in self.plain:
+            lists = "; or let its FMU list the input, if this output passes one on at once"
         raise CouplingError(
             f"t = {time:g} s: {name} cannot be kept within its tolerance ({relative:g} relative, {absolute:g} "
             f"absolute): its error is {error:.3g} times as large at the shortest step, {length:g} s; loosen "
-            f"simulation.tolerance, or this signal's in [simulation.tolerances], or allow a smaller simulation.min_step"
+            f"simulation.tolerance, or this signal's in [simulation.tolerances], or allow a smaller "
+            f"simulation.min_step{lists}"
         )
 
     def report(self) -> dict[str, Any]:

@@ -76,14 +76,18 @@ def test_what_does_not_convert_is_refused_unless_a_scale_is_given():
         assert found.note == f"{what}; what is given there is applied to the values"
 
 
+def a(kind):
+    return f"a{'n' * (kind[0] in 'EI')} {kind}"
+
+
 def test_types_that_pass_as_they_are():
     whole, real, gear = end("A", kind="Integer"), end("B", "K", K), end("C", kind="Enumeration")
     truth, word = end("D", kind="Boolean"), end("E", kind="String")
     assert between(whole, real) == between(gear, whole) == between(whole, gear) == Conversion()
     assert between(truth, truth) == between(word, word) == Conversion()
     assert between(truth, real) == Conversion(note="a Boolean is given to a Real, false as 0, true as 1")
-    assert between(truth, whole) == Conversion(note="a Boolean is given to a Integer, false as 0, true as 1")
-    assert between(gear, real) == Conversion(note="a Enumeration is given to a Real, the number of its item")
+    assert between(truth, whole) == Conversion(note="a Boolean is given to an Integer, false as 0, true as 1")
+    assert between(gear, real) == Conversion(note="an Enumeration is given to a Real, the number of its item")
     scaled = between(truth, real, scale=10.0, offset=-5.0)
     assert (scaled.scale, scaled.offset) == (10.0, -5.0)
 
@@ -95,19 +99,19 @@ def test_types_that_need_a_threshold():
     for source in (real, whole, gear):
         kind = source[0].type
         asked = (
-            f"a {kind} output leads to a Boolean input only with a threshold: threshold = 0.5 makes it true above 0.5"
+            f"{a(kind)} output leads to a Boolean input only with a threshold: threshold = 0.5 makes it true above 0.5"
         )
         assert between(source, truth).problem == asked
-        note = f"a {kind} is given to a Boolean, true above -2.5"
+        note = f"{a(kind)} is given to a Boolean, true above -2.5"
         assert between(source, truth, threshold=-2.5) == Conversion(note=note)
     for target in (whole, gear):
         kind = target[0].type
-        asked = f"a Real output leads to a {kind} input only with a threshold: {nearest}"
+        asked = f"a Real output leads to {a(kind)} input only with a threshold: {nearest}"
         assert between(real, target).problem == asked
-        asked = f"scale and offset lead to a {kind} input only with a threshold: {nearest}"
+        asked = f"scale and offset lead to {a(kind)} input only with a threshold: {nearest}"
         assert between(whole, target, scale=2.0).problem == between(truth, target, offset=1.0).problem == asked
         found = between(real, target, scale=2.0, offset=1.0, threshold=0.0)
-        assert found == Conversion(2.0, 1.0, note=f"a Real is given to a {kind}, rounded up above a fraction of 0")
+        assert found == Conversion(2.0, 1.0, note=f"a Real is given to {a(kind)}, rounded up above a fraction of 0")
         for wrong in (-0.1, 1.0):
             assert "from 0 to below 1" in between(real, target, threshold=wrong).problem
 

@@ -86,8 +86,8 @@ def test_every_type_connects_to_its_own(connected, source, target):
 @pytest.mark.parametrize(
     ("source", "target", "why"),
     [
-        ("plain", "whole", "a Real output leads to a Integer input only with a threshold"),
-        ("whole", "truth", "a Integer output leads to a Boolean input only with a threshold"),
+        ("plain", "whole", "a Real output leads to an Integer input only with a threshold"),
+        ("whole", "truth", "an Integer output leads to a Boolean input only with a threshold"),
         ("plain", "truth", "a Real output leads to a Boolean input only with a threshold"),
         ("word", "plain", "a String output cannot feed a Real input"),
         ("plain", "word", "a Real output cannot feed a String input"),
