@@ -18,12 +18,18 @@ def wire(system: System, interfaces: Mapping[str, Interface]) -> Wiring:
     wiring = Wiring()
     for instance in system.instances.values():
         wiring.starts[instance.name] = find_starts(system, instance, interfaces[instance.name], wiring)
+    made: dict[str, int] = {}
     for connection in system.connections:
         try:
-            wiring.links += find_links(connection, interfaces, wiring)
+            links = find_links(connection, interfaces, wiring)
+            wiring.links += links
+            made[connection.origin] = made.get(connection.origin, 0) + len(links)
         except ScenarioError as error:
             ends = SignalName.parse(connection.source), SignalName.parse(connection.target)
             wiring.problems += error.at(described(connection), *ends)
+    for connection in system.connections:
+        if connection.optional and made.pop(connection.origin, None) == 0:
+            wiring.notes.append(f"{described(connection)} stands for nothing: there are no such elements")
     check_inputs(system, interfaces, wiring)
     check_sampling(system, interfaces, wiring)
     return wiring

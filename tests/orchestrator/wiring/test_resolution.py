@@ -254,3 +254,17 @@ def test_an_optional_connection_stands_for_nothing_where_an_end_is_missing(resol
     assert [str(problem) for problem in wiring.problems] == (
         [] if optional else ["'b.x[0]' = 'a.y[0]': Foreign (a) has no variable 'y[0]'; there is 'y[1]'"]
     )
+    nothing = "'b.x[0]' = 'a.y[0]' stands for nothing: there are no such elements"
+    assert (nothing in wiring.notes) == optional
+
+
+def test_of_a_pattern_that_makes_one_connection_at_least_nothing_is_said(resolve, foreign, xml):
+    path = foreign([xml["variable"]("x[0]", "input", start=0.0), xml["variable"]("y[1]", "output")])
+    system = System(stop_time=1.0)
+    system.add("a", path)
+    system.add("b", path)
+    for k in (0, 1):
+        system.connections.append(Connection(f"a.y[{k}]", "b.x[0]", optional=not k, origin="s.toml:7"))
+    wiring = resolve(system)
+    assert len(wiring.links) == 1
+    assert not any("stands for nothing" in note for note in wiring.notes)
