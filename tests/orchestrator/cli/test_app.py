@@ -301,7 +301,7 @@ WRONG = {
     ),
     "kind": (["comfort_cruise", "--kind", "nativ"], "'nativ' is not one of"),
     "option": (["comfort_cruise", "--bogus"], "No such option: --bogus"),
-    "output": (["comfort_cruise", "--stop", "1", "-o", "a_file"], "the output directory a_file cannot be "),
+    "output": (["comfort_cruise", "--stop", "1", "-o", "a_file"], "a_file cannot be used: "),
 }
 
 
@@ -346,7 +346,9 @@ def test_describe_shows_a_component_by_causality_with_units_and_dependencies(tmp
     assert text.index("Parameters") < text.index("Inputs") < text.index("Outputs")
     assert "source: Wang et al. 2020, eqs. 3-9" in text
     assert re.search(r"^alpha +Real +1/s +0\.034285\d+ +gain on the error", text, re.MULTILINE)
-    assert re.search(r"^ahead_speed +Real +m/s +0 +speed of the train ahead \(optional\)", text, re.MULTILINE)
+    assert re.search(
+        r"^ahead_speed +Real +m/s +0 +speed of the train ahead \(read where has_ahead\)", text, re.MULTILINE
+    )
     assert re.search(r"^bottom_demand +Real +m/s2 .* position, speed, target_speed, ahead_position", text, re.MULTILINE)
 
 
