@@ -6,6 +6,7 @@ from pathlib import Path
 
 from .names import SignalName
 from .problems import Problem
+from .times import digits
 
 
 class RailcosimError(Exception):
@@ -87,7 +88,7 @@ class FmuError(RunError):
 
     def __str__(self) -> str:
         where = [self.instance] if self.instance else []
-        where += [f"t = {self.time:g} s"] if self.time is not None else []
+        where += [f"t = {digits(self.time)} s"] if self.time is not None else []
         where += [f"status {self.status}"] if self.status else []
         head = f"{', '.join(where)}: " if where else ""
         said = ((line, len(list(same))) for line, same in groupby(self.log))

@@ -28,7 +28,7 @@ ORDER = (
     ("system",),
     ("errors",),
     ("problems",),
-    ("names",),
+    ("names", "times"),
 )
 """The rooms and root files of the orchestrator; each imports itself and what stands in lines below."""
 RANKS = {room: rank for rank, rooms in enumerate(ORDER) for room in rooms}

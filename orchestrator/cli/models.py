@@ -17,6 +17,7 @@ from ..fmi import Workspace, is_fmu_name, load_fmu
 from ..packing import pack as pack_system
 from ..problems import Problem, suggestion
 from ..scenario import shipped
+from ..times import digits
 from ..validation import TIMEOUT
 from ..validation import validate as validate_fmu
 from .options import (
@@ -95,7 +96,7 @@ def describe(
         "FMI": interface.version,
         "made with": interface.generator,
         "guid": interface.guid,
-        "default step": "" if interface.default_step is None else f"{interface.default_step:g} s",
+        "default step": "" if interface.default_step is None else f"{digits(interface.default_step)} s",
         "saves its state": "yes" if interface.can_save_state else "no",
     }
     for label, fact in facts.items():

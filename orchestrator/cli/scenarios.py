@@ -9,6 +9,7 @@ from ..master import ALGORITHMS
 from ..run import check as check_system
 from ..run import describe_stepping
 from ..scenario import load, shipped
+from ..times import digits
 from ..wiring import describe_topology
 from .options import Algorithm, Preset, Scenario, Set, Step, Stop, Swap, With, load_system
 from .printing import counted, open_console, say, show_compilations, show_notes
@@ -50,7 +51,9 @@ def check(
         checked = check_system(system, workspace)
     say(out, system.provenance.title or system.provenance.name, "bold")
     connections = len(checked.wiring.links)
-    facts = f"{len(system.instances)} instances, {connections} scalar connections, step {system.stepping.step:g} s"
+    facts = (
+        f"{len(system.instances)} instances, {connections} scalar connections, step {digits(system.stepping.step)} s"
+    )
     say(out, facts, "dim")
     for line in describe_stepping(checked):
         say(out, line)

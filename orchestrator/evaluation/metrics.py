@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 
 from ..errors import ExpressionError, WindowError
 from ..problems import Problem
+from ..times import digits
 from .expressions import Expression, parse
 from .functions import ELEMENTWISE, Function
 from .platoon import PLATOON
@@ -79,7 +80,7 @@ def _at(signals: Signals, x: Any, t: Any) -> float:
     moment, time = scalar(t, "the time of at(x, t)"), signals.time
     slack = 1e-6 * signals.step
     if not time.size or not time[0] - slack <= moment <= time[-1] + slack:
-        raise WindowError(f"no recorded points around t = {moment:g} s")
+        raise WindowError(f"no recorded points around t = {digits(moment)} s")
     values = np.array([np.interp(moment, time, row) for row in window_of(signals, x).rows])
     return np.nan if np.isnan(values).any() else _largest(values)
 
@@ -123,7 +124,7 @@ def _mean_jerk(
         for a, b in excluded:
             starts &= ~((time <= b + slack) & (time + width >= a - slack))
         if not starts.any():
-            raise WindowError(f"mean_jerk needs recorded points {width:g} s apart in the window")
+            raise WindowError(f"mean_jerk needs recorded points {digits(width)} s apart in the window")
         later = np.array([np.interp(time[starts] + width, time, row) for row in seen.rows])
         return float(np.abs(later - seen.rows[:, starts]).max() / width)
 

@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 from ..errors import ExpressionError, WindowError
 from ..names import SignalName
 from ..problems import Problem, suggestion
+from ..times import digits, slack
 from .calculation import Scope, evaluate
 from .expressions import Expression, evaluate_constant, parse
 from .functions import CONSTANTS
@@ -159,10 +160,12 @@ class Requirement:
         start, end = (None if x is None else _moment(x, signals) for x in (self.start, self.end))
         outside = [(_moment(first, signals), _moment(last, signals)) for first, last in self.outside]
         if start is not None and end is not None and start > end:
-            raise ExpressionError(Problem("", f"'from {start:g} until {end:g}' ends before it starts", "swap the two"))
+            raise ExpressionError(
+                Problem("", f"'from {digits(start)} until {digits(end)}' ends before it starts", "swap the two")
+            )
         for first, last in outside:
             if first > last:
-                backwards = f"'outside [{first:g}, {last:g}]' ends before it starts"
+                backwards = f"'outside [{digits(first)}, {digits(last)}]' ends before it starts"
                 raise ExpressionError(Problem("", backwards, "swap the two"))
         return _Times(start, end, outside)
 
@@ -215,16 +218,19 @@ class Requirement:
     ) -> tuple[Literal["pass", "fail", "inconclusive"], str]:
         """The verdict and the reason for it, where it needs one."""
         last = float(signals.time[-1])
-        reached = signals.completed if end is None else end <= last + 1e-6 * signals.step
+        reached = signals.completed if end is None else end <= last + slack(signals.step, last)
         # A number over the whole run (final, settling_time, ...) is not final before the run is.
         reducers = (isinstance(x, Call) and self.condition.functions[x.name].reduces for x in walk(self.condition.tree))
         provisional = not signals.completed and any(reducers)
         if not worst.holds and not provisional and (reached or self.quantifier == "always"):
             return "fail", "a value is not a number (NaN)" if np.isnan(worst.slack) else ""
         if not signals.completed:
-            return "inconclusive", f"the run ended at {last:g} s, before its stop time {signals.stop_time:g} s"
-        if not reached:
-            return "inconclusive", f"its window lasts until {end:g} s, the run only until {last:g} s"
+            return (
+                "inconclusive",
+                f"the run ended at {digits(last)} s, before its stop time {digits(signals.stop_time)} s",
+            )
+        if end is not None and not reached:
+            return "inconclusive", f"its window lasts until {digits(end)} s, the run only until {digits(last)} s"
         return "pass", ""
 
     def _worst(self, signals: Signals, points: NDArray[np.bool_], index: int | None) -> _Worst:

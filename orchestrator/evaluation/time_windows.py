@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from ..errors import ExpressionError, WindowError
 from ..problems import Problem
+from ..times import digits, slack
 from .signals import Signals
 
 Array = NDArray[np.float64]
@@ -79,7 +80,7 @@ def time_windows(outside: Any) -> list[tuple[float, float]]:
             raise ExpressionError("outside takes a window [from, to] or a list of them, as in outside = [210, 240]")
         first, last = (scalar(end, "an end of outside") for end in pair)
         if first > last:
-            message = f"outside = [{first:g}, {last:g}] ends before it starts"
+            message = f"outside = [{digits(first)}, {digits(last)}] ends before it starts"
             raise ExpressionError(Problem("", message, "swap the two"))
         windows.append((first, last))
     return windows
@@ -90,17 +91,21 @@ def select(
 ) -> NDArray[np.bool_]:
     """Which recorded points lie in after <= t <= until and in none of the closed intervals `outside`; shape (T,).
 
-    A millionth of a step is forgiven, because 3 * 0.1 is not 0.3.
+    Rounding is forgiven, because 3 * 0.1 is not 0.3.
     """
-    time, slack = signals.time, 1e-6 * signals.step
+    time, forgiven = signals.time, slack(signals.step, *_ends(signals.time))
     points = np.ones(time.shape, dtype=np.bool_)
     if after is not None:
-        points &= time >= after - slack
+        points &= time >= after - forgiven
     if until is not None:
-        points &= time <= until + slack
+        points &= time <= until + forgiven
     for first, last in outside:
-        points &= ~((time >= first - slack) & (time <= last + slack))
+        points &= ~((time >= first - forgiven) & (time <= last + forgiven))
     return points
+
+
+def _ends(time: NDArray[np.float64]) -> list[float]:
+    return [float(time[0]), float(time[-1])] if time.size else []
 
 
 def window_of(signals: Signals, x: Any, after: Any = None, until: Any = None, outside: Any = None) -> Window:
@@ -115,8 +120,8 @@ def window_of(signals: Signals, x: Any, after: Any = None, until: Any = None, ou
     excluded = [] if outside is None else time_windows(outside)
     time = signals.time
     last = float(time[-1]) if time.size else -np.inf
-    if end is not None and end > last + 1e-6 * signals.step:
-        raise WindowError(f"the window lasts until {end:g} s but the recorded points end at {last:g} s")
+    if end is not None and end > last + slack(signals.step, last):
+        raise WindowError(f"the window lasts until {digits(end)} s but the recorded points end at {digits(last)} s")
     points = select(signals, start, end, excluded)
     if not points.any():
         raise WindowError(Problem("", "no recorded point lies in the window", "widen it, or record more often"))

@@ -8,6 +8,7 @@ from ..fmi import Interface, Model
 from ..names import SignalName
 from ..problems import Problem, suggestion
 from ..system import System
+from ..times import count_steps, digits
 from ..wiring import Wiring
 from .algebraic_loops import find_loops
 from .algorithms import ALGORITHMS
@@ -86,11 +87,11 @@ def _check_rates(system: System) -> Iterable[Problem]:
             limit = "with which refresh does not go"
         if limit:
             yield Problem(instance.origin, f"{name} has a step of its own, {limit}", names=(name,))
-        own = f"its step = {instance.step:g} s"
+        own = f"its step = {digits(instance.step)} s"
         if not _is_multiple(instance.step, system.stepping.step):
-            own = f"{own} is not a whole multiple of the system's, {system.stepping.step:g} s"
-        elif not _is_multiple(duration, instance.step):
-            own = f"{own} does not divide the run of {duration:g} s into whole steps"
+            own = f"{own} is not a whole multiple of the system's, {digits(system.stepping.step)} s"
+        elif count_steps(system.stepping.start_time, system.stepping.stop_time, instance.step) is None:
+            own = f"{own} does not divide the run of {digits(duration, system.stepping.stop_time)} s into whole steps"
         else:
             continue
         yield Problem(str(name), own, names=(name,)).at(instance.origin)

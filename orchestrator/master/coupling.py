@@ -6,6 +6,7 @@ from collections.abc import Mapping, Sequence
 
 from ..errors import CouplingError
 from ..fmi import Slave
+from ..times import digits
 from ..wiring import Link
 from .algebraic_loops import LoopSolver
 from .exchange import Exchange
@@ -104,7 +105,8 @@ class Coupling:
         if not left <= _SOLVED:
             names = ", ".join(loops.signals[:6])
             raise CouplingError(
-                f"t = {time:g} s: the algebraic loop through {names} has no solution near its last one: it is left "
+                f"t = {digits(time)} s: the algebraic loop through {names} has no solution near its "
+                f"last one: it is left "
                 f"with a relative residual of {left:.3g}; take a smaller step, or put a component with memory into it"
             )
 

@@ -12,6 +12,7 @@ from ..fmi import Interface, Variable
 from ..names import SignalName
 from ..problems import Problem, suggestion
 from ..system import ACTIONS, Event, System
+from ..times import digits
 from ..wiring import Wiring, bounded
 from .algorithms import ALGORITHMS
 
@@ -115,7 +116,7 @@ def _wrong_times(event: Event, step: float) -> Iterator[Problem]:
         if not _is_finite(length) or length <= 0.0:
             yield Problem("", f"{key} takes a number greater than 0, not {length!r}")
         elif length < step * (1.0 - 1e-6):
-            shorter = f"{key} = {length:g} s is shorter than the step, {step:g} s"
+            shorter = f"{key} = {digits(length)} s is shorter than the step, {digits(step)} s"
             yield Problem("", f"{shorter}: it may pass between two points unnoticed")
     if event.action == "set" and event.duration is not None:
         yield Problem("", "'set' takes no duration", "take 'override' for a value that lasts a while")

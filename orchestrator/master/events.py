@@ -15,10 +15,8 @@ from typing import Any
 from ..fmi import Variable
 from ..names import SignalName
 from ..system import Event
+from ..times import slack
 from .exchange import Change, Exchange
-
-LATE = 1e-6
-"""Part of a communication step by which an event may come late and still count as being of that point."""
 
 
 @dataclass(frozen=True, order=True)
@@ -105,7 +103,8 @@ class Schedule:
     def next_point(self, start: float, step: float, after: int) -> float:
         """Number of the first communication point, later than number ``after``, at which something is to be done."""
         time = self.next_time()
-        due = math.inf if math.isinf(time) else max(after + 1, math.ceil((time - start) / step - LATE))
+        steps = (time - start - slack(step, start, time)) / step
+        due = math.inf if math.isinf(time) else max(after + 1, math.ceil(steps))
         changed = [rate for target, rate in self._slow.items() if self._slots[target].active]
         return min([due, *(after - after % rate + rate for rate in changed)])
 

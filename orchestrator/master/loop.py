@@ -14,18 +14,17 @@ from typing import Any
 from ..errors import FmuError, RunError
 from ..fmi import Slave
 from ..fmi.binding import Watch
+from ..times import slack
 from ..wiring import Link
 from .algebraic_loops import LoopSolver, find_feeders, find_loops
 from .algorithms import ALGORITHMS, Explicit, FixedStep, VariableStep
 from .compiled import CompiledLoop
 from .coupling import Coupling
-from .events import LATE, Schedule
+from .events import Schedule
 from .exchange import types_of
 from .initialization import settle
 from .observer import Observer, Rows
 from .settings import DEFAULT, Settings
-
-_ROUNDING = 1e-9
 
 
 class Master:
@@ -208,7 +207,7 @@ class Master:
             return observe
 
         def see(steps: int, rows: Rows) -> bool:
-            if steps == stop and self._let_happen(LATE * step, lambda: observe(steps, rows)):
+            if steps == stop and self._let_happen(slack(step, self.time), lambda: observe(steps, rows)):
                 self.exchange.remember()
                 if len(rows) and rows[-1][0] == self.time:
                     rows[-1][1:] = self.values  # type: ignore[index]
@@ -277,12 +276,13 @@ class Master:
     ) -> bool:
         algorithm = self.algorithm
         assert isinstance(algorithm, VariableStep)
-        coupling, last, late = self.coupling, self._stop_time, _ROUNDING * step
+        coupling, last = self.coupling, self._stop_time
+        late = slack(step, start_time, last)
         end = last if points[0] == points[1] else min(last, start_time + points[0] * step)
         while coupling.time < end:
             row = last
             if every:  # the next point at which a row is due
-                done = math.floor((coupling.time - start_time) / (every * step) + _ROUNDING)
+                done = math.floor((coupling.time - start_time) / (every * step) + late / (every * step))
                 row = start_time + (done + 1) * every * step
                 row = row if row < last - late else last
             due = math.inf if self._schedule is None else self._schedule.next_time()

@@ -13,6 +13,7 @@ from ..fmi import Unit
 from ..master import ALGORITHMS
 from ..run import Checked
 from ..system import System
+from ..times import digits
 from .exposure import Exposed
 
 _EXPONENTS = ("kg", "m", "s", "A", "K", "mol", "cd", "rad")
@@ -162,7 +163,7 @@ def page(system: System, checked: Checked, exposed: Sequence[Exposed]) -> str:
         f'<!DOCTYPE html><html lang="en"><head><meta charset="utf-8"><title>{html.escape(came.name)}</title></head>'
         f"<body><h1>{html.escape(came.title or came.name)}</h1><p>{html.escape(came.description)}</p>"
         f"<p>Preset: {html.escape(came.preset or 'none')}{', modified' if came.modified else ''}. "
-        f"{html.escape(system.stepping.algorithm)}: the models step every {step:g} s, {html.escape(how)}. "
+        f"{html.escape(system.stepping.algorithm)}: the models step every {digits(step)} s, {html.escape(how)}. "
         f"The importing tool's step is a whole multiple of that.</p>"
         f"<h2>Models</h2><table><tr><th>instance</th><th>model</th><th>digest</th></tr>{instances}</table>"
         f"<h2>Variables</h2><table><tr><th>name</th><th>causality</th><th>unit</th><th>description</th></tr>{shown}"

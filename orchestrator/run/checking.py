@@ -16,6 +16,7 @@ from ..master import ALGORITHMS, check_coupling, check_events, describe_coupling
 from ..names import SignalName
 from ..problems import Problem, suggestion
 from ..system import System
+from ..times import count_steps, digits
 from ..wiring import Order, Wiring, derive_order, wire
 from .loop_delay import loop_delays
 from .size import tell_size
@@ -187,14 +188,19 @@ def _check_times(system: System) -> list[str]:
     record = system.stepping.step if system.stepping.record is None else system.stepping.record
     duration = "stop_time - start_time" if system.stepping.start_time else "stop_time"
     problems = []
-    for name, length in ((duration, system.stepping.stop_time - system.stepping.start_time), ("record", record)):
-        count = length / system.stepping.step
+    start, stop = system.stepping.start_time, system.stepping.stop_time
+    for name, begin, end in ((duration, start, stop), ("record", 0.0, record)):
+        count = (end - begin) / system.stepping.step
         if count >= _MOST_STEPS:
             problems.append(
-                f"{name} = {length:g} s is {count:.3g} steps of {system.stepping.step:g} s: too many to count"
+                f"{name} = {digits(end - begin, begin, end)} s is {count:.3g} steps of "
+                f"{digits(system.stepping.step)} s: too many to count"
             )
-        elif not count > 0.5 or abs(count - round(count)) > 1e-6:
-            problems.append(f"{name} = {length:g} s is not a whole multiple of step = {system.stepping.step:g} s")
+        elif count_steps(begin, end, system.stepping.step) is None:
+            problems.append(
+                f"{name} = {digits(end - begin, begin, end)} s is not a whole multiple of step = "
+                f"{digits(system.stepping.step)} s"
+            )
     return problems
 
 
@@ -209,7 +215,7 @@ def describe_stepping(checked: Checked) -> list[str]:
     lines += [str(delay) for delay in delays if not delay.wanted and delay.steps]
     for instance in system.instances.values():
         if instance.step is not None:
-            lines.append(f"{instance.name} steps every {instance.step:g} s")
+            lines.append(f"{instance.name} steps every {digits(instance.step)} s")
     return lines
 
 

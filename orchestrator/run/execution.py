@@ -17,6 +17,7 @@ from ..fmi import Kind, Workspace
 from ..fmi.binding import forget_paths
 from ..master import check_threads
 from ..system import Instance, System
+from ..times import digits
 from . import checkpoint
 from . import record as record_file
 from .checking import Checked, check
@@ -154,8 +155,8 @@ def go_on(
         system = _override(point.system, stop_time, None, None)
         if not system.stepping.stop_time > point.time:
             raise ScenarioError(
-                f"{directory}: its checkpoint is at t = {point.time:g} s; it cannot go on to an earlier stop time, "
-                f"{system.stepping.stop_time:g} s"
+                f"{directory}: its checkpoint is at t = {digits(point.time)} s; it cannot go on to an earlier stop time, "
+                f"{digits(system.stepping.stop_time)} s"
             )
         every = checkpoint_every if checkpoint_every is not None else point.every
         return _execute(system, Job(point.kind, place, threads, every, point, progress), figures)

@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 from ..errors import RollbackError, RunError, ScenarioError, StoppedError
 from ..fmi import Interface, Kind, Slave
 from ..master import ALGORITHMS, Master, Rows
+from ..times import slack
 from . import record as record_file
 from .assembly import assembled
 from .checking import Checked
@@ -194,7 +195,8 @@ class Session:
         begin, before = clock.perf_counter(), master.steps
         try:
             while True:
-                passed = math.floor((master.time - system.stepping.start_time) / system.stepping.step + 1e-6)
+                late = slack(system.stepping.step, system.stepping.start_time, master.time)
+                passed = math.floor((master.time - system.stepping.start_time + late) / system.stepping.step)
                 until = min(count, (passed // stride + 1) * stride)
                 points = {"first": master.steps, "until": until}
                 if not master.run(

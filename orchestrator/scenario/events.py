@@ -10,6 +10,7 @@ from ..errors import ScenarioError
 from ..names import SignalName
 from ..problems import Problem
 from ..system import ACTIONS, Event
+from ..times import digits
 from .groups import Entry, choice, number, positive, shown
 from .patterns import Counts, members, read_signal
 from .reader import Reader
@@ -125,7 +126,9 @@ def _repetition(event: Event, entries: Mapping[str, Entry]) -> list[Problem]:
         remedy = "give a duration, in s: duration = 5.0"
         return [entries["every"].problem("what begins again must end before", remedy)]
     if event.every < event.duration:
-        shorter = f"the period, {event.every:g} s, must not be shorter than the duration, {event.duration:g} s"
+        shorter = (
+            f"the period, {digits(event.every)} s, must not be shorter than the duration, {digits(event.duration)} s"
+        )
         return [entries["every"].problem(shorter)]
     return []
 

@@ -10,6 +10,7 @@ from ..errors import ScenarioError
 from ..master import ALGORITHMS
 from ..problems import Problem
 from ..system import ACCELERATIONS, LOOPS, UNSETTLED
+from ..times import count_steps, digits
 from .groups import Entry, choice, number, positive, shown, truth, whole, whole_multiple
 from .patterns import Counts, members, read_signal
 
@@ -99,7 +100,7 @@ def _shortest(entries: Mapping[str, Entry]) -> list[Problem]:
     if unsaid or step <= 0 or shortest <= step:
         return []
     where = f" ({entries['step'].origin})" if "step" in entries else ""
-    longer = f"the shortest step, {shortest:.10g} s, must not be longer than the step, {step:.10g} s{where}"
+    longer = f"the shortest step, {digits(shortest)} s, must not be longer than the step, {digits(step)} s{where}"
     return [entries["min_step"].problem(longer)]
 
 
@@ -119,28 +120,32 @@ def _pair(entry: Entry, problems: list[Problem]) -> list[float]:
 def _grid(entries: Mapping[str, Entry], values: Mapping[str, Any]) -> list[Problem]:
     """What is wrong with the points in time."""
     step, start, stop = values.get("step", 0.1), values.get("start_time", 0.0), values["stop_time"]
-    steps_of = f"steps of {step:.10g} s" + (f" ({entries['step'].origin})" if "step" in entries else "")
+    steps_of = f"steps of {digits(step)} s" + (f" ({entries['step'].origin})" if "step" in entries else "")
     if step <= 0:
-        return [entries["step"].problem(f"the step must be greater than 0 s, not {step:g} s")]
+        return [entries["step"].problem(f"the step must be greater than 0 s, not {digits(step)} s")]
     if stop <= start:
-        return [entries["stop_time"].problem(f"the stop time, {stop:g} s, must be later than the start, {start:g} s")]
+        return [
+            entries["stop_time"].problem(
+                f"the stop time, {digits(stop)} s, must be later than the start, {digits(start)} s"
+            )
+        ]
     record = values.get("record")
     if (
         "algorithm" in values and ALGORITHMS[values["algorithm"]].varies_step
     ):  # a step ends wherever a row or the end is due
         if record is not None and record <= 0:
-            return [entries["record"].problem(f"the distance of rows must be greater than 0 s, not {record:g} s")]
+            return [entries["record"].problem(f"the distance of rows must be greater than 0 s, not {digits(record)} s")]
         return []
     problems = []
-    if not whole_multiple(stop - start, step):
+    if count_steps(start, stop, step) is None:
         steps = max(1, math.floor((stop - start) / step)) if math.isfinite((stop - start) / step) else 1
-        near = " or ".join(f"{start + k * step:.10g} s" for k in (steps, steps + 1))
-        message = f"{stop - start:.10g} s is not a whole number of {steps_of}"
+        near = " or ".join(f"{digits(start + k * step)} s" for k in (steps, steps + 1))
+        message = f"{digits(stop - start, start, stop)} s is not a whole number of {steps_of}"
         problems.append(entries["stop_time"].problem(message, f"change the step, or stop at {near}"))
     if record is not None and not whole_multiple(record, step):
         fitting = max(1, round(record / step)) * step if 0 < record / step < 1e15 else step
-        message = f"{record:.10g} s is not a whole number of {steps_of}"
-        problems.append(entries["record"].problem(message, f"take {fitting:.10g} s (simulation.record)"))
+        message = f"{digits(record)} s is not a whole number of {steps_of}"
+        problems.append(entries["record"].problem(message, f"take {digits(fitting)} s (simulation.record)"))
     return problems
 
 

@@ -8,6 +8,7 @@ from ctypes import c_double, c_int
 from typing import TYPE_CHECKING, Any
 
 from ..errors import FmuError
+from ..times import digits
 from .agreement import typical_deviation
 from .probes import HALF, NotedError, Probe, Task, Tried, instances
 
@@ -128,16 +129,19 @@ def steps(task: Task) -> str:
             found = Tried(it.slave, task, finer).initialize().run(2 * HALF)[1::2]
     except FmuError as error:
         if interface.sampled:
-            raise NotedError(f"a sampled block, which does not take steps of {finer:g} s") from error
-        told = f"says that it takes steps of any length, but not of {finer:g} s: {error.args[0]}"
+            raise NotedError(f"a sampled block, which does not take steps of {digits(finer)} s") from error
+        told = f"says that it takes steps of any length, but not of {digits(finer)} s: {error.args[0]}"
         raise FmuError(told, time=error.time, status=error.status, log=error.log) from error
     away = typical_deviation(expected, found)
     if away > _FAR:
-        told = f"with steps of {finer:g} s instead of {task.step:g} s outputs are others, by {away:.0%} of their range"
+        told = (
+            f"with steps of {digits(finer)} s instead of {digits(task.step)} s outputs are "
+            f"others, by {away:.0%} of their range"
+        )
         if interface.sampled:
             raise NotedError(f"a sampled block: {told}")
         raise FmuError(f"says that it takes steps of any length, but {told}")
-    return f"steps of {finer:g} s give what steps of {task.step:g} s give, but for {away:.1g} of the range"
+    return f"steps of {digits(finer)} s give what steps of {digits(task.step)} s give, but for {away:.1g} of the range"
 
 
 def derivatives(task: Task) -> str:

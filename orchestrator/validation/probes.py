@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, Any
 
 from ..errors import FmuError
 from ..fmi.binding import SLAVES, LoadedSlave, call_name
+from ..times import digits
 from .agreement import Rows, compare, typical_deviation
 from .record import Record
 
@@ -124,7 +125,7 @@ class Tried:
         for names, channel in self._outputs:
             for name, value in zip(names, channel.get(), strict=True):
                 if isinstance(value, float) and not math.isfinite(value):
-                    raise FmuError(f"output {name} is {value!r} at t = {self.slave.time:g} s", log=self.slave.log)
+                    raise FmuError(f"output {name} is {value!r} at t = {digits(self.slave.time)} s", log=self.slave.log)
                 values.append(value)
         return values
 
@@ -171,7 +172,7 @@ def simulate(task: Task) -> str:
         rows = it.run()
         it.trying("terminate")
         it.slave.terminate()
-    return f"{STEPS} steps of {task.step:g} s, {len(rows[0])} outputs finite"
+    return f"{STEPS} steps of {digits(task.step)} s, {len(rows[0])} outputs finite"
 
 
 def starts(task: Task) -> str:

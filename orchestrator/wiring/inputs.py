@@ -9,6 +9,7 @@ from ..fmi import Interface, Variable
 from ..names import SignalName
 from ..problems import Problem
 from ..system import System
+from ..times import digits
 from .links import Link, Wiring
 
 _LISTED = 4
@@ -123,7 +124,10 @@ def check_sampling(system: System, interfaces: Mapping[str, Interface], wiring: 
         if interface.annotation and sample and isinstance(sample, int | float):
             own_step = system.instances[name].step or system.stepping.step
             if not _is_multiple(own_step, sample):
-                what = f"the communication step {own_step:g} s is not a whole multiple of its sample_time {sample:g} s"
+                what = (
+                    f"the communication step {digits(own_step)} s is not a whole multiple of its "
+                    f"sample_time {digits(sample)} s"
+                )
                 problem = Problem(name, f"{what}: set step or {name}.sample_time", names=(SignalName(name),))
                 wiring.problems.append(problem.at(system.instances[name].origin))
         own, step = interface.default_step, system.instances[name].step or system.stepping.step
@@ -131,14 +135,15 @@ def check_sampling(system: System, interfaces: Mapping[str, Interface], wiring: 
             told.add(interface.model)
             if not _is_multiple(step, own):
                 wiring.notes.append(
-                    f"{interface.model} cannot vary its step and is made for {own:g} s; it is stepped at {step:g} s"
+                    f"{interface.model} cannot vary its step and is made for {digits(own)} s; it is "
+                    f"stepped at {digits(step)} s"
                 )
         longest = interface.annotation and interface.annotation.recommended_step
         if longest and system.stepping.step > longest * (1 + 1e-9) and interface.model not in told:
             told.add(interface.model)
             wiring.notes.append(
-                f"{interface.model} is advised to step at {longest:g} s or faster; this run steps at "
-                f"{system.stepping.step:g} s"
+                f"{interface.model} is advised to step at {digits(longest)} s or faster; this run steps at "
+                f"{digits(system.stepping.step)} s"
             )
 
 

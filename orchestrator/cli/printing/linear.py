@@ -9,6 +9,7 @@ from rich.table import Table
 from rich.text import Text
 
 from ...linearization import Linearization, Mode, Passing, Stability, default_input
+from ...times import digits
 from .console import say, show_notes
 from .tables import table
 
@@ -18,8 +19,8 @@ _MOST_MODES = 40
 def show_linear(out: Console, model: Linearization, stability: Stability, passings: list[Passing]) -> None:
     """What a user asked for: is it stable, how fast, and does a disturbance grow from train to train."""
     say(out, model.system.provenance.title or model.system.provenance.name, "bold")
-    kind = "continuous" if model.step is None else f"one step of {model.step:g} s"
-    facts = f"linear at t = {model.time:g} s; {kind}; {len(model.states)} states"
+    kind = "continuous" if model.step is None else f"one step of {digits(model.step)} s"
+    facts = f"linear at t = {digits(model.time)} s; {kind}; {len(model.states)} states"
     say(out, f"{facts}; inputs: {_short(model.inputs)}; outputs: {_short(model.outputs)}", "dim")
     show_notes(out, model.notes)
     out.print(_modes_table(stability))

@@ -9,6 +9,7 @@ from rich.console import Console
 
 from ...evaluation import compare_metrics
 from ...run import CHECKPOINT_FILE, Finding, Run, StepChange, StepCheck
+from ...times import digits
 from .console import and_figures, counted, open_console, say, show_notes
 from .findings import show_findings
 from .metrics import show_metrics
@@ -40,7 +41,11 @@ def show_run(outcome: Run, second: Run | None, step: StepCheck | None, quiet: bo
     if outcome.status != "completed":
         reached = float(outcome.time[-1]) if len(outcome.time) else system.stepping.start_time
         why = f": {outcome.error}" if outcome.status == "terminated" else ""
-        say(out, f"{outcome.status} at t = {reached:g} s of {system.stepping.stop_time:g} s{why}", "bold red")
+        say(
+            out,
+            f"{outcome.status} at t = {digits(reached)} s of {digits(system.stepping.stop_time)} s{why}",
+            "bold red",
+        )
         if outcome.directory is not None and (outcome.directory / CHECKPOINT_FILE).is_file():
             say(out, f"to go on from the last checkpoint: orchestrate run --resume {outcome.directory}", whole=True)
     else:
@@ -70,7 +75,7 @@ def _show_tables(out: Console, outcome: Run, second: Run | None) -> None:
 
 def _step_line(found: StepCheck) -> str:
     """The verdict on the step, with what decides it."""
-    line = f"the step of {found.step:g} s is {found.verdict}"
+    line = f"the step of {digits(found.step)} s is {found.verdict}"
     beyond = found.beyond
     if not beyond and not found.requirements:
         worst = next(iter(found.changes), None)
@@ -114,7 +119,7 @@ def _show_head(out: Console, outcome: Run) -> None:
         f"{len(system.instances)} instances",
         _kinds(outcome),
         system.stepping.algorithm,
-        f"step {system.stepping.step:g} s",
+        f"step {digits(system.stepping.step)} s",
     ]
     if outcome.status == "completed":
         facts.append(

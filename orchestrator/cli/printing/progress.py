@@ -11,6 +11,7 @@ from rich.progress import BarColumn, Progress, SpinnerColumn, TextColumn, TimeEl
 
 from ....fmus import toolchain
 from ...run import Progress as OnProgress
+from ...times import digits
 from .console import open_console, printable, tell
 
 
@@ -35,7 +36,7 @@ def show_progress(
             task = bar.add_task(title, total=None, reached="")
 
             def show(time: float, stop: float) -> None:
-                at = f"{time:.6g} of {stop:.6g} s"
+                at = f"{digits(time)} of {digits(stop)} s"
                 bar.update(task, description=title, completed=time - start, total=stop - start, reached=at)
 
             with _compilations(lambda what: bar.update(task, description=what)):
@@ -110,6 +111,6 @@ def _lines(title: str, start: float, reached: float) -> OnProgress:
         told = max(told, before)
         while told < done:
             told += 1
-            tell(f"{title}: {10 * told} % of {stop - start:g} s")
+            tell(f"{title}: {10 * told} % of {digits(stop - start)} s")
 
     return show

@@ -10,6 +10,7 @@ from rich.text import Text
 
 from ...names import SignalName
 from ...system import Connection, Event, Instance, Provenance, System
+from ...times import digits
 from .console import counted, say
 from .tables import table
 
@@ -22,8 +23,8 @@ def show_system(out: Console, system: System) -> None:
         "": origin.description,
         "source": origin.source,
         "file": origin.path,
-        "steps": f"{stepping.algorithm}, every {stepping.step:g} s from {stepping.start_time:g} to "
-        f"{stepping.stop_time:g} s",
+        "steps": f"{stepping.algorithm}, every {digits(stepping.step)} s from {digits(stepping.start_time)} to "
+        f"{digits(stepping.stop_time)} s",
         "seed": f"{system.seed}",
     }
     for label, fact in facts.items():
@@ -107,7 +108,7 @@ def _changed(one: Connection) -> str:
 def _event(event: Event) -> tuple[str, str, str]:
     size = {"value": event.value, "rate": event.rate, "for": event.duration, "every": event.every}
     return (
-        f"{event.at:g} s",
+        f"{digits(event.at)} s",
         event.signal,
         " ".join([event.action, *(f"{k} {v}" for k, v in size.items() if v is not None)]),
     )

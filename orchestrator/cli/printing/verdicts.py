@@ -11,6 +11,7 @@ from rich.table import Table
 from rich.text import Text
 
 from ...evaluation import BAD, REFERENCE, UNJUDGED_RUN, ComparedValue, Verdict, count_values
+from ...times import digits
 from .console import say
 from .tables import PLAIN, number, prefixed, show_reasons, table, verdict
 
@@ -22,7 +23,7 @@ def show_requirements(out: Console, verdicts: Sequence[Verdict]) -> None:
     columns = ("requirement", "verdict", "margin", "worst at", "text")
     made = table("Requirements", columns, right=("margin", "worst at"), fold=("requirement", "text"))
     for v in verdicts:
-        place = "" if v.time is None else f"{v.time:g} s"
+        place = "" if v.time is None else f"{digits(v.time)} s"
         place += "" if v.index is None else f", i = {v.index}"
         margin = "" if v.margin is None else f"{v.margin:.4g}"
         made.add_row(Text(v.name), verdict(v.verdict), margin, place, Text(" ".join(v.text.split())))

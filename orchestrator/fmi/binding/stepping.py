@@ -6,12 +6,11 @@ from abc import ABC, abstractmethod
 from typing import Any, ClassVar
 
 from ...errors import FmuError, RollbackError, StoppedError
+from ...times import digits, slack
 from ..interface import Interface
 from .surroundings import ONE, SMALL, TINY, are_floats_disturbed
 
 OK, WARNING, DISCARD, FATAL, PENDING = 0, 1, 2, 4, 5
-_SHORTEST_PART = 1e-6
-"""The smallest part of a communication step in which an FMU that discards it is asked to take it."""
 _MOST_PARTS = 10_000
 
 
@@ -132,7 +131,8 @@ class Stepping(ABC):
         return False, reached if on and reached is not None else time + 0.5 * part
 
     def _go_on(self, time: float, length: float, status: int, final: bool) -> None:
-        self.time, end, part, shortest = time, time + length, length, _SHORTEST_PART * length
+        self.time, end, part = time, time + length, length
+        shortest = slack(length, time, end)
         for _ in range(_MOST_PARTS):
             reached = self._reached(time + part, status)
             if self._stops(status):
@@ -141,7 +141,8 @@ class Stepping(ABC):
             if reached is None:
                 break
             if reached > end + shortest:
-                raise self._failure(f"says that it got to t = {reached:g} s in the step to t = {end:g} s", status)
+                what = f"says that it got to t = {digits(reached)} s in the step to t = {digits(end)} s"
+                raise self._failure(what, status)
             on = reached > time + shortest
             time, part = (reached, end - reached) if on else (time, 0.5 * part)
             self.time = time

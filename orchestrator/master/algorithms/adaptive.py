@@ -25,6 +25,7 @@ from ...fmi import Interface, Variable
 from ...names import SignalName
 from ...problems import Problem
 from ...system import System
+from ...times import digits
 from ...wiring import Wiring
 from ..coupling import Coupling
 from .algorithm import Fit, VariableStep
@@ -277,8 +278,8 @@ class Adaptive(VariableStep):
         if place in self.plain:
             lists = "; or let its FMU list the input, if this output passes one on at once"
         raise CouplingError(
-            f"t = {time:g} s: {name} cannot be kept within its tolerance ({relative:g} relative, {absolute:g} "
-            f"absolute): its error is {error:.3g} times as large at the shortest step, {length:g} s; loosen "
+            f"t = {digits(time)} s: {name} cannot be kept within its tolerance ({relative:g} relative, {absolute:g} "
+            f"absolute): its error is {error:.3g} times as large at the shortest step, {digits(length)} s; loosen "
             f"simulation.tolerance, or this signal's in [simulation.tolerances], or allow a smaller "
             f"simulation.min_step{lists}"
         )

@@ -22,6 +22,7 @@ import numpy as np
 from ...errors import CouplingError, FmuError, StoppedError
 from ...fmi import Interface
 from ...system import System
+from ...times import digits
 from ...wiring import Link, Wiring, derive_order
 from ..coupling import Coupling
 from .acceleration import ACCELERATIONS, Vector
@@ -258,8 +259,10 @@ class Iterative(FixedStep):
         ways += [] if grows else ["more simulation.max_iterations"]
         ways += [] if self.acceleration == "anderson" else ['simulation.acceleration = "anderson"']
         return CouplingError(
-            f"t = {step[0]:g} s: the coupling through {names} {'diverges' if grows else 'does not converge'}: after "
-            f"{len(sizes)} iterations of the step of {step[1]:g} s they {what}; take {', '.join(ways)} or a smaller "
+            f"t = {digits(step[0])} s: the coupling through {names} "
+            f"{'diverges' if grows else 'does not converge'}: after "
+            f"{len(sizes)} iterations of the step of {digits(step[1])} s they {what}; take "
+            f"{', '.join(ways)} or a smaller "
             "simulation.relaxation"
         )
 
@@ -282,7 +285,9 @@ class Iterative(FixedStep):
         begins = self.tally.unsettled
         if not begins:
             return ""
-        return f"; {len(begins)} of {self.tally.steps} steps went on unsettled, the first from t = {begins[0]:.10g} s"
+        return (
+            f"; {len(begins)} of {self.tally.steps} steps went on unsettled, the first from t = {digits(begins[0])} s"
+        )
 
 
 def own_tolerances(blocks: Blocks, interfaces: Mapping[str, Interface]) -> dict[str, float]:

@@ -13,6 +13,7 @@ from typing import Any
 
 from ...errors import CouplingError
 from ...fmi import Interface, Slave
+from ...times import digits
 from ..coupling import Coupling
 from ..exchange import Feed
 from ..extrapolation import Points
@@ -115,7 +116,8 @@ class Repetition:
         if self._has_moved and not self.is_proven:
             names = listed([self._exchange.signals[k] for k in self.places])
             raise CouplingError(
-                f"t = {time:g} s: adaptive has nothing to watch: {names} show the inputs of their FMUs and no state, "
+                f"t = {digits(time)} s: adaptive has nothing to watch: {names} show the inputs of "
+                f"their FMUs and no state, "
                 "so that nothing tells a step that is too long; make a state an output, or choose gauss-seidel"
             )
 

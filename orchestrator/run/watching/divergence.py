@@ -22,6 +22,7 @@ from ...fmi import Interface
 from ...master import ALGORITHMS, find_loops
 from ...names import SignalName
 from ...system import System
+from ...times import digits
 from ...wiring import Link
 from .finding import Finding
 from .swings import find_swings
@@ -115,7 +116,7 @@ def _finding(found: Mapping[str, Growth], signals: Signals, how: str, advice: st
         since,
         float(signals[first][worst]),
         float(signals.time[worst]),
-        f"the coupling through {names} diverges: {how} since t = {since:.6g} s; {advice}",
+        f"the coupling through {names} diverges: {how} since t = {digits(since)} s; {advice}",
     )
 
 

@@ -9,6 +9,7 @@ from typing import NamedTuple
 
 from ...fmi import Interface
 from ...names import SignalName
+from ...times import digits
 from ...wiring import Following, Quantity, Train, Wiring, find_followings, find_trains
 from .finding import Finding, Kind
 
@@ -67,9 +68,11 @@ def _gap(following: Following) -> Rule:
 
     def tell(seen: Seen) -> Finding:
         past = (
-            f", and is up to {-seen.worst:.6g} m past it (t = {seen.worst_time:.6g} s)" if seen.worst < -_TOUCH else ""
+            f", and is up to {-seen.worst:.6g} m past it (t = {digits(seen.worst_time)} s)"
+            if seen.worst < -_TOUCH
+            else ""
         )
-        what = f"{behind} reaches {ahead}, which runs ahead of it, at t = {seen.since:.6g} s{past}"
+        what = f"{behind} reaches {ahead}, which runs ahead of it, at t = {digits(seen.since)} s{past}"
         signal = f"{ahead}.position - {behind}.position"
         return Finding("collision", (behind, ahead), signal, seen.since, seen.worst, seen.worst_time, what)
 
@@ -81,13 +84,13 @@ def _speeds(train: Train) -> Iterator[Rule]:
 
     def backwards(seen: Seen) -> Finding:
         worst, when = seen.worst - STANDSTILL, seen.worst_time
-        what = f"{name} runs backwards from t = {seen.since:.6g} s on, with {worst:.6g} m/s at t = {when:.6g} s"
+        what = f"{name} runs backwards from t = {digits(seen.since)} s on, with {worst:.6g} m/s at t = {digits(when)} s"
         return Finding("reversing", (name,), signal, seen.since, worst, when, what)
 
     def away(seen: Seen) -> Finding:
         worst, when = FASTEST - seen.worst, seen.worst_time
-        limit = f"{name} is faster than any train, {FASTEST:g} m/s, from t = {seen.since:.6g} s on"
-        what = f"{limit}: {worst:.6g} m/s at t = {when:.6g} s"
+        limit = f"{name} is faster than any train, {FASTEST:g} m/s, from t = {digits(seen.since)} s on"
+        what = f"{limit}: {worst:.6g} m/s at t = {digits(when)} s"
         return Finding("runaway", (name,), signal, seen.since, worst, when, what)
 
     yield Rule(Quantity(train.speed.terms, train.speed.offset + STANDSTILL), backwards)
@@ -104,6 +107,6 @@ def _flags(name: str, face: Interface) -> Iterator[Rule]:
 
 
 def _tell_flag(name: str, flag: str, kind: Kind, what: str, value: float, seen: Seen) -> Finding:  # noqa: PLR0917
-    last = f", last at t = {seen.last:.6g} s" if seen.last > seen.since else ""
-    message = f"{name} {what} ({name}.{flag}), first at t = {seen.since:.6g} s{last}"
+    last = f", last at t = {digits(seen.last)} s" if seen.last > seen.since else ""
+    message = f"{name} {what} ({name}.{flag}), first at t = {digits(seen.since)} s{last}"
     return Finding(kind, (name,), f"{name}.{flag}", seen.since, value, seen.since, message)
