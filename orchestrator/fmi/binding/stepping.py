@@ -95,7 +95,8 @@ class Stepping(ABC):
 
         A part ends where the FMU says that it got, or at half the length where it does not say.
         """
-        end, part, shortest = time + length, length, _SHORTEST_PART * length
+        end, part = time + length, length
+        shortest = slack(length, time, end)
         for _ in range(_MOST_PARTS):
             self.time = time
             state = self.save()
@@ -127,7 +128,7 @@ class Stepping(ABC):
             self.check(self.DO_STEP, status)
             return True, time + part if reached is None else reached
         self.restore(state)
-        on = reached is not None and time < reached < time + part * (1.0 - _SHORTEST_PART)
+        on = reached is not None and time < reached < time + part - slack(part, time)
         return False, reached if on and reached is not None else time + 0.5 * part
 
     def _go_on(self, time: float, length: float, status: int, final: bool) -> None:
