@@ -25,6 +25,7 @@ from ..names import SignalName, parted
 from ..problems import Problem, suggestion
 from ..run import Checked, Progress, assembled, check
 from ..system import System
+from ..times import digits
 from .blocks import Array, Continuous, Stepped, make_block
 from .composition import Composition
 
@@ -102,7 +103,7 @@ def linearize(
     if not 0.0 <= steps < np.inf or abs(steps - round(steps)) > 1e-6:
         raise ScenarioError(
             f"the time to linearize at, {at:g} s, is no communication point: take a whole number of steps of "
-            f"{system.stepping.step:g} s from {system.stepping.start_time:g} s on"
+            f"{digits(system.stepping.step)} s from {digits(system.stepping.start_time)} s on"
         )
     nothing: dict[str, Any] = {"metrics": {}, "requirements": {}, "published": [], "references": [], "figures": []}
     # The step that is differentiated may end after the scenario's own stop time.

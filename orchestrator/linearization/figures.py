@@ -16,6 +16,7 @@ from ...fmus.units import BASE
 from ...fmus.units import parse as parse_unit
 from ..figures import COLOURS, DASHES, FORMATS, bracketed, colour, legend, page
 from ..names import SignalName
+from ..times import digits
 from .blocks import Array
 from .closed_loop import Linearization
 from .modes import Stability
@@ -53,7 +54,7 @@ def draw_linear(
         The files.
     """
     page = partial(_page, directory, format=format, dpi=dpi)
-    title = f"{model.system.provenance.title or model.system.provenance.name}\nLinear at t = {model.time:g} s"
+    title = f"{model.system.provenance.title or model.system.provenance.name}\nLinear at t = {digits(model.time)} s"
     paths = [_poles(stability, title, page)]
     if not model.inputs:
         return paths

@@ -79,7 +79,7 @@ class Results(Mapping[str, NDArray[Any]]):
     __hash__ = object.__hash__
 
     def __repr__(self) -> str:
-        span = f" from {self.time[0]:g} to {self.time[-1]:g} s" if len(self.time) else ""
+        span = f" from {digits(float(self.time[0]))} to {digits(float(self.time[-1]))} s" if len(self.time) else ""
         return f"<Results of {len(self)} signals at {len(self.time)} points{span}: {shortened(self)}>"
 
     @classmethod
