@@ -155,8 +155,8 @@ def go_on(
         system = _override(point.system, stop_time, None, None)
         if not system.stepping.stop_time > point.time:
             raise ScenarioError(
-                f"{directory}: its checkpoint is at t = {digits(point.time)} s; it cannot go on to an earlier stop time, "
-                f"{digits(system.stepping.stop_time)} s"
+                f"{directory}: its checkpoint is at t = {digits(point.time)} s; it cannot go on to an earlier stop "
+                f"time, {digits(system.stepping.stop_time)} s"
             )
         every = checkpoint_every if checkpoint_every is not None else point.every
         return _execute(system, Job(point.kind, place, threads, every, point, progress), figures)

@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 
 from ..errors import ScenarioError, SignalError
 from ..master import Rows
+from ..times import digits
 from .missing import missing_signal, shortened
 from .rows import Writer, add_to_checksum, read_rows
 
