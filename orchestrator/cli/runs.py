@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -194,7 +195,7 @@ def reproduce(
                 if rows:
                     groups[case.command] = rows
     out = open_console()
-    for title, findings in noticed.items():
+    for title, findings in () if quiet else noticed.items():
         show_findings(findings, title, out)
     if published and not quiet:
         show_values(out, "Published values", published)
@@ -202,7 +203,9 @@ def reproduce(
         show_values(out, "Missed" if quiet else "References that are missed", failed)
     bad = any(row.verdict in BAD for row in every)
     if quiet:
-        say(out, in_one_line(every), "bold red" if bad else "green")
+        kinds = Counter(finding.kind for findings in noticed.values() for finding in findings)
+        found_too = "".join(f"; {count} {kind}" for kind, count in kinds.items())
+        say(out, in_one_line(every) + found_too, "bold red" if bad else "green")
     for line, worse in () if quiet else summary([], every):
         say(out, line, "bold red" if worse else "green")
     raise typer.Exit(FAILED if bad else OK)

@@ -135,3 +135,10 @@ def test_what_departs_costs_nothing_until_it_holds(shelf: Path, capsys: pytest.C
     (shelf / "one.toml").write_text(departs.format(fast=20.0, own=10.0))
     assert call(["reproduce"]) == 1
     assert "departs no more: start" in capsys.readouterr().out
+
+
+def test_quiet_counts_what_was_found_by_kind(shelf: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    reversing = SCENARIO.replace("speed = 10.0,", "speed = -10.0,").replace("value = 10.0", "value = -10.0")
+    (shelf / "one.toml").write_text(reversing.format(fast=20.0, own=-10.0))
+    assert call(["reproduce", "--quiet"]) == 0
+    assert capsys.readouterr().out == "reproduced: stated 2 of 2, reference 1 of 1; 1 reversing\n"
