@@ -349,7 +349,7 @@ def test_describe_shows_a_component_by_causality_with_units_and_dependencies(tmp
     assert re.search(
         r"^ahead_speed +Real +m/s +0 +speed of the train ahead \(read where has_ahead\)", text, re.MULTILINE
     )
-    assert re.search(r"^bottom_demand +Real +m/s2 .* position, speed, target_speed, ahead_position", text, re.MULTILINE)
+    assert re.search(r"^bottom_demand +Real +m/s2 .* position, speed, target_speed, has_ahead", text, re.MULTILINE)
 
 
 def test_describe_shows_build_arguments(tmp_path: Path) -> None:
