@@ -98,6 +98,27 @@ def test_results_keep_their_places_and_shared_terms(compiled):
     assert call(0.3, 4.0) == [4.0, math.sin(0.3 * 4.0), 2.5, math.sin(0.3 * 4.0) + 0.3, 0.0]
 
 
+def test_what_is_not_chosen_is_not_computed():
+    """Work that one choice alone asks for stands inside its branch; what others read too stands before it."""
+    x, y = ca.SX.sym("x"), ca.SX.sym("y")
+    shared, rare = ca.sin(x), ca.exp(y)
+    chosen = ca.if_else(x > 0, shared, ca.if_else(y > 0, rare * shared, ca.cos(y)))
+    code = ccode.function("f", [("u", ca.vertcat(x, y))], [chosen, shared])
+    depth = {name: code.split(f"{name}(")[0].splitlines()[-1].count("    ") for name in ("sin", "exp", "cos")}
+    assert depth == {"sin": 1, "exp": 3, "cos": 3}
+
+
+def test_choices_inside_choices_and_truths_as_numbers(compiled):
+    x, y = ca.SX.sym("x"), ca.SX.sym("y")
+    steps = ca.SX(0.0)
+    for k in range(200):  # deeper than compilers need to take blocks
+        steps = ca.if_else(x >= k, float(k), steps)
+    call = compiled([steps, (x < y) + (x < y) + (y < x), (x < y) / (x <= y)], [x, y])
+    assert [call(v, 300.0)[0] for v in (-1.0, 0.0, 57.5, 198.9, 500.0)] == [0.0, 0.0, 57.0, 198.0, 199.0]
+    assert call(1.0, 2.0)[1:] == [2.0, 1.0]
+    assert math.isnan(call(2.0, 1.0)[2])
+
+
 def test_arguments_that_nothing_reads_are_no_warnings(compiled):
     x, y = ca.SX.sym("x"), ca.SX.sym("y")
     assert compiled([ca.SX(7.0)], [x, y])(1.0, 2.0) == [7.0]

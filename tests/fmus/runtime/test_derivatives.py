@@ -44,6 +44,16 @@ def test_directional_derivatives_of_the_train_are_the_analytic_ones(load):
     assert found == pytest.approx([expected, expected, 2.0, 4e5, 2.0, 3.0], rel=1e-14)
 
 
+def test_a_train_that_is_held_answers_to_nothing_and_one_that_sets_off_as_if_it_moved(load):
+    """At rest the linearization is that of the side it stays on: dv' = 0 held, dF/m - c1 dv once the drive is enough."""
+    fmu = load("PointMassTrain").initialize()
+    knowns, direction = ("force", "disturbance", "line_resistance", "speed"), (4e5, 0.5, 0.25, 2.0)
+    assert fmu.directional(("acceleration", "der(speed)"), knowns, direction) == [0.0, 0.0]
+    fmu.set("force", 40e3)
+    found = fmu.directional(("acceleration", "der(speed)"), knowns, direction)
+    assert found == pytest.approx([1.0 + 0.5 - 0.25 - 0.00077616 * 2.0] * 2, rel=1e-14)
+
+
 def test_directional_derivatives_of_the_controller_are_the_analytic_ones(load):
     """Without neighbours demand = a tanh(alpha (v_r - v) / a), so d demand = (1 - tanh^2) alpha (dv_r - dv)."""
     fmu = load("ComfortCruise").initialize()
