@@ -45,7 +45,7 @@ def test_directional_derivatives_of_the_train_are_the_analytic_ones(load):
 
 
 def test_a_train_that_is_held_answers_to_nothing_and_one_that_sets_off_as_if_it_moved(load):
-    """At rest the linearization is that of the side it stays on: dv' = 0 held, dF/m - c1 dv once the drive is enough."""
+    """At rest the linearization is that of where it stays: dv' = 0 held, dF/m - c1 dv once the drive is enough."""
     fmu = load("PointMassTrain").initialize()
     knowns, direction = ("force", "disturbance", "line_resistance", "speed"), (4e5, 0.5, 0.25, 2.0)
     assert fmu.directional(("acceleration", "der(speed)"), knowns, direction) == [0.0, 0.0]
