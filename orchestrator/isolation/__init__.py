@@ -2,8 +2,10 @@
 
 from .choice import check_isolation, check_once_per_process, instantiate, is_isolated, isolate, isolation_notes
 from .launch import end_process, signal_name, starting
+from .proxy import IsolatedSlave
 
 __all__ = [
+    "IsolatedSlave",
     "check_isolation",
     "check_once_per_process",
     "end_process",

@@ -15,7 +15,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
-from ..errors import FmuError, StoppedError
+from ..errors import FmuError, RollbackError, StoppedError
 
 if TYPE_CHECKING:
     from ..fmi import Type
@@ -38,7 +38,7 @@ NOTE_CALL, NOTE_MEMORY = range(2)
 """What it is doing (see `note`), and the most memory it has been seen to use, in KiB."""
 CALLS = ("", "instantiate", "setup", "enter_initialization", "exit_initialization", "set", "step", "get", "save",
          "restore", "forget", "serialize", "deserialize", "directional_derivatives", "interpolate", "terminate",
-         "free")  # fmt: skip
+         "roll_back", "free")  # fmt: skip
 """What an FMU is asked to do, by number in `NOTE_CALL`."""
 NUMBERS = {name: number for number, name in enumerate(CALLS)}
 _CHUNK = 1 << 16
@@ -210,18 +210,22 @@ def memory_hint(used: float, limit: float | None) -> str:
     return f"; it had {used / 1024:.0f} of the {limit / 1024:.0f} MiB that memory_limit allows: a likely reason"
 
 
+_KINDS: dict[str, type[FmuError]] = {kind.__name__: kind for kind in (FmuError, RollbackError, StoppedError)}
+
+
 def describe(error: Exception) -> dict[str, Any]:
     """An error as plain values, for `as_error`."""
     if isinstance(error, FmuError):
+        kind = next((name for name, kind in _KINDS.items() if type(error) is kind), "FmuError")
         told = {"instance": error.instance, "time": error.time, "status": error.status, "log": error.log}
-        return {"stops": isinstance(error, StoppedError), "message": str(error.args[0]), **told}
-    return {"stops": False, "message": f"{type(error).__name__}: {error}", "log": []}
+        return {"kind": kind, "message": str(error.args[0]), **told}
+    return {"kind": "FmuError", "message": f"{type(error).__name__}: {error}", "log": []}
 
 
 def as_error(told: Mapping[str, Any], instance: str, time: float) -> FmuError:
     """The error that `describe` described, of this instance at this time in s where it does not say."""
-    kind, time_told = StoppedError if told["stops"] else FmuError, told.get("time", time)
-    return kind(
+    time_told = told.get("time", time)
+    return _KINDS[told["kind"]](
         str(told["message"]),
         instance=str(told.get("instance", instance)),
         time=None if time_told is None else float(time_told),

@@ -154,6 +154,10 @@ class IsolatedSlave:
         if not (final and watched):
             self._finish()
 
+    def roll_back(self) -> None:
+        """From now on be restored after steps that it discards."""
+        self._ask("roll_back")
+
     def save(self) -> _Saved:
         """The present state: a handle of the process's."""
         self._saved += 1

@@ -7,7 +7,7 @@ from contextlib import contextmanager
 
 from ..fmi import Slave
 from ..fmi.binding import LoadedSlave
-from ..isolation import instantiate
+from ..isolation import IsolatedSlave, instantiate
 from ..master import Master, Settings
 from .checking import Checked
 
@@ -29,8 +29,8 @@ def assembled(checked: Checked, *, threads: int = 1, restoring: Collection[str] 
     try:
         for name, model in checked.models.items():
             slaves[name] = slave = instantiate(model, system.instances[name])
-            if name in restoring and isinstance(slave, LoadedSlave):
-                slave.rolls_back = True
+            if name in restoring and isinstance(slave, LoadedSlave | IsolatedSlave):
+                slave.roll_back()
         yield Master(
             slaves,
             checked.order.sequence,

@@ -122,7 +122,10 @@ def test_a_number_beyond_all_bounds_is_refused_not_crashed_on():
         (lambda: Line(profile=[{"position": 0.0, "gradient": 5.0}]), "section 1: 'gradient' is 5.0 (rise over run)"),
         (lambda: Line(profile=[{"position": 0.0}, {"position": 9.0, "gradient": -20}]), "section 2: 'gradient' is -20"),
         (lambda: Line(profile=[{"position": 0.0, "tunnel": -1.0}]), "'tunnel' is -1.0 (its length, in m)"),
-        (lambda: Line(profile=[{"position": 0.0, "resistance": 20.0}]), "'resistance' is 20.0 (further resistance, in"),
+        (
+            lambda: Line(profile=[{"position": 0.0, "resistance": 20.0}]),
+            "'resistance' is 20.0 (further resistance to motion, in",
+        ),
         (lambda: Line(profile=[{"position": 0.0, "radius": 0.8}]), "'radius' is in m, 0 for straight track: 0.8"),
         (lambda: Protection(limits=[[0.0, 300.0]]), "speed limit 1: 'speed' is 300.0 (in m/s)"),
         (lambda: ReferenceProfile(profile={"speed": 250.0, "jerk": 0.1}), "'speed' is 250.0 (in m/s)"),

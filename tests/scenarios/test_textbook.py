@@ -209,12 +209,13 @@ def test_jacobi_loses_a_stiff_coupling_and_says_so(tmp_path):
     """It runs to the end with numbers that nothing in the world has."""
     outcome = run(stiff("jacobi"), kind="native", output=tmp_path)
     assert np.abs(outcome["left.x"]).max() > 1e200
-    (note,) = outcome.notes
+    (note,) = [finding.message for finding in outcome.findings]
     factor = Coupled(0.05, "jacobi", of=STIFF).radius()
     assert note.startswith("the coupling through right.force, left.x, left.v diverges: it grows by a factor of ")
     assert factor_in(note) == pytest.approx(factor, rel=0.01)
     assert 'take a smaller step, or algorithm = "iterative" with extrapolation = 1' in note
-    assert note in json.loads((tmp_path / "run.json").read_text())["notes"]
+    record = json.loads((tmp_path / "run.json").read_text())
+    assert [(finding["kind"], finding["message"]) for finding in record["findings"]] == [("diverging", note)]
 
 
 def test_gauss_seidel_loses_it_faster_and_the_error_says_why():

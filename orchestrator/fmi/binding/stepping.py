@@ -64,6 +64,10 @@ class Stepping(ABC):
             self.resume(time, length, status, final)
         self.time = time + length
 
+    def roll_back(self) -> None:
+        """From now on be restored after steps that it discards."""
+        self.rolls_back = True
+
     def resume(self, time: float, length: float, status: int, final: bool) -> None:
         """Go on after a step returned something else than ok: an FMU that discarded it may take it in parts.
 

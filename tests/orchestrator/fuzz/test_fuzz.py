@@ -46,7 +46,7 @@ start = { alpha = 0.03, has_ahead = "i > 1" }
 component = "Schedule"
 isolate = false
 build = { points = 2, unit = "m/s" }
-start.values = [85.0, 80.0]
+start = { times = [0.0, 10.0], values = [85.0, 80.0] }
 
 [connections]
 "cruise[i].position" = "train[i].position"

@@ -344,6 +344,6 @@ def test_run_says_that_a_delayed_loop_diverges(file, capsys, tmp_path):
     code, out, err = command(capsys, "run", file(-30.0, "delay"), "--output", str(tmp_path / "out"), "--kind", "python")
     text = " ".join((out + err).split())
     assert code == 0
-    assert "note: the coupling through b.y, a.y diverges: it grows by a factor of " in text
+    assert "diverging: the coupling through b.y, a.y diverges: it grows by a factor of " in text
     assert float(text.split("a factor of ")[1].split()[0]) == pytest.approx(30.0, rel=0.05)
     assert 'algebraic_loops = "solve"' in text

@@ -88,7 +88,7 @@ WRONG = [
     (("sorce.x", "freeze", 1.0), "there is no instance 'sorce'; did you mean 'source'?"),
     (("x", "freeze", 1.0), "there is no instance 'x'"),
     (("source.rwo", "freeze", 1.0), "Outputs has no variable 'rwo'; did you mean 'row'?"),
-    (("source.row[4]", "freeze", 1.0), "Outputs has no variable 'row[4]'; did you mean 'row[3]'?"),
+    (("source.row[4]", "freeze", 1.0), "Outputs has no variable 'row[4]'; there are 'row[1]' to 'row[3]'"),
     (("source", "freeze", 1.0), "Outputs has no variable ''"),
     (("source.x", "frezee", 1.0), "there is no action 'frezee'; did you mean 'freeze'?"),
     (("source.fixed", "set", 1.0, 2.0), "it is a fixed parameter: only tunable ones can change"),

@@ -294,7 +294,7 @@ def test_half_the_step_halves_the_base(text, tmp_path, capsys):
     assert [result[f"{name}.n"][-1] for name in ("equal", "slow[1]", "slow[2]")] == [34, 13, 34]
     (tmp_path / "x.toml").write_text(text + '[metrics]\nequal = "final(equal.n)"\nslow = "final(slow[1].n)"\n')
     arguments = ["run", str(tmp_path / "x.toml"), "--verify-step", "--kind", "plain", "-o", str(tmp_path / "out")]
-    assert cli.call(arguments) == 0
+    assert cli.call(arguments) == 1  # too coarse: numbers that count samples change with the step
     words = [line.split() for line in capsys.readouterr().out.splitlines()]
     assert ["equal", "22", "34", "+12"] in words
     assert ["slow", "13", "13", "+0"] in words

@@ -32,7 +32,7 @@ def detail(report, check):
 @needs_native
 def test_our_native_fmus_pass_everything():
     report = validate(build("PointMassTrain", kind="native"))
-    assert set(verdicts(report).values()) <= {"pass", "skipped"}
+    assert set(verdicts(report).values()) <= {"pass", "skipped", "note"}
     assert set(PROBES.values()) < set(verdicts(report))
     assert report.passed
 
