@@ -279,8 +279,8 @@ class Adaptive(VariableStep):
             lists = "; or let its FMU list the input, if this output passes one on at once"
         raise CouplingError(
             f"t = {digits(time)} s: {name} cannot be kept within its tolerance ({relative:g} relative, {absolute:g} "
-            f"absolute): its error is {error:.3g} times as large at the shortest step, {digits(length)} s; loosen "
-            f"simulation.tolerance, or this signal's in [simulation.tolerances], or allow a smaller "
+            f"absolute): its error is {error:.3g} times as large at the shortest step, {digits(length, time)} s; "
+            f"loosen simulation.tolerance, or this signal's in [simulation.tolerances], or allow a smaller "
             f"simulation.min_step{lists}"
         )
 

@@ -136,7 +136,7 @@ class Outcome:
 def go(tmp_path, capsys):
     """Write a scenario and run it, or check it, in a directory of its own."""
 
-    def run(fmus, start=None, connections=None, command="run", more="", **simulation):
+    def run(fmus, start=None, connections=None, command="run", more="", *, options=(), **simulation):
         lines = ["[simulation]", *(f"{k} = {x}" for k, x in ({"stop_time": 10.0, "step": 0.5} | simulation).items())]
         for name, path in (fmus if isinstance(fmus, dict) else {"it": fmus}).items():
             lines += [f"[instances.{name}]", f"fmu = {json.dumps(str(path))}", f"[instances.{name}.start]"]
@@ -146,8 +146,8 @@ def go(tmp_path, capsys):
         output = tmp_path / "out"
         shutil.rmtree(output, ignore_errors=True)
         capsys.readouterr()
-        options = ["-o", str(output), "--no-figures"] if command == "run" else []
-        code = cli.call([command, str(tmp_path / "s.toml"), *options])
+        more_options = ["-o", str(output), "--no-figures"] if command == "run" else []
+        code = cli.call([command, str(tmp_path / "s.toml"), *more_options, *options])
         said = capsys.readouterr()
         errors = [line for line in said.err.splitlines() if "% of" not in line]
         record = json.loads((output / "run.json").read_text()) if output.exists() else {}

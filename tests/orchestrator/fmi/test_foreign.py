@@ -60,10 +60,10 @@ SAVES = 'canHandleVariableCommunicationStepSize="true" canGetAndSetFMUstate="tru
 
 
 @BOTH_LOOPS
-@pytest.mark.parametrize("mode", [19, 14])
-def test_one_that_has_to_be_restored_after_a_discarded_step(fmu, go, mode):
+@pytest.mark.parametrize(("mode", "isolate"), [(19, ()), (14, ()), (19, ("--isolate", "it"))])
+def test_one_that_has_to_be_restored_after_a_discarded_step(fmu, go, mode, isolate):
     """Whether it says how far it would get or not; all of the run is there, and how it came about is told."""
-    found = go(fmu(simulation=SAVES), {"it": {"mode": mode, "u": 1.0, "longest": 0.2}})
+    found = go(fmu(simulation=SAVES), {"it": {"mode": mode, "u": 1.0, "longest": 0.2}}, options=isolate)
     assert (found.code, found.record["status"]) == (0, "completed")
     assert list(found.results.time) == [0.5 * k for k in range(21)]
     assert found.results["it.x"] == pytest.approx(found.results.time, abs=1e-12)
