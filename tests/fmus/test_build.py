@@ -289,9 +289,9 @@ def test_processes_building_at_once_do_not_break_each_other(fresh_cache, sample)
     assert [process.returncode for process in running] == [0, 0, 0], told
     assert told[0][0] == told[1][0] == told[2][0]
     cache = Path(os.environ["RAILCOSIM_CACHE"])
-    assert sorted(p.name for p in cache.rglob("*") if p.is_file()) == sorted(
-        ["Gust.fmu", "PointMassTrain.fmu", "ComfortCruise.fmu", "Everything.fmu"]
-    )
+    models = ("ComfortCruise", "Everything", "Gust", "PointMassTrain")
+    files = [f"{model}.fmu{ending}" for model in models for ending in ("", ".sha256")]
+    assert sorted(p.name for p in cache.rglob("*") if p.is_file()) == files
 
 
 def test_a_plain_component_shows_the_same_description(sample):

@@ -471,7 +471,7 @@ def test_processes_building_natively_at_once_do_not_break_each_other(fresh_cache
     assert [process.returncode for process in running] == [0, 0, 0], told
     assert told[0][0] == told[1][0] == told[2][0]
     files = sorted(path.name for path in fresh_cache.rglob("*") if path.is_file())
-    assert files == ["Gust.fmu", "PointMassTrain.fmu"]
+    assert files == ["Gust.fmu", "Gust.fmu.sha256", "PointMassTrain.fmu", "PointMassTrain.fmu.sha256"]
 
 
 def test_a_native_fmu_without_casadi_says_what_to_install(fresh_cache, monkeypatch):
