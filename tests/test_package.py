@@ -78,6 +78,7 @@ def foreign(tmp_path: Path) -> Path:
     return tmp_path
 
 
+@pytest.mark.long
 def test_the_wheel_runs_beside_folders_of_the_same_names(installed: Path, foreign: Path) -> None:
     script = foreign / "study.py"
     script.write_text(

@@ -242,3 +242,16 @@ def load(unpack):
 @pytest.fixture(scope="session")
 def component_class():
     return resolve
+
+
+HERE = Path(__file__).parent
+LARGE = ("CoupledSubwayTrain", "FaultTolerantCruise")
+"""Models of which everything takes seconds."""
+
+
+@pytest.hookimpl(tryfirst=True)
+def pytest_collection_modifyitems(items):
+    """What every model is put through, the large ones are in the long tier."""
+    for item in items:
+        if item.path.parent == HERE and "[" in item.name and item.name.partition("[")[2].startswith(LARGE):
+            item.add_marker(pytest.mark.long)

@@ -100,6 +100,7 @@ def test_it_runs_in_fmpy_as_in_plain_python(tmp_path):
 # ---------------------------------------------------------------- building
 
 
+@pytest.mark.long
 def test_the_same_component_gives_the_same_bytes(monkeypatch, tmp_path):
     contents = []
     for place in ("one", "a much longer place/two"):

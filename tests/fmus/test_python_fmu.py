@@ -133,6 +133,7 @@ def test_fmpy_gives_what_plain_python_gives(reference, unpack, built, step, samp
                 np.testing.assert_allclose(result[name], column, rtol=1e-12, atol=1e-12 * size, err_msg=name)
 
 
+@pytest.mark.long
 def test_the_excitation_moves_every_number(reference):
     """The comparison above would be idle on signals that stand still; flags and schedules of the catalogue may."""
     cls, arguments, starts = prepared(reference, STEP)
@@ -303,6 +304,7 @@ def test_reset_gives_a_new_life(reference, instantiate):
 # ---------------------------------------------------------------- many instances
 
 
+@pytest.mark.long
 def test_two_hundred_interleaved_instances_do_not_disturb_each_other(instantiate, sample):
     kinds = [build(r) for r in (sample("Everything"), sample("Counter"), "PointMassTrain", sample("Dice"))]
     alone = {}

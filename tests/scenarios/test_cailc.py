@@ -72,6 +72,7 @@ def comparison():
     return run(load("ato_comparison"), figures=False)
 
 
+@pytest.mark.long
 def test_comparison(comparison):
     assert judged(comparison) == set()
 

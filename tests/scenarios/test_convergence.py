@@ -20,6 +20,7 @@ CASES = pytest.mark.parametrize(
 
 
 @CASES
+@pytest.mark.long
 def test_first_order_and_jacobi_three_times_gauss_seidel(deviation, law):
     found = {
         algorithm: [deviation(step=h, algorithm=algorithm, **law) for h in STEPS]
@@ -44,6 +45,7 @@ def test_it_is_the_reference_that_it_converges_to(reference):
     assert np.abs(2.0 * ends[0.25] - ends[0.5] - exact).max() < 0.02
 
 
+@pytest.mark.long
 def test_python_fmus_converge_alike(deviation):
     """Bit-equal to the components in this process, so one pair of steps is enough."""
     stop = 120.0

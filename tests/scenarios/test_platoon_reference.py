@@ -144,6 +144,7 @@ TUNING = {  # delta: standard deviation, mean spread in one run, largest spread;
 }
 
 
+@pytest.mark.long
 def test_the_tuning_parameter_sets_the_range_of_stable_gaps(platoon):
     """The table of section 6, all starts and tolerances at once: the reachable range is exactly 7.4 km +- delta."""
     x, v = random_starts()
@@ -159,6 +160,7 @@ def test_the_tuning_parameter_sets_the_range_of_stable_gaps(platoon):
     assert np.abs(run.v[-1] - 70.0).max() < 5e-4
 
 
+@pytest.mark.long
 def test_the_spread_of_one_run_need_not_grow_with_it(platoon):
     """Section 6, from the article's start."""
     found = [platoon.dop853(platoon.TUNABLE.changed(delta=d)).gaps[-1] for d in (0.05, 0.1, 0.15, 0.2)]
@@ -167,6 +169,7 @@ def test_the_spread_of_one_run_need_not_grow_with_it(platoon):
 
 @settings(max_examples=3, deadline=None)
 @given(st.integers(2, 10**6), st.sampled_from([0.02, 0.05, 0.1, 0.2, 0.3]))
+@pytest.mark.long
 def test_stable_gaps_are_within_the_tolerance_from_every_start(platoon, seed, delta):
     """The domain of section 6: gaps 6.7 to 8.1 km, speeds 10 to 75 m/s; forty starts at a time."""
     run = platoon.march(platoon.TUNABLE.changed(delta=delta), *random_starts(40, seed), step=0.5, report=200.0)

@@ -51,6 +51,7 @@ def test_too_fast_is_braked_within_a_sample_and_the_overspeed_is_bounded(plant):
     assert np.ptp(result["train.position"][-1000:]) < 0.05
 
 
+@pytest.mark.long
 def test_a_brake_that_is_too_weak_is_followed_by_the_emergency_brake():
     """A wet rail on a falling gradient: the service brake loses, and the stronger one is called for."""
     falling = [{"position": 0.0}, {"position": 60.0, "gradient": -0.045}]

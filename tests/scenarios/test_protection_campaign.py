@@ -32,6 +32,7 @@ def keeps_its_promises(campaign, number):
 
 # A force that is late and a limit over position; a limit that falls; a slow sampling; a noisy sensor; full traction.
 @pytest.mark.parametrize("number", [0, 1, 13, 4, 5])
+@pytest.mark.long
 def test_a_smoke(campaign, number):
     case, with_it, without = keeps_its_promises(campaign, number)
     assert len(case.faults) == 1
@@ -95,6 +96,7 @@ def test_the_judge_sees_a_signal_that_stays_silent(campaign, signal, text):
     assert all(text in found for found in broken)
 
 
+@pytest.mark.long
 def test_the_command(tmp_path):
     """Two runs: a table with a line for each, a summary, and the exit code of promises that are kept."""
     file = tmp_path / "table.md"

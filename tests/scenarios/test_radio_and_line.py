@@ -28,6 +28,7 @@ def test_a_perfect_radio_is_a_wire_to_the_last_bit():
             assert (through[f"train[{i}].{name}"] == wired[f"train[{i}].{name}"]).all()
 
 
+@pytest.mark.long
 def test_the_same_seed_gives_the_same_run_and_another_one_another():
     def speeds(seed):
         result = run(load("degraded_radio", stop_time=60.0, settings=[f"simulation.seed={seed}"]))
@@ -37,6 +38,7 @@ def test_the_same_seed_gives_the_same_run_and_another_one_another():
     assert (speeds(1) != speeds(2)).any()
 
 
+@pytest.mark.long
 def test_native_fmus_and_plain_components_hear_the_same():
     changes = {"stop_time": 30.0}
     runs = [run(load("degraded_radio", **changes), kind=kind) for kind in ("auto", "plain")]
@@ -124,6 +126,7 @@ def margins(seeds, **safety):
     return [close["braking_margin"](run(close["close_system"](seed, **safety))) for seed in seeds]
 
 
+@pytest.mark.long
 def test_close_following_keeps_the_braking_distance_with_the_fallback_and_not_without():
     """Distances of 400 m at 60 m/s, emergency braking in an outage; the safe bound acts at all times (guard)."""
     assert min(margins(range(8))) > 0.0

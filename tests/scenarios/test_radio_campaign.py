@@ -57,6 +57,7 @@ def test_the_policy_leaves_the_reserve_as_margin(script):
     assert left - 50.0**2 / 2 * (1 / script.BRAKING - 1 / script.HARDEST) == pytest.approx(100.0)
 
 
+@pytest.mark.long
 def test_five_telling_runs(script):
     found = margins(script, TELLING)
     assert max(found["no fallback"]) < 0.0

@@ -34,6 +34,7 @@ CELLS = [
 
 
 @pytest.mark.parametrize(("h", "law", "algorithm", "expected"), CELLS)
+@pytest.mark.long
 def test_the_table(deviation, h, law, algorithm, expected):
     """To the last printed digit."""
     for found, printed in zip(deviation(step=h, algorithm=algorithm, **law), expected, strict=True):

@@ -132,6 +132,7 @@ def test_stability_limit(algorithm, order):
         assert seen[0] == pytest.approx(seen[1], rel=1e-3)
 
 
+@pytest.mark.long
 def test_the_table_of_the_documentation_is_that_of_the_theory():
     """Errors at two steps, and the limits of both systems; in docs/algorithms.md to two or three digits."""
     page = (HERE.parents[1] / "docs" / "algorithms.md").read_text(encoding="utf-8")

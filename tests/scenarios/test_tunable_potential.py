@@ -90,6 +90,7 @@ def test_a_swap_alone_gives_each_row_of_table_4(law, convergence, speed, gap, ac
 
 @pytest.mark.parametrize("law", LAWS)
 @pytest.mark.parametrize("scenario", ["comfort_cruise", "cruise_comparison"])
+@pytest.mark.long
 def test_a_swap_just_works(scenario, law):
     result = run(
         load(scenario, swaps=[f"cruise={law}"], stop_time=20.0, settings=["simulation.record=1"]), kind="plain"
@@ -100,6 +101,7 @@ def test_a_swap_just_works(scenario, law):
 
 
 @native
+@pytest.mark.long
 def test_the_table_shows_what_is_reconstructed(capfd, tmp_path, monkeypatch):
     """Measured beside published, under a heading that names the origin."""
     monkeypatch.setenv("COLUMNS", "200")
@@ -184,6 +186,7 @@ def test_how_long_a_step_may_be(platoon, law, h, algorithm, converges):
     assert bool(np.abs(v[-20:] - 70.0).max() <= 1.0) is converges
 
 
+@pytest.mark.long
 def test_halving_the_step_halves_the_difference(platoon):
     """First order in the exchange; over the first 200 s, where no dead zone has let the gaps rest."""
     exact = platoon.dop853(platoon.FIXED, stop=200.0, report=1.0)

@@ -293,6 +293,7 @@ starts = st.tuples(
 
 @settings(max_examples=10, deadline=None)
 @given(starts)
+@pytest.mark.long
 def test_the_bottom_layer_keeps_the_range(start):
     """Section 5: gaps that start inside stay inside; away from the walls also with the force held for 0.5 s."""
     gaps, _, violated = run(positions(start[0]), start[1], comfort=False, stop=200.0, step=0.5)

@@ -5,6 +5,7 @@ import pytest
 from railcosim.components import GaussianDisturbance, simulate
 
 
+@pytest.mark.long
 def test_mean_deviation_and_independence():
     """30 000 draws: three standard errors of mean, deviation and correlation."""
     found = simulate(GaussianDisturbance(deviation=0.02, hold=0.01, seed=7), 100.0, 0.01)["disturbance"]

@@ -115,6 +115,7 @@ def test_independent_losses_have_their_rate():
     assert (rows[:, 2] > 0.0).mean() == pytest.approx(0.2, abs=0.03)
 
 
+@pytest.mark.long
 def test_bursts_have_the_length_and_share_of_the_chain():
     """Share p / (p + r) = 1/6, mean length 1 / r = 10 messages."""
     rows, _ = listen(RadioLink(seed=3, burst_begin=0.02, burst_end=0.1), count=4000)

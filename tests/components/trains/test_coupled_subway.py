@@ -55,6 +55,7 @@ def test_where_it_is_measured():
 
 
 @pytest.mark.parametrize("vehicles", [2, 4, 11])
+@pytest.mark.long
 def test_any_number_of_vehicles(vehicles):
     train = CoupledSubwayTrain(vehicles=vehicles, line=LEVEL)
     found = simulate(train, 2.0, 0.01, lambda t: {"trip_time": t, "force": 50e3})
@@ -63,6 +64,7 @@ def test_any_number_of_vehicles(vehicles):
     assert found["speed"][-1] > 0.1
 
 
+@pytest.mark.long
 def test_the_train_stands_while_waiting():
     def inputs(t):
         return {"trip": 1 + (t >= 3.0 - 1e-9), "trip_time": t - 1.0 if t < 3.0 - 1e-9 else t - 5.0, "force": 150e3}

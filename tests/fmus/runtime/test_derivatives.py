@@ -83,6 +83,7 @@ def test_the_derivative_of_a_square_is_defined_everywhere(load):
         assert fmu.directional(("scalars[10]", "scalars[11]"), ("u",), (1.0,)) == [2.0 * u, 3.0 * u * u]
 
 
+@pytest.mark.long
 def test_in_initialization_a_computed_start_moves_with_what_it_follows_from(load):
     """v = u[1]^2 at the start, z = tanh(x[1] + v), der(v) = x[1] - v; afterwards v stands on its own."""
     fmu = load(MIXED).enter()

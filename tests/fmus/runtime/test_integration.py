@@ -26,6 +26,7 @@ def signals(component, values, stop, step, kind):
         ("CoupledSubwayTrain", {"vehicle_speed": [0.5] * 6, "force": -150e3, "max_step": 0.01, **TRIP}, 1.5, 0.1),
     ],
 )
+@pytest.mark.long
 def test_a_native_train_stops_as_in_plain_python(component, values, stop, step):
     plain, native = (signals(component, values, stop, step, kind) for kind in ("plain", "native"))
     assert (plain == native).all()

@@ -141,6 +141,7 @@ assert again.get("command") == 0.5 * tests.ERRORS[2]
 """
 
 
+@pytest.mark.long
 def test_the_file_does_not_depend_on_the_locale_of_the_host(tmp_path, unpack, monkeypatch, in_another_process):
     """A German host writes 0,5: the file must say 0.5."""
     archive = tmp_path / "locales"

@@ -411,6 +411,7 @@ def test_check_tells_of_delays_and_of_jacobi(small: Path) -> None:
     assert "jacobi steps all instances in parallel" in out
 
 
+@pytest.mark.long
 def test_build_all_builds_the_catalogue_once_each(tmp_path: Path) -> None:
     done = orchestrate("build", "--all", "Gust", "-o", "fmus", folder=tmp_path)
     names = sorted(path.name for path in (tmp_path / "fmus").iterdir())

@@ -45,6 +45,7 @@ def test_each_metric_at_half_the_step_the_difference_and_a_verdict(small, capsys
     assert json.loads((small / "out/run.json").read_text())["step_check"]["verdict"] == "fine"
 
 
+@pytest.mark.long
 def test_a_step_too_coarse_ends_with_1(small, capsys):
     assert verified("comfort_cruise", "--preset", "no-gust", "--step", "10") == 1
     said = capsys.readouterr().out

@@ -77,6 +77,7 @@ def test_a_paper_is_found_by_the_scenario_or_a_word_of_its_source(paper: str, fo
             published_cases(paper)
 
 
+@pytest.mark.long
 def test_the_command_of_every_shipped_case_loads_the_same_system() -> None:
     shipped = published_cases()
     assert {case.system.provenance.name for case in shipped} >= {"comfort_cruise", "comfort_cruise_bottom_layer"}

@@ -317,6 +317,7 @@ def test_an_fmu_that_is_made_for_one_step(fmu, go):
 # -------------------------------------------------------------------- many variables
 
 
+@pytest.mark.long
 def test_thousands_of_variables(fmu, go, v):
     """Reading, wiring, checking and recording take a time that grows with their number, not with its square."""
     count = 2500

@@ -268,6 +268,7 @@ def test_a_lost_process_has_exit_code_3(scenario, tmp_path, deed, message):
     assert not session_of(process.pid)
 
 
+@pytest.mark.long
 def test_the_option(scenario, tmp_path):
     for options, expected in ((("--isolate", "c"), [False, True, True]), (("--isolate", "all"), [True] * 3)):
         with scenario("nothing")(*options) as process:

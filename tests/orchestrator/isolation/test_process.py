@@ -127,6 +127,7 @@ def test_a_crash_tells_what_the_fmu_said_last(apart, begin):
     assert str(caught.value).endswith("(SIGSEGV)\n    [warning] it: beware\n    printed at 1 s")
 
 
+@pytest.mark.long
 def test_what_an_fmu_prints_is_not_shown_and_does_not_fill_the_disk(apart, workspace, capfd):
     it = apart("step print", begun=True)
     (output,) = workspace.folder.glob("host_*/output")

@@ -300,6 +300,7 @@ def orchestrate():
 
 
 @needs_native
+@pytest.mark.long
 def test_the_command_answers_and_leaves_its_numbers_and_figures(orchestrate, tmp_path):
     done = orchestrate("linearize", "comfort_cruise", "--at", "60", "-o", tmp_path)
     assert done.exit_code == 0, done.output

@@ -159,6 +159,7 @@ def test_time(both, odd, start, ring):
     assert np.array_equal(result.time, start + np.arange(41) * 0.25)
 
 
+@pytest.mark.long
 def test_many_instances_share_one_library(both, odd, ring):
     """More than the file descriptors a process has; each with values of its own."""
     result = both(ring(odd, 1500, 1.0))

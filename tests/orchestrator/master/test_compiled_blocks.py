@@ -54,6 +54,7 @@ print(run(system, output=sys.argv[2]).status)
 """
 
 
+@pytest.mark.long
 def test_ctrl_c_and_kill(odd, tmp_path):
     """Ctrl-C ends the run at a recorded point; after a kill the rows are there up to about a second before."""
     for ending in (signal.SIGINT, signal.SIGKILL):

@@ -37,6 +37,7 @@ def test_our_native_fmus_pass_everything():
     assert report.passed
 
 
+@pytest.mark.long
 def test_our_python_fmus_pass():
     report = validate(build("PointMassTrain", kind="python"))
     assert report.passed, report.findings
@@ -140,6 +141,7 @@ def test_a_library_of_another_name_or_platform(lag):
 
 
 @needs_native
+@pytest.mark.long
 def test_our_own_rules_bind_our_own_fmus(tmp_path):
     """The same archive with what we promise taken out of it."""
     path = tmp_path / "worse.fmu"
@@ -202,6 +204,7 @@ def test_a_file_that_is_no_fmu_is_refused(tmp_path, xml, name, content, capsys):
 
 
 @needs_compiler
+@pytest.mark.long
 def test_the_command_prints_a_table_and_tells_by_its_exit_code(lag, capsys):
     lenient = lag(on_get="if (vr[i] > 2) " + CRASH)
     assert call(["validate", str(lenient)]) == 0  # a warning fails nothing

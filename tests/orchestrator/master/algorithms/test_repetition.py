@@ -92,6 +92,7 @@ def test_where_no_output_is_a_continuous_number_it_is_refused_before(species, wo
     assert told in str(caught.value)
 
 
+@pytest.mark.long
 def test_a_list_that_leaves_an_input_out_is_suspected(species):
     """y shows u at once, and its FMU says that it depends on nothing: no step is short enough."""
     with pytest.raises(CouplingError) as caught:
