@@ -138,6 +138,8 @@ class Input(Variable):
 
     With a ``flag``, a boolean input of the same component, the equations read it only where that is true: it may stay
     unconnected while the flag is false, and whoever connects it says what the flag is.
+
+    One that belongs ``beside`` another input comes from where that one comes, unless it is connected itself.
     """
 
     def __init__(
@@ -147,11 +149,13 @@ class Input(Variable):
         *,
         optional: bool = False,
         flag: Input | None = None,
+        beside: Input | None = None,
         **rest: Any,
     ) -> None:
         super().__init__(unit, start, **rest)
         self.optional = optional or flag is not None
         self.flag = flag
+        self.beside = beside
 
 
 class Output(Variable):

@@ -48,6 +48,10 @@ def check_returned(component: Component, method: Method, returned: Any, owed: Du
         raise ComponentError(f"{name}.{method} returns {returned!r}; it must return a dict{at}")
     if unknown := sorted(returned.keys() - owed.may.keys()):
         raise ComponentError(f"{name}.{method} returns {unknown}; it may return {sorted(owed.may)}{at}")
+    for key, value in returned.items():
+        if value is None or (isinstance(value, str) and owed.may[key].type is not str):
+            kind = owed.may[key].type.__name__
+            raise ComponentError(f"{name}.{method} returns {value!r} for {key!r}, which is declared {kind}{at}")
     if missing := sorted(owed.must - returned.keys()):
         if function is None:
             raise ComponentError(f"{name} has no method {method!r}, which must return {missing}")

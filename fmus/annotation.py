@@ -28,6 +28,7 @@ class Annotation:
         requires: packages that it imports.
         optional_inputs: names of inputs that may stay unconnected.
         flags: for inputs that are read only where a boolean input is true, its name.
+        beside: for inputs that come from where another input comes, unless they are connected, its name.
         rising: names of array parameters whose elements must rise.
         unused_inputs: names of inputs that nothing is computed from: a port has them, this component does without.
         recommended_step: longest advisable communication step in s.
@@ -44,6 +45,7 @@ class Annotation:
     requires: tuple[str, ...] = ()
     optional_inputs: tuple[str, ...] = ()
     flags: Mapping[str, str] = field(default_factory=dict)
+    beside: Mapping[str, str] = field(default_factory=dict)
     rising: tuple[str, ...] = ()
     unused_inputs: tuple[str, ...] = ()
     recommended_step: float | None = None
@@ -64,6 +66,7 @@ def write(annotation: Annotation, root: Any) -> None:
         "requires": " ".join(annotation.requires),
         "optionalInputs": " ".join(annotation.optional_inputs),
         "flags": json.dumps(annotation.flags) if annotation.flags else "",
+        "beside": json.dumps(annotation.beside) if annotation.beside else "",
         "rising": " ".join(annotation.rising),
         "unusedInputs": " ".join(annotation.unused_inputs),
         "recommendedStep": "" if step is None else repr(float(step)),
@@ -83,7 +86,6 @@ def read(root: Any) -> Annotation | None:
     if element is None:
         return None
     step, arguments = element.get("recommendedStep"), json.loads(element.get("arguments", "{}"))
-    flags = json.loads(element.get("flags", "{}"))
     return Annotation(
         component=element.get("name", ""),
         arguments=arguments if isinstance(arguments, dict) else {},
@@ -94,9 +96,15 @@ def read(root: Any) -> Annotation | None:
         note=element.get("note", ""),
         requires=tuple(element.get("requires", "").split()),
         optional_inputs=tuple(element.get("optionalInputs", "").split()),
-        flags={str(k): str(v) for k, v in flags.items()} if isinstance(flags, dict) else {},
+        flags=_names(element.get("flags", "{}")),
+        beside=_names(element.get("beside", "{}")),
         rising=tuple(element.get("rising", "").split()),
         unused_inputs=tuple(element.get("unusedInputs", "").split()),
         recommended_step=float(step) if step else None,
         sampled=element.get("sampled") == "true",
     )
+
+
+def _names(text: str) -> dict[str, str]:
+    told = json.loads(text)
+    return {str(k): str(v) for k, v in told.items()} if isinstance(told, dict) else {}

@@ -184,6 +184,7 @@ def _annotation(component: Component, kind: FmuKind, digest: str, used: Names | 
         requires=cls.requires,
         optional_inputs=tuple(n for s, d in inputs if isinstance(d, Input) and d.optional for n in s.scalars),
         flags={n: d.flag.name for s, d in inputs if isinstance(d, Input) and d.flag for n in s.scalars},
+        beside={s.name: d.beside.name for s, d in inputs if isinstance(d, Input) and d.beside},
         rising=tuple(s.name for s in component.of(Parameter) if getattr(s.declaration, "rising", False)),
         unused_inputs=() if used is None else tuple(name for name in every if name not in used),
         recommended_step=cls.recommended_step,

@@ -238,6 +238,13 @@ class System:
             name = next(iter(values))
             raise TypeError(f"a system has no {name!r}{did_you_mean(name, valid)}")
 
+    def __repr__(self) -> str:
+        name = " ".join(filter(None, (self.provenance.name, self.provenance.preset)))
+        return (
+            f"<System {name}: {len(self.instances)} instances, {len(self.connections)} connections, "
+            f"{self.stepping.algorithm}, steps of {self.stepping.step:g} s up to {self.stepping.stop_time:g} s>"
+        )
+
     def changed(self, **values: Any) -> System:
         """A copy with other values of its fields, or of those of its parts: ``system.changed(step=0.05, seed=7)``."""
         return System(**{one.name: getattr(self, one.name) for one in fields(self)} | values)

@@ -22,12 +22,21 @@ def slack(step: float, *times: float) -> float:
 
 
 def count_steps(start: float, stop: float, step: float) -> int | None:
-    """How many steps lead from a start to a stop, all in s; None where that is no whole number from 1 on."""
+    """How many steps lead from a start to a stop, all in s; None where that is no whole number from 1 on.
+
+    A step that is not a few times as long as the distance of neighbouring numbers there leads nowhere.
+    """
     duration = stop - start
-    if not (math.isfinite(duration) and 0.0 < duration / step < math.inf):
+    if not (math.isfinite(duration) and 0.0 < duration / step < math.inf) or is_lost(step, start, stop):
         return None
     count = round(duration / step)
-    return count if count >= 1 and abs(count * step - duration) <= slack(step, start, stop) < 0.5 * step else None
+    allowed = min(slack(step, start, stop), 0.25 * step)  # so that it is one number and no other
+    return count if count >= 1 and abs(count * step - duration) <= allowed else None
+
+
+def is_lost(step: float, *times: float) -> bool:
+    """Whether a step is so short that points at such times, all in s, cannot be told apart."""
+    return step < 2.0 * math.ulp(max(map(abs, times)))
 
 
 def digits(time: float, *others: float) -> str:

@@ -36,7 +36,10 @@ class CruiseController(DavisResistance, ABC):
     leader_age = Input("s", optional=True, description="how old what is known of the first train is")
     line_resistance = Input("N/kg", optional=True, description="resistance of slope, curve and tunnel per mass")
     curve_resistance = Input(
-        "N/kg", optional=True, description="part of line_resistance that opposes motion either way: curve and tunnel"
+        "N/kg",
+        optional=True,
+        beside=line_resistance,
+        description="part of line_resistance that opposes motion either way: curve and tunnel",
     )
 
     mass = Parameter("kg", 400e3, minimum=1.0, description="mass of the own train")

@@ -28,7 +28,10 @@ class Train(Component, ABC):
     disturbance = Input("m/s2", optional=True, description="disturbing force per mass, positive forwards")
     line_resistance = Input("N/kg", optional=True, description="resistance of slope, curve and tunnel per mass")
     curve_resistance = Input(
-        "N/kg", optional=True, description="part of line_resistance that opposes motion either way: curve and tunnel"
+        "N/kg",
+        optional=True,
+        beside=line_resistance,
+        description="part of line_resistance that opposes motion either way: curve and tunnel",
     )
 
 

@@ -104,6 +104,10 @@ class Comparison:
     directory: Path | None = None
     figures: list[Path] = field(default_factory=list)
 
+    def __repr__(self) -> str:
+        names = ", ".join(variant.name for variant in self.variants)
+        return f"<Comparison of {names}: {len(self.rows)} rows>"
+
     @property
     def names(self) -> list[str]:
         """Of the variants."""

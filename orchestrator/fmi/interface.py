@@ -128,6 +128,11 @@ class Interface:
         return self.annotation.flags if self.annotation else {}
 
     @cached_property
+    def beside(self) -> Mapping[str, str]:
+        """For inputs of one of our own FMUs that come from where another input comes, its name."""
+        return self.annotation.beside if self.annotation else {}
+
+    @cached_property
     def rising(self) -> tuple[str, ...]:
         """Array parameters of one of our own FMUs whose elements must rise."""
         return self.annotation.rising if self.annotation else ()

@@ -41,10 +41,11 @@ class StepChange:
 class StepCheck:
     """The verdict on a step [s]: `too coarse` where a value changes by more than it may, or a verdict changes.
 
+    It is `not judged` where there are neither metrics nor requirements.
     `changes` are those of all metrics, the worst first; `requirements` the names of those that come out differently.
     """
 
-    verdict: Literal["fine", "too coarse"]
+    verdict: Literal["fine", "too coarse", "not judged"]
     step: float
     changes: list[StepChange]
     requirements: list[str]
@@ -91,4 +92,7 @@ def check_step(outcome: Run, half: Run) -> StepCheck:
     verdicts = {verdict.name: verdict.verdict for verdict in half.requirements}
     differ = [v.name for v in outcome.requirements if verdicts.get(v.name, v.verdict) != v.verdict]
     coarse = bool(differ) or any(not change.share <= 1.0 for change in changes)
-    return StepCheck("too coarse" if coarse else "fine", outcome.system.stepping.step, changes, differ)
+    judged = bool(outcome.metrics or outcome.requirements)
+    return StepCheck(
+        "too coarse" if coarse else "fine" if judged else "not judged", outcome.system.stepping.step, changes, differ
+    )

@@ -10,7 +10,7 @@ from ..errors import ScenarioError
 from ..master import ALGORITHMS
 from ..problems import Problem
 from ..system import ACCELERATIONS, LOOPS, UNSETTLED
-from ..times import count_steps, digits
+from ..times import count_steps, digits, is_lost
 from .groups import Entry, choice, number, positive, shown, truth, whole, whole_multiple
 from .patterns import Counts, members, read_signal
 
@@ -137,7 +137,10 @@ def _grid(entries: Mapping[str, Entry], values: Mapping[str, Any]) -> list[Probl
             return [entries["record"].problem(f"the distance of rows must be greater than 0 s, not {digits(record)} s")]
         return []
     problems = []
-    if count_steps(start, stop, step) is None:
+    if is_lost(step, start, stop):
+        message = f"points that are {digits(step)} s apart cannot be told apart at such times"
+        problems.append(entries["stop_time"].problem(message, "begin nearer to 0 s (simulation.start_time)"))
+    elif count_steps(start, stop, step) is None:
         steps = max(1, math.floor((stop - start) / step)) if math.isfinite((stop - start) / step) else 1
         near = " or ".join(f"{digits(start + k * step)} s" for k in (steps, steps + 1))
         message = f"{digits(stop - start, start, stop)} s is not a whole number of {steps_of}"

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import replace
 
 from ..errors import ScenarioError
 from ..fmi import Interface
@@ -11,6 +12,22 @@ from ..system import System
 from .inputs import check_inputs, check_sampling
 from .links import Wiring, described, find_links
 from .starts import find_starts
+
+
+def _connect_beside(system: System, interfaces: Mapping[str, Interface], wiring: Wiring) -> None:
+    """Connect what nobody connected but belongs to an input that is: curves and tunnels where the slope comes from."""
+    fed = {link.target for link in wiring.links}
+    for link in list(wiring.links):
+        there, here = link.source.instance, link.target.instance
+        for name, other in interfaces[here].beside.items():
+            source, target = SignalName(there, name), SignalName(here, name)
+            given = interfaces[there].variables.get(name)
+            if link.target.variable != other or target in fed or name in system.instances[here].start:
+                continue
+            if link.source.variable == other and given is not None and given.causality == "output":
+                made = replace(link.connection, source=str(source), target=str(target))
+                wiring.links += find_links(made, interfaces, wiring)
+                wiring.notes.append(f"{target} takes {source}, because {link.target} takes {link.source}")
 
 
 def wire(system: System, interfaces: Mapping[str, Interface]) -> Wiring:
@@ -30,6 +47,7 @@ def wire(system: System, interfaces: Mapping[str, Interface]) -> Wiring:
     for connection in system.connections:
         if connection.optional and made.pop(connection.origin, None) == 0:
             wiring.notes.append(f"{described(connection)} stands for nothing: there are no such elements")
+    _connect_beside(system, interfaces, wiring)
     check_inputs(system, interfaces, wiring)
     check_sampling(system, interfaces, wiring)
     return wiring

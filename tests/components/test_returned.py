@@ -46,3 +46,10 @@ def test_what_is_wrong_is_told_with_the_methods_place():
 
 def test_a_method_that_is_not_there_is_told():
     assert said("derivatives", {}) == "Case has no method 'derivatives', which must return ['x']"
+
+
+@pytest.mark.parametrize("value", [None, "no"])
+def test_a_value_that_is_none_is_told(value):
+    text = said("outputs", {"y": value})
+    assert f"Case.outputs returns {value!r} for 'y', which is declared float (" in text
+    assert "test_returned.py:" in text

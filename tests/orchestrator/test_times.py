@@ -17,6 +17,8 @@ from railcosim.orchestrator.times import count_steps, digits, slack
         (0.0, 1e9, 1e-3, 10**12),
         (0.0, 1.0, 0.3, None),
         (1700000000.0, 1700000010.15, 0.1, None),
+        (1700000000.0, 1700000000.00001, 1e-6, 10),  # a few numbers lie between two points
+        (1700000000.0, 1700000000.00001, 1e-7, None),
         (1000.0, 1000.0000035, 1e-6, None),
         (1700000000.0, 1700000001.0, 1e-7, None),  # points that cannot be told apart
         (1.0, 1.0, 0.1, None),

@@ -79,6 +79,8 @@ def _step_line(found: StepCheck) -> str:
     beyond = found.beyond
     if not beyond and not found.requirements:
         worst = next(iter(found.changes), None)
+        if found.verdict == "not judged":
+            return f"{line}: there are no metrics and no requirements"
         if worst is None or not worst.change:
             return f"{line}: half of it changes no metric and no requirement's verdict"
         return f"{line}: half of it changes {worst.name} most, by {_of_allowed(worst)}"

@@ -69,6 +69,11 @@ def test_a_requirement_that_comes_out_differently():
     assert (found.verdict, found.requirements) == ("too coarse", ["b"])
 
 
+def test_without_metrics_and_requirements_there_is_no_verdict():
+    assert check_step(ended({}), ended({})).verdict == "not judged"
+    assert check_step(ended({}, [("a", "pass")]), ended({}, [("a", "pass")])).verdict == "fine"
+
+
 def test_a_run_says_so_in_its_record(tmp_path):
     system = System(stop_time=2.0, step=0.1, metrics={"way": "final(train.position)"})
     system.add("train", "PointMassTrain", speed=20.0, force=0.0)

@@ -99,3 +99,31 @@ def test_breakpoints_that_do_not_rise_are_told(resolve, starts, said):
     system = System()
     system.add("s", "Schedule", {"points": 3}, **starts)
     assert [str(problem) for problem in resolve(system).problems] == said
+
+
+CURVE = [{"position": 0.0, "gradient": 0.01, "radius": 300.0}]
+
+
+@pytest.mark.parametrize(
+    ("more", "start", "sources"),
+    [
+        ((), {}, ["line.curve_resistance"]),
+        ((("line.curve_resistance", "train.curve_resistance"),), {}, ["line.curve_resistance"]),
+        ((), {"curve_resistance": 0.0}, []),
+    ],
+)
+def test_what_belongs_beside_an_input_comes_from_where_that_comes(resolve, more, start, sources):
+    """Curves and tunnels, which only oppose motion, from the line that gives the slope; unless told otherwise."""
+    system = System()
+    system.add("line", "Line", build={"profile": CURVE}, position=0.0)
+    system.add("train", "PointMassTrain", **{"force": 0.0} | start)
+    for source, target in (("line.line_resistance", "train.line_resistance"), *more):
+        system.connect(source, target, scale=0.5)
+    wiring = resolve(system)
+    made = [link for link in wiring.links if link.target.variable == "curve_resistance"]
+    assert [(str(link.source), link.scale) for link in made] == [(source, 0.5) for source in sources]
+    note = (
+        "train.curve_resistance takes line.curve_resistance, because train.line_resistance takes line.line_resistance"
+    )
+    assert (note in wiring.notes) == (bool(sources) and not more)
+    assert wiring.problems == []
