@@ -162,7 +162,8 @@ def test_names_of_what_initial_and_update_compute():
         (lambda s: s.missing, "missing"),
         (lambda s: 1.0 / 0.0, "division by zero"),
         (lambda s: s.w, "has shape (2,), declared ()"),
-        (lambda s: None, "neither a number nor an expression"),
+        (lambda s: None, "returns None for 'y', which is declared float"),
+        (lambda s: object(), "is neither a number nor an expression"),
     ],
 )
 def test_a_refusal_names_component_method_and_construct(equation, said):

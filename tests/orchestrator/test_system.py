@@ -26,3 +26,9 @@ def test_where_something_was_written_does_not_make_it_another_thing():
     assert Instance("a", "Gust", origin="x.toml:3") == Instance("a", "Gust", origin="y.toml:9")
     assert Connection("a.y", "b.u", origin="x.toml:3") == Connection("a.y", "b.u")
     assert Connection("a.y", "b.u", delay=1) != Connection("a.y", "b.u")
+
+
+def test_a_system_is_shown_in_a_line():
+    system = System(stop_time=2.0, step=0.5)
+    system.add("train", "PointMassTrain")
+    assert repr(system) == "<System system: 1 instances, 0 connections, gauss-seidel, steps of 0.5 s up to 2 s>"
