@@ -5,6 +5,7 @@ import pytest
 from railcosim.orchestrator import System, run
 
 TRIP = {"trip": 1, "trip_time": 0.0}
+LONG = pytest.mark.long
 
 
 def signals(component, values, stop, step, kind):
@@ -22,11 +23,13 @@ def signals(component, values, stop, step, kind):
         ("PointMassTrain", {"speed": 5.0, "force": -300e3}, 20.0, 1.0),
         ("PointMassTrain", {"speed": 5.0, "force": 0.0, "line_resistance": 0.05, "max_step": 0.7}, 119.0, 1.4),
         ("Consist", {"speed": [3.0, 2.0, 2.5], "position": [0.0, -25.0, -50.0], "force": [-1e5, 0.0, -5e4]}, 20.0, 0.1),
-        ("SubwayTrain", {"speed": 2.0, "force": -150e3, "max_step": 0.05, **TRIP}, 4.0, 0.1),
-        ("CoupledSubwayTrain", {"vehicle_speed": [0.5] * 6, "force": -150e3, "max_step": 0.01, **TRIP}, 1.5, 0.1),
+        pytest.param("SubwayTrain", {"speed": 2.0, "force": -150e3, "max_step": 0.05, **TRIP}, 4.0, 0.1, marks=LONG),
+        pytest.param(
+            *("CoupledSubwayTrain", {"vehicle_speed": [0.5] * 6, "force": -150e3, "max_step": 0.01, **TRIP}, 1.5, 0.1),
+            marks=LONG,
+        ),
     ],
 )
-@pytest.mark.long
 def test_a_native_train_stops_as_in_plain_python(component, values, stop, step):
     plain, native = (signals(component, values, stop, step, kind) for kind in ("plain", "native"))
     assert (plain == native).all()

@@ -231,6 +231,6 @@ def test_a_mistake_in_a_preset_is_told_also_when_another_one_runs():
 def test_a_step_too_short_for_its_times_is_told():
     text = TEXT.replace("stop_time = 10.0\nstep = 0.5", "start_time = 1.7e9\nstop_time = 1700000000.00001\nstep = 1e-7")
     assert problems(text) == [
-        "x.toml:3: simulation.stop_time: points that are 1e-07 s apart cannot be told apart at such times; begin nearer to 0 s "
-        "(simulation.start_time)"
+        "x.toml:3: simulation.stop_time: points that are 1e-07 s apart cannot be told apart at such times; "
+        "begin nearer to 0 s (simulation.start_time)"
     ]
