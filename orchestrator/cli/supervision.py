@@ -2,20 +2,17 @@
 
 from __future__ import annotations
 
-import ctypes
 import os
 import signal
 import sys
 import traceback
 from collections.abc import Callable, Iterable
 
-from ..isolation import signal_name
+from ..isolation import end_with_parent, signal_name
 from .options import FMU_FAILED
 from .printing import tell
 
 _PASSED_ON = {signal.SIGINT, signal.SIGTERM, *({signal.SIGHUP, signal.SIGQUIT} if os.name == "posix" else ())}
-_KILL_WITH_PARENT = 1
-"""PR_SET_PDEATHSIG of Linux's prctl."""
 _CRASHES = ("SIGSEGV", "SIGBUS", "SIGFPE", "SIGILL", "SIGABRT", "SIGTRAP", "SIGSYS")
 _UNEXPECTED = 1
 """The exit code that Python has for an exception that nobody expected."""
@@ -39,7 +36,7 @@ def supervised(command: Callable[[], int]) -> int:
     parent = os.getpid()
     child = os.fork()
     if child == 0:
-        ctypes.CDLL(None).prctl(_KILL_WITH_PARENT, signal.SIGKILL, 0, 0, 0)
+        end_with_parent()
         if os.getppid() != parent:  # gone already
             os._exit(FMU_FAILED)
         signal.pthread_sigmask(signal.SIG_SETMASK, before)

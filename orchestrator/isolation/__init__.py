@@ -1,7 +1,7 @@
 """An FMU in a process of its own: its crash, hang or leak is an error of that instance, not our end."""
 
 from .choice import check_isolation, check_once_per_process, instantiate, is_isolated, isolate, isolation_notes
-from .launch import end_process, signal_name, starting
+from .launch import end_process, end_with_parent, signal_name, starting
 from .proxy import IsolatedSlave
 
 __all__ = [
@@ -9,6 +9,7 @@ __all__ = [
     "check_isolation",
     "check_once_per_process",
     "end_process",
+    "end_with_parent",
     "instantiate",
     "is_isolated",
     "isolate",

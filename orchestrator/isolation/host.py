@@ -22,6 +22,7 @@ from typing import TYPE_CHECKING, Any
 import psutil
 
 from . import messages
+from .launch import end_with_parent
 from .messages import NOTE_CALL, NOTE_MEMORY, Cells, Door, note
 
 if TYPE_CHECKING:
@@ -32,8 +33,6 @@ _LOOK_SECONDS = 0.25
 """How often the caretaker looks after the process."""
 _MOST_OUTPUT = 4 << 20
 """Bytes of output kept in the file: an FMU that prints at every step must not fill the disk."""
-_KILL_WITH_PARENT = 1
-"""PR_SET_PDEATHSIG of Linux's prctl."""
 
 
 class _Heard(deque[str]):
@@ -302,7 +301,7 @@ def _stay_with_parent(of_main_thread: bool) -> None:
     if not sys.platform.startswith("linux"):
         return
     if of_main_thread:
-        ctypes.CDLL(None).prctl(_KILL_WITH_PARENT, signal.SIGKILL, 0, 0, 0)
+        end_with_parent()
     with contextlib.suppress(OSError):
         Path("/proc/self/oom_score_adj").write_text("1000")
 

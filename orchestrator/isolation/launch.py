@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import ctypes
 import os
 import secrets
 import signal
@@ -109,6 +110,15 @@ def accept(server: socket.socket, process: subprocess.Popen[bytes], password: by
     if process.poll() is None:
         raise TimeoutError
     return socket.socket()  # not connected: its first use tells that the process is lost
+
+
+def end_with_parent() -> None:
+    """Let Linux end this process with the thread that has started it."""
+    ctypes.CDLL(None).prctl(_KILL_WITH_PARENT, signal.SIGKILL, 0, 0, 0)
+
+
+_KILL_WITH_PARENT = 1
+"""PR_SET_PDEATHSIG of Linux's prctl."""
 
 
 def end_process(process: subprocess.Popen[bytes]) -> None:

@@ -200,7 +200,8 @@ def _execute(system: System, job: Job, figures: bool) -> Run:
         later = [note for note in session.disturbances() if note not in outcome.notes]
         if later:  # while instances were given back
             outcome.notes += later
-            _add_notes(outcome, place)
+            if place is not None:
+                record_file.add(place.path, notes=_all_notes(outcome))
     return outcome
 
 
@@ -232,13 +233,12 @@ def _draw(outcome: Run, place: RunDirectory) -> None:
     except FigureError as error:
         outcome.figures = error.drawn
         outcome.notes += map(str, error.problems)
-    record_file.add(place.path, figures=[path.name for path in outcome.figures])
-    _add_notes(outcome, place)
+    record_file.add(place.path, figures=[path.name for path in outcome.figures], notes=_all_notes(outcome))
 
 
-def _add_notes(outcome: Run, place: RunDirectory | None) -> None:
-    if place is not None:
-        record_file.add(place.path, notes=[*outcome.checked.notes, *outcome.notes])
+def _all_notes(outcome: Run) -> list[str]:
+    """Those of the system, and those of the run."""
+    return [*outcome.checked.notes, *outcome.notes]
 
 
 def evaluate(outcome: Run) -> None:
