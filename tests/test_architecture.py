@@ -29,6 +29,7 @@ ORDER = (
     ("errors",),
     ("problems",),
     ("names", "times"),
+    ("world",),
 )
 """The rooms and root files of the orchestrator; each imports itself and what stands in lines below."""
 RANKS = {room: rank for rank, rooms in enumerate(ORDER) for room in rooms}
@@ -145,4 +146,61 @@ def test_files_are_short_and_folders_small():
             wrong += [f"{path.relative_to(ROOT)} has {lines} lines, over {most}"] if lines > most else []
             folders[path.parent.relative_to(ROOT)] += path.parts[len(ROOT.parts)] in PACKAGES
     wrong += [f"{x} has {count} files, over {MOST_FILES}" for x, count in folders.items() if count > MOST_FILES]
+    assert not wrong, "\n".join(wrong)
+
+
+WORLD = {
+    *("time", "subprocess", "socket", "tempfile", "shutil", "filelock", "multiprocessing", "asyncio", "select"),
+    *("mmap", "datetime", "fcntl"),
+}
+"""Modules whose functions `orchestrator/world.py` gives to all others; types and constants of theirs may be named."""
+OS = {
+    *("open", "read", "write", "close", "pipe", "replace", "rename", "remove", "unlink", "mkdir", "makedirs", "rmdir"),
+    *("fsync", "truncate", "ftruncate", "listdir", "scandir", "walk", "stat", "link", "symlink", "chmod", "utime"),
+    *("fork", "kill", "killpg", "waitpid", "wait", "system", "popen", "_exit", "sendfile", "times", "posix_spawn"),
+}
+FILES = {
+    *("open", "read_text", "read_bytes", "write_text", "write_bytes", "mkdir", "unlink", "rmdir", "chmod", "touch"),
+    *("stat", "iterdir", "glob", "rglob", "rename", "symlink_to", "hardlink_to", "sendall", "recv", "recv_into"),
+}
+EXEMPT = {
+    "cli/streams.py": {"select.select"},  # the standard streams, which somebody else has opened
+    "fmi/archive.py": {"tempfile.gettempdir"},  # asks, and changes nothing
+    "fmi/members.py": {"archive.open"},  # a member of an archive that is open
+    "run/directory.py": {"socket.gethostname"},  # asks, and changes nothing
+    "isolation/launch.py": {"socket.socket"},  # one that leads nowhere
+    "isolation/host.py": {"socket.socket"},  # an open one that was inherited
+}
+
+
+def goes_past_the_seam(call, names):
+    """Whether a call is one of those that stand in `orchestrator/world.py`, made past it."""
+    text = ast.unparse(call.func)
+    owner, _, name = text.rpartition(".")
+    module = names.get(owner or name, "")
+    if module == "os":
+        return name in OS
+    if module in WORLD:
+        return True
+    is_path_replace = name == "replace" and len(call.args) == 1 and owner and not call.keywords
+    return text == "open" or (owner != "world" and (name in FILES or is_path_replace))
+
+
+def test_the_world_is_met_through_the_seam():
+    wrong = []
+    for path in code("orchestrator", "py"):
+        place = path.relative_to(ROOT / "orchestrator").as_posix()
+        nodes = list(ast.walk(ast.parse(path.read_text(encoding="utf-8"))))
+        names = {x.asname or x.name: x.name for node in nodes if isinstance(node, ast.Import) for x in node.names}
+        for node in nodes:
+            if isinstance(node, ast.ImportFrom) and not node.level and node.module in WORLD | {"os"}:
+                names |= {x.asname or x.name: node.module for x in node.names}
+            if isinstance(node, ast.ImportFrom) and node.level and (node.module or "").endswith("world"):
+                wrong.append(f"{place}:{node.lineno}: import world itself: a fault in it would not be met")
+        wrong += [
+            f"{place}:{node.lineno}: {ast.unparse(node.func)} goes past orchestrator/world.py"
+            for node in nodes
+            if isinstance(node, ast.Call) and place != "world.py" and goes_past_the_seam(node, names)
+            if ast.unparse(node.func) not in EXEMPT.get(place, ())
+        ]
     assert not wrong, "\n".join(wrong)

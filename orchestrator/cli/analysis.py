@@ -7,6 +7,7 @@ from typing import Annotated, Any
 
 import typer
 
+from .. import world
 from ..comparison import compare as compare_systems
 from ..comparison import read_directions, variants
 from .options import (
@@ -159,7 +160,7 @@ def linearize(
         )
     found, passings = stability(model), string_stability(model)
     directory = output or Path("results") / "-".join(filter(None, (system.provenance.name, preset, "linear")))
-    directory.mkdir(parents=True, exist_ok=True)
+    world.mkdir(directory, parents=True, exist_ok=True)
     write_linear(directory, model, found, passings)
     drawn: Any = {"duration": duration, "dpi": dpi} | ({"format": figure_format.value} if figure_format else {})
     figures = [] if no_figures else draw_linear(model, found, passings, directory, **drawn)

@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import importlib.metadata
 import logging
-import os
 from collections.abc import Sequence
 from typing import Annotated
 
 import typer
 
 from ...components.component import ComponentError
+from .. import world
 from ..errors import FmuError, RailcosimError, RunError, ScenarioError
 from . import analysis, models, runs, scenarios
 from .options import FMU_FAILED, OK, WRONG_INPUT
@@ -32,7 +32,7 @@ def main() -> None:
     secure_streams()
     logging.getLogger().addHandler(Log(logging.WARNING))
     # pythonfmu 0.7 frees its interpreter state twice when C++ is torn down, and some exits crash: leave before that.
-    os._exit(supervised(_command))
+    world.exit_at_once(supervised(_command))
 
 
 def _command() -> int:

@@ -8,6 +8,7 @@ from typing import Annotated, Any
 
 import typer
 
+from .. import world
 from ..comparison import published_cases
 from ..errors import ScenarioError
 from ..evaluation import BAD, ComparedValue
@@ -234,6 +235,6 @@ def plot(
         print(recover_rows(results))
     figures = [{"title": ", ".join(signals), "y": signals}] if signals else loaded.figures
     directory = output or results
-    directory.mkdir(parents=True, exist_ok=True)
+    world.mkdir(directory, parents=True, exist_ok=True)
     for path in draw(written_as(figures, figure_format and figure_format.value, dpi), loaded, directory):
         print(path)

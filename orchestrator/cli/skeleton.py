@@ -6,6 +6,7 @@ import keyword
 from pathlib import Path
 
 from ...components import CATALOGUE
+from .. import world
 from ..errors import ScenarioError
 
 _TEXT = '''"""A cruise controller of one's own: written once here, it runs as plain Python, in a test, and as an FMU.
@@ -65,7 +66,7 @@ def write_skeleton(path: Path) -> str:
     if not name.isidentifier() or name in _TAKEN or keyword.iskeyword(name):
         raise ScenarioError(f"{path}: {name or path.stem!r} cannot name a class of yours; choose another file name")
     try:
-        with path.open("x", encoding="utf-8") as stream:
+        with world.open(path, "x", encoding="utf-8") as stream:
             stream.write(_TEXT.format(file=path.name, name=name))
     except FileExistsError:
         raise ScenarioError(f"{path} exists already; choose another name") from None

@@ -9,6 +9,8 @@ import select
 import sys
 from typing import Any, BinaryIO, TextIO, cast
 
+from .. import world
+
 _STANDARD = (0, 1, 2)
 
 
@@ -22,7 +24,7 @@ def secure_streams() -> None:
         try:
             os.fstat(descriptor)
         except OSError:
-            os.open(os.devnull, os.O_RDWR)  # takes the lowest free number, which is this one
+            world.open_descriptor(os.devnull, os.O_RDWR)  # takes the lowest free number, which is this one
     sys.stdout = _secured(sys.stdout, 1)
     sys.stderr = _secured(sys.stderr, 2)
 

@@ -8,6 +8,7 @@ import sys
 import traceback
 from collections.abc import Callable, Iterable
 
+from .. import world
 from ..isolation import end_with_parent, signal_name
 from .options import FMU_FAILED
 from .printing import tell
@@ -29,16 +30,16 @@ def supervised(command: Callable[[], int]) -> int:
     """
     if not sys.platform.startswith("linux"):
         return command()
-    said, saying = os.pipe()
+    said, saying = world.pipe()
     signal.signal(signal.SIGCHLD, signal.SIG_DFL)
     awaited = {*_PASSED_ON, signal.SIGCHLD}
     before = signal.pthread_sigmask(signal.SIG_BLOCK, awaited)
     parent = os.getpid()
-    child = os.fork()
+    child = world.fork()
     if child == 0:
         end_with_parent()
         if os.getppid() != parent:  # gone already
-            os._exit(FMU_FAILED)
+            world.exit_at_once(FMU_FAILED)
         signal.pthread_sigmask(signal.SIG_SETMASK, before)
         code = _UNEXPECTED
         try:
@@ -47,13 +48,13 @@ def supervised(command: Callable[[], int]) -> int:
             traceback.print_exc()
             sys.stderr.flush()
         finally:
-            os.write(saying, b".")
-            os._exit(code)
-    os.close(saying)
+            world.write(saying, b".")
+            world.exit_at_once(code)
+    world.close(saying)
     code = os.waitstatus_to_exitcode(_outlived(child, awaited))
     os.set_blocking(said, False)
     try:
-        if os.read(said, 1):
+        if world.read(said, 1):
             return code
     except BlockingIOError:  # what it has started holds the other end
         pass
@@ -65,11 +66,11 @@ def _outlived(child: int, awaited: set[signal.Signals]) -> int:
     while True:
         told = signal.sigwaitinfo(awaited)
         if told.si_signo == signal.SIGCHLD:
-            gone, status = os.waitpid(child, os.WNOHANG)
+            gone, status = world.wait_for(child, os.WNOHANG)
             if gone:
                 return status
         elif told.si_code <= 0:  # from a process, not from the terminal, which tells the child itself
-            os.kill(child, told.si_signo)
+            world.signal_to(child, told.si_signo)
 
 
 def _untimely(code: int, mask: Iterable[int]) -> int:
@@ -86,5 +87,5 @@ def _untimely(code: int, mask: Iterable[int]) -> int:
     else:
         signal.signal(-code, signal.SIG_DFL)
     signal.pthread_sigmask(signal.SIG_SETMASK, mask)
-    os.kill(os.getpid(), -code)
+    world.signal_to(os.getpid(), -code)
     return 128 - code

@@ -12,6 +12,7 @@ from dataclasses import asdict, dataclass, field
 from pathlib import Path
 from typing import Any
 
+from .. import world
 from ..errors import FmuError, RailcosimError, ScenarioError
 from ..figures import remarked
 from ..fmi import Kind
@@ -226,7 +227,7 @@ def compare(
     if not comparison.variants:
         raise ScenarioError(Problem("", "there is nothing to compare", "name a scenario"))
     if directory is not None:
-        directory.mkdir(parents=True, exist_ok=True)
+        world.mkdir(directory, parents=True, exist_ok=True)
         for variant, name in zip(comparison.variants, _folders(comparison.names), strict=True):
             variant.directory = directory / name
     for variant in comparison.variants:
@@ -337,12 +338,12 @@ def write_json(comparison: Comparison, path: Path) -> None:
         "figures": [figure.name for figure in comparison.figures],
     }
     text = json.dumps(content, indent=1, ensure_ascii=False) + "\n"
-    path.write_text(text, encoding="utf-8", errors="backslashreplace")
+    world.write_text(path, text, encoding="utf-8", errors="backslashreplace")
 
 
 def write_csv(comparison: Comparison, path: Path) -> None:
     """The table: one line for each metric and index, one column for each variant."""
-    with path.open("w", newline="", encoding="utf-8", errors="backslashreplace") as stream:
+    with world.open(path, "w", newline="", encoding="utf-8", errors="backslashreplace") as stream:
         writer = csv.writer(stream, lineterminator="\n")
         writer.writerow(["metric", "index", "unit", "better", *comparison.names, "winner"])
         for row in comparison.rows:

@@ -11,6 +11,8 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from .. import world
+
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
@@ -78,7 +80,8 @@ def page(
         lines = [line for part in title.splitlines() for line in textwrap.wrap(part, letters)]
         figure.suptitle("\n".join(lines), x=0.01, ha="left", fontsize=title_size, fontweight="bold")
         yield list(figure.subplots(panels, 1, sharex=share_x, squeeze=False)[:, 0])
-        figure.savefig(path, metadata=_NAMELESS[path.suffix])
+        with world.open(path, "wb") as stream:
+            figure.savefig(stream, format=path.suffix[1:], metadata=_NAMELESS[path.suffix])
 
 
 def colour(k: int, count: int) -> Any:

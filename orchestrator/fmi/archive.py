@@ -3,15 +3,14 @@
 from __future__ import annotations
 
 import hashlib
-import shutil
 import tempfile
-import time
 import zipfile
 from pathlib import Path
 from typing import NamedTuple
 
-from filelock import FileLock, Timeout
+from filelock import Timeout
 
+from .. import world
 from ..errors import FmuFileError
 from .members import extract, list_members
 from .recognition import describe_file
@@ -48,11 +47,11 @@ class Workspace:
 
     def __init__(self) -> None:
         self._place = _plain_folder()
-        self._lock = FileLock(self._place / _OWNED)
+        self._lock = world.lock(self._place / _OWNED)
         self._lock.acquire(timeout=0)
         _sweep(self._place)
         self.folder = self._place / "fmus"
-        self.folder.mkdir()
+        world.mkdir(self.folder)
         self._unpacked: dict[str, tuple[Path, tuple[str, ...]]] = {}
 
     def unpack(self, path: Path) -> Unpacked:
@@ -62,7 +61,7 @@ class Workspace:
                 f"{path} is a folder, not an FMU file; zip what is in it, modelDescription.xml at the top"
             )
         try:
-            with path.open("rb") as stream:
+            with world.open(path, "rb") as stream:
                 digest = hashlib.file_digest(stream, "sha256").hexdigest()
         except OSError as error:
             raise FmuFileError(f"{path} cannot be read: {error.strerror or error}") from error
@@ -74,14 +73,14 @@ class Workspace:
 
     def write_description(self, description: bytes) -> Path:
         """A folder that holds nothing but a model description, for a component that runs in this process."""
-        folder = Path(tempfile.mkdtemp(dir=self.folder))
-        (folder / "modelDescription.xml").write_bytes(description)
+        folder = Path(world.mkdtemp(dir=self.folder))
+        world.write_bytes(folder / "modelDescription.xml", description)
         return folder
 
     def close(self) -> None:
         """Remove everything unpacked."""
         self._lock.release()
-        shutil.rmtree(self._place, ignore_errors=True)
+        world.rmtree(self._place, ignore_errors=True)
 
     def __enter__(self) -> Workspace:
         return self
@@ -93,7 +92,7 @@ class Workspace:
 def _plain_folder() -> Path:
     for parent in (None, "/tmp", "/var/tmp", "C:/Temp"):
         try:
-            folder = Path(tempfile.mkdtemp(prefix=_PREFIX, dir=parent)).resolve()
+            folder = Path(world.mkdtemp(prefix=_PREFIX, dir=parent)).resolve()
         except OSError:
             continue
         if (
@@ -101,7 +100,7 @@ def _plain_folder() -> Path:
             == f"file://{'' if folder.as_posix()[0] == '/' else '/'}{folder.as_posix()}"
         ):
             return folder
-        folder.rmdir()
+        world.rmdir(folder)
     raise FmuFileError(
         f"FMUs cannot be unpacked below {tempfile.gettempdir()!r}: Python FMUs need a path of plain ASCII letters; "
         "set TMPDIR to such a folder"
@@ -110,13 +109,13 @@ def _plain_folder() -> Path:
 
 def _sweep(own: Path) -> None:
     """Remove what runs left behind that were killed: folders beside our own whose lock is there and held by nobody."""
-    for folder in own.parent.glob(f"{_PREFIX}*"):
+    for folder in world.glob(own.parent, f"{_PREFIX}*"):
         try:
             lock = folder / _OWNED
-            if folder == own or not lock.is_file() or time.time() - lock.stat().st_mtime < _NEW:
+            if folder == own or not lock.is_file() or world.now() - world.stat(lock).st_mtime < _NEW:
                 continue
-            with FileLock(lock, timeout=0):
-                shutil.rmtree(folder, ignore_errors=True)
+            with world.lock(lock).acquire(timeout=0):
+                world.rmtree(folder, ignore_errors=True)
         except (OSError, Timeout):  # in use, or somebody else's
             continue
 
@@ -124,14 +123,14 @@ def _sweep(own: Path) -> None:
 def _extract(path: Path, target: Path) -> tuple[str, ...]:
     """Unpack a file; what was put right on the way."""
     try:
-        with zipfile.ZipFile(path) as archive:
+        with world.open(path, "rb") as stream, zipfile.ZipFile(stream) as archive:
             members = list_members(path, archive)
             extract(archive, members, target)
     except FmuFileError:
-        shutil.rmtree(target, ignore_errors=True)
+        world.rmtree(target, ignore_errors=True)
         raise
     except Exception as error:  # damaged, encrypted, unwritable (a file where a folder stands): all kinds are raised
-        shutil.rmtree(target, ignore_errors=True)
+        world.rmtree(target, ignore_errors=True)
         what = describe_file(path)
         why = f"{path} is {what}" if what else f"{path} is not a usable FMU: {error}"
         raise FmuFileError(why) from error

@@ -7,7 +7,6 @@ about its meaning, with a note.
 from __future__ import annotations
 
 import posixpath
-import shutil
 import stat
 import zipfile
 from collections import Counter
@@ -15,6 +14,7 @@ from collections.abc import Collection, Iterator
 from dataclasses import dataclass
 from pathlib import Path, PurePosixPath, PureWindowsPath
 
+from .. import world
 from ..errors import FmuFileError
 from .recognition import describe_members
 
@@ -88,25 +88,25 @@ def extract(archive: zipfile.ZipFile, members: Members, target: Path) -> None:
     for name, entry in members.files.items():
         place = target / name
         if name.endswith("/"):
-            place.mkdir(parents=True, exist_ok=True)
+            world.mkdir(place, parents=True, exist_ok=True)
             continue
-        place.parent.mkdir(parents=True, exist_ok=True)
-        with archive.open(entry) as source, place.open("xb") as copy:
-            shutil.copyfileobj(source, copy)
-        with place.open("rb") as stream:
+        world.mkdir(place.parent, parents=True, exist_ok=True)
+        with archive.open(entry) as source, world.open(place, "xb") as copy:
+            world.copyfileobj(source, copy)
+        with world.open(place, "rb") as stream:
             head = stream.read(_HEAD)
         if head.startswith(_POINTER):
             what = f"holds a Git LFS pointer in place of {name!r}; fetch that with 'git lfs pull' and pack it again"
             raise FmuFileError(f"{archive.filename} {what}")
         mode = entry.external_attr >> 16
         if mode & 0o111 or (not mode and head.startswith(_PROGRAMS)):
-            place.chmod(0o755)
+            world.chmod(place, 0o755)
 
 
 def _check_size(path: Path, entries: Collection[zipfile.ZipInfo]) -> None:
     if len(entries) > MAX_FILES:
         raise FmuFileError(f"{path} is refused: it holds {len(entries)} files")
-    total, packed = sum(entry.file_size for entry in entries), path.stat().st_size
+    total, packed = sum(entry.file_size for entry in entries), world.stat(path).st_size
     if total > MAX_SIZE:
         raise FmuFileError(f"{path} is refused: it unpacks to {total / 2**30:.1f} GiB")
     if total > SMALL and total > MAX_RATIO * packed:

@@ -5,7 +5,6 @@ from __future__ import annotations
 import codecs
 import math
 import re
-import tempfile
 from collections.abc import Iterable, Mapping, Set
 from dataclasses import replace
 from io import BytesIO
@@ -16,6 +15,7 @@ from fmpy.model_description import ValidationError, read_model_description
 from lxml import etree
 
 from ...fmus.annotation import read as read_annotation
+from .. import world
 from ..errors import FmuFileError
 from ..names import arrays_of
 from .interface import Interface, Type, Unit, Variable
@@ -97,7 +97,7 @@ def _parse(path: Path, name: str) -> tuple[Any, list[str]]:
     try:
         parsed = etree.parse(str(path), _parser())
     except (etree.XMLSyntaxError, OSError) as error:  # the latter where bytes do not fit the encoding
-        parsed, overlooked = _parse_anyhow(path.read_bytes())
+        parsed, overlooked = _parse_anyhow(world.read_bytes(path))
         if parsed is None:
             what = getattr(error, "msg", None) or "it has bytes that do not fit its encoding"
             raise FmuFileError(f"{name}: its modelDescription.xml is not XML: {what}") from error
@@ -140,7 +140,7 @@ def _read(folder: Path, repaired: Any) -> tuple[Any, list[str]]:
     """
     if repaired is None:
         return _read_leniently(str(folder))
-    with tempfile.TemporaryDirectory() as place:
+    with world.TemporaryDirectory() as place:
         source = f"{place}/modelDescription.xml"
         repaired.getroottree().write(source, encoding="UTF-8", xml_declaration=True)
         return _read_leniently(source)

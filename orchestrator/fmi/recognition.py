@@ -6,6 +6,8 @@ import zipfile
 from collections.abc import Collection
 from pathlib import Path, PurePosixPath
 
+from .. import world
+
 _HEAD = 1024
 """Bytes at the beginning of a file that tell what it is."""
 _AGAIN = "download or copy it once more"
@@ -29,13 +31,14 @@ def describe_file(path: Path) -> str:
     Raises:
         OSError: it cannot be read.
     """
-    with path.open("rb") as stream:
+    with world.open(path, "rb") as stream:
         head = stream.read(_HEAD)
         stream.seek(257)
         is_tar = stream.read(5) == b"ustar"
+        is_zip = zipfile.is_zipfile(stream)
     if not head:
         return f"empty; {_AGAIN}"
-    if head.startswith(b"PK\x03\x04") and not zipfile.is_zipfile(path):
+    if head.startswith(b"PK\x03\x04") and not is_zip:
         return f"a zip archive without its end, as if cut short; {_AGAIN}"
     text = head.removeprefix(b"\xef\xbb\xbf").lstrip().lower()
     for begin, what in _KINDS:

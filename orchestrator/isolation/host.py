@@ -13,7 +13,6 @@ import signal
 import socket
 import sys
 import threading
-import time
 from collections import deque
 from collections.abc import Callable, Iterable, Sequence
 from pathlib import Path
@@ -21,6 +20,7 @@ from typing import TYPE_CHECKING, Any
 
 import psutil
 
+from .. import world
 from . import messages
 from .launch import end_with_parent
 from .messages import NOTE_CALL, NOTE_MEMORY, Cells, Door, note
@@ -45,7 +45,7 @@ class _Heard(deque[str]):
     def append(self, line: str) -> None:
         super().append(line)
         with contextlib.suppress(OSError):
-            os.write(1, f"{line}\n".encode(errors="replace"))
+            world.write(1, f"{line}\n".encode(errors="replace"))
 
 
 class Host:
@@ -152,7 +152,7 @@ class Host:
             self._slave.free()
         self._door.send(messages.ANSWER)
         # Not by the usual way: some FMUs crash when their libraries are torn down, and all has been given back.
-        os._exit(0)
+        world.exit_at_once(0)
 
     def _report(self, told: dict[str, Any]) -> None:
         self._notes[NOTE_CALL] = 0
@@ -247,14 +247,14 @@ def main(folder: str, door: str) -> None:
         door: the number of the inherited socket, or ``"host:port"`` of one to connect to.
     """
     end = _connect(door)
-    start: dict[str, Any] = messages.content((Path(folder) / "start").read_bytes())
+    start: dict[str, Any] = messages.content(world.read_bytes(Path(folder) / "start"))
     with contextlib.suppress(ValueError):  # a Ctrl-C is for the master, which ends the run properly
         signal.signal(signal.SIGINT, signal.SIG_IGN)
     sys.path[:] = start["path"]
     _stay_with_parent(start["of_main_thread"])
     _print_by_lines()
-    with (Path(folder) / "memory").open("r+b") as stream:
-        memory = mmap.mmap(stream.fileno(), 0)
+    with world.open(Path(folder) / "memory", "r+b") as stream:
+        memory = world.map_memory(stream.fileno(), 0)
     notes = memoryview(memory)[: messages.HEAD].cast("q")
     from ..fmi.binding import SLAVES, read_interface  # noqa: PLC0415 (after the path is set; and what it needs is not the FMU's memory)
 
@@ -268,7 +268,7 @@ def main(folder: str, door: str) -> None:
         host.instantiate(lambda log: SLAVES[interface.version](name, interface, folder_of_fmu, log))
         host.serve()
     except (EOFError, OSError):  # the master is gone
-        os._exit(1)
+        world.exit_at_once(1)
 
 
 def _connect(door: str) -> Door:
@@ -276,8 +276,8 @@ def _connect(door: str) -> Door:
         os.set_inheritable(int(door), False)  # for no process that the FMU starts
         return Door(socket.socket(fileno=int(door)))
     address, _, port = door.rpartition(":")
-    end = socket.create_connection((address, int(port)))
-    end.sendall(sys.stdin.buffer.readline().strip())
+    end = world.create_connection((address, int(port)))
+    world.send(end, sys.stdin.buffer.readline().strip())
     return Door(end)
 
 
@@ -303,7 +303,7 @@ def _stay_with_parent(of_main_thread: bool) -> None:
     if of_main_thread:
         end_with_parent()
     with contextlib.suppress(OSError):
-        Path("/proc/self/oom_score_adj").write_text("1000")
+        world.write_text(Path("/proc/self/oom_score_adj"), "1000")
 
 
 def _limit_memory(before: int, mebibytes: float) -> int | None:
@@ -328,6 +328,6 @@ def _take_care(parent: int, notes: memoryview, before: int) -> None:
             notes[NOTE_MEMORY] = max(notes[NOTE_MEMORY], _memory_in_use() - before)
             with contextlib.suppress(OSError):
                 if os.fstat(1).st_size > _MOST_OUTPUT:
-                    os.ftruncate(1, 0)
-            time.sleep(_LOOK_SECONDS)
-    os._exit(1)
+                    world.truncate(1, 0)
+            world.sleep(_LOOK_SECONDS)
+    world.exit_at_once(1)

@@ -10,10 +10,11 @@ import signal
 import socket
 import subprocess
 import sys
-import time
 from collections.abc import Iterator
 from pathlib import Path
 from typing import IO
+
+from .. import world
 
 _BOOT = """
 import os, sys, types
@@ -55,10 +56,10 @@ def start_process(command: list[str], output: IO[bytes]) -> tuple[subprocess.Pop
         output: where all that the process prints goes.
     """
     if INHERITS:
-        near, far = socket.socketpair()
+        near, far = world.socketpair()
         with far, _closed_on_failure(near):
             # In a session of its own: a Ctrl-C in the terminal is for the master, which ends the run properly.
-            process = subprocess.Popen(
+            process = world.start(
                 [*command, str(far.fileno())],
                 stdin=subprocess.DEVNULL,
                 stdout=output,
@@ -67,10 +68,10 @@ def start_process(command: list[str], output: IO[bytes]) -> tuple[subprocess.Pop
                 start_new_session=True,
             )
         return process, near, b""
-    server = socket.create_server(("127.0.0.1", 0))
+    server = world.create_server(("127.0.0.1", 0))
     address, port = server.getsockname()
     with _closed_on_failure(server):
-        process = subprocess.Popen(
+        process = world.start(
             [*command, f"{address}:{port}"],
             stdin=subprocess.PIPE,
             stdout=output,
@@ -98,16 +99,16 @@ def accept(server: socket.socket, process: subprocess.Popen[bytes], password: by
     Raises:
         TimeoutError: it has not come within some time.
     """
-    until = time.monotonic() + seconds
+    until = world.monotonic() + seconds
     server.settimeout(0.1)
-    while process.poll() is None and time.monotonic() < until:
+    while world.poll(process) is None and world.monotonic() < until:
         with contextlib.suppress(OSError):
             end, _ = server.accept()
             end.settimeout(seconds)
-            if secrets.compare_digest(end.recv(len(password), socket.MSG_WAITALL), password):
+            if secrets.compare_digest(world.receive(end, len(password), socket.MSG_WAITALL), password):
                 return end
             end.close()
-    if process.poll() is None:
+    if world.poll(process) is None:
         raise TimeoutError
     return socket.socket()  # not connected: its first use tells that the process is lost
 
@@ -125,10 +126,10 @@ def end_process(process: subprocess.Popen[bytes]) -> None:
     """End a process, and what it has started: they are a group of their own, which outlives the process."""
     if sys.platform == "win32":
         with contextlib.suppress(OSError):
-            process.kill()
+            world.kill(process)
         return
     with contextlib.suppress(OSError):
-        os.killpg(process.pid, signal.SIGKILL)
+        world.kill_group(process.pid, signal.SIGKILL)
 
 
 def signal_name(number: int) -> str:

@@ -15,6 +15,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
+from .. import world
 from ..errors import FmuError, RollbackError, StoppedError
 
 if TYPE_CHECKING:
@@ -128,7 +129,7 @@ class Door:
 
     def send(self, frames: bytes) -> None:
         """Ring."""
-        self._end.sendall(frames)
+        world.send(self._end, frames)
 
     def receive(self) -> tuple[int, bytes]:
         """The next frame.
@@ -149,7 +150,7 @@ class Door:
         return kind, body
 
     def _more(self) -> None:
-        chunk = self._end.recv(_CHUNK)
+        chunk = world.receive(self._end, _CHUNK)
         if not chunk:
             raise EOFError
         self._rest += chunk
@@ -160,7 +161,7 @@ class Door:
         whole[: len(self._rest)] = self._rest
         view, have = memoryview(whole), len(self._rest)
         while have < size:
-            count = self._end.recv_into(view[have:])
+            count = world.receive_into(self._end, view[have:])
             if not count:
                 raise EOFError
             have += count

@@ -3,15 +3,14 @@
 from __future__ import annotations
 
 import contextlib
-import mmap
 import os
 import subprocess
 import sys
-import tempfile
 import threading
 from collections.abc import Callable
 from pathlib import Path
 
+from .. import world
 from ..errors import cut
 from ..fmi import Interface
 from ..fmi.binding import plain_interface
@@ -64,7 +63,7 @@ class HostProcess:
         self._name_call = name_call
         self._limit_given = memory_limit is not None
         self._limit: int | None = None
-        self._folder = Path(tempfile.mkdtemp(prefix="host_", dir=folder.parent))
+        self._folder = Path(world.mkdtemp(prefix="host_", dir=folder.parent))
         start = {
             "path": sys.path,
             "parent": os.getpid(),
@@ -74,12 +73,12 @@ class HostProcess:
             "folder": str(folder),
             "interface": plain_interface(interface),
         }
-        (self._folder / "start").write_bytes(messages.encoded(start))
-        with (self._folder / "memory").open("w+b") as stream:
+        world.write_bytes(self._folder / "start", messages.encoded(start))
+        with world.open(self._folder / "memory", "w+b") as stream:
             stream.truncate(messages.HEAD + 8 * cells)
-            self.memory = mmap.mmap(stream.fileno(), 0)
+            self.memory = world.map_memory(stream.fileno(), 0)
         self._notes: memoryview | None = memoryview(self.memory)[: messages.HEAD].cast("q")
-        with (self._folder / "output").open("ab") as output:
+        with world.open(self._folder / "output", "ab") as output:
             command = [*starting("isolation.host"), str(self._folder)]
             self._process, self._end, self._password = start_process(command, output)
         self._door: Door | None = None
@@ -179,7 +178,7 @@ class HostProcess:
         return HostLostError(message, self._last_lines())
 
     def _hangs(self) -> HostLostError:
-        if self._process.poll() is not None:  # what it has started holds the line open
+        if world.poll(self._process) is not None:  # what it has started holds the line open
             return self._is_lost()
         end_process(self._process)
         self._reap(_GRACE)
@@ -223,12 +222,12 @@ class HostProcess:
     def _reap(self, seconds: float) -> bool:
         """Wait for its end; False if it does not come."""
         with contextlib.suppress(subprocess.TimeoutExpired):
-            self._process.wait(seconds)
+            world.wait(self._process, seconds)
         return self._process.returncode is not None
 
     def _last_lines(self) -> list[str]:
         """The end of what it wrote: messages of the FMU, and what it printed."""
-        with (self._folder / "output").open("rb") as stream:
+        with world.open(self._folder / "output", "rb") as stream:
             size = stream.seek(0, os.SEEK_END)
             stream.seek(max(0, size - _LINES * _LINE))
             lines = stream.read().decode(errors="replace").splitlines()

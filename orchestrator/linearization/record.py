@@ -8,6 +8,7 @@ import math
 from collections.abc import Sequence
 from pathlib import Path
 
+from .. import world
 from .closed_loop import Linearization
 from .modes import Stability
 from .responses import Passing
@@ -64,7 +65,7 @@ def write_linear(directory: Path, model: Linearization, stability: Stability, pa
     }
     path = directory / "linear.json"
     text = json.dumps(content, indent=1, ensure_ascii=False) + "\n"
-    path.write_text(text, encoding="utf-8", errors="backslashreplace")
+    world.write_text(path, text, encoding="utf-8", errors="backslashreplace")
     return path
 
 

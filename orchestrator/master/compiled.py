@@ -6,12 +6,12 @@ signals), steps are taken in Python with identical results.
 
 from __future__ import annotations
 
-import time as clock
 from collections.abc import Sequence
 
 import numpy as np
 from numpy.typing import NDArray
 
+from .. import world
 from ..fmi.binding import FmuChannel, FmuSlave, is_watched
 from .algorithms import Explicit, Operation
 from .coupling import Coupling
@@ -200,11 +200,11 @@ class CompiledLoop:
         while done < stop and goes_on:
             block = min(block, stop - done, max(1, _MOST_VALUES // width) * every)
             rows = np.empty((_rows_due(done, block, every, count), width))
-            clock_begin = clock.perf_counter()
+            clock_begin = world.perf_counter()
             taken, written, failed, status, newest, disturber = kernel.run(
                 *self._plan, changes, values, history, newest, rows, every, start_time, step, done, block, count, begin
             )
-            seconds = clock.perf_counter() - clock_begin
+            seconds = world.perf_counter() - clock_begin
             begin = 0
             done += taken
             if disturber >= 0:

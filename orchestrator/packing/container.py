@@ -12,7 +12,6 @@ import hashlib
 import importlib.metadata
 import logging
 import re
-import tempfile
 import zipfile
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
@@ -22,6 +21,7 @@ from pathlib import Path
 from lxml import etree
 
 from ...fmus.build import build, write_archive
+from .. import world
 from ..errors import RailcosimError, ScenarioError
 from ..fmi import Model, Workspace, is_fmu_name
 from ..master import ALGORITHMS, Explicit
@@ -81,7 +81,7 @@ def pack(system: System, path: Path, *, expose: Sequence[str] = (), platforms: S
         problems += _refused(system, checked, platforms)
         if problems:
             raise ScenarioError(list(dict.fromkeys(problems)))
-        with tempfile.TemporaryDirectory(dir=workspace.folder) as folder:
+        with world.TemporaryDirectory(dir=workspace.folder) as folder:
             given = Path(folder) / "given"
             files = {name: _file(system, name, model, platforms, given) for name, model in checked.models.items()}
             archive, references = _container(system, checked, exposed, files, Path(folder))
@@ -181,8 +181,8 @@ def _file(system: System, name: str, model: Model, platforms: Sequence[str], giv
         return build(instance.model, instance.build, kind="native", platforms=tuple(platforms))
     anew = given / model.digest / f"{Path(instance.model).stem}.fmu"
     if not anew.exists():
-        found = (path for path in model.folder.rglob("*") if path.is_file())
-        write_archive({path.relative_to(model.folder).as_posix(): path.read_bytes() for path in found}, anew)
+        found = (path for path in world.rglob(model.folder, "*") if path.is_file())
+        write_archive({path.relative_to(model.folder).as_posix(): world.read_bytes(path) for path in found}, anew)
     return anew
 
 
@@ -223,7 +223,7 @@ def _container(
         raise RailcosimError(
             f"fmu-manipulation-toolbox cannot pack {system.provenance.name}: {error.reason}"
         ) from error
-    with zipfile.ZipFile(folder / f"{_LIBRARY}.fmu") as made:
+    with world.open(folder / f"{_LIBRARY}.fmu", "rb") as stream, zipfile.ZipFile(stream) as made:
         archive = {entry: made.read(entry) for entry in made.namelist() if not entry.endswith("/")}
     return archive, _references(archive.pop("modelDescription.xml"), len(exposed))
 

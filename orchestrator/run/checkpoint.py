@@ -9,7 +9,6 @@ from __future__ import annotations
 import dataclasses
 import json
 import math
-import os
 import zipfile
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -18,6 +17,7 @@ from typing import Any
 
 import numpy as np
 
+from .. import world
 from ..errors import RailcosimError, ScenarioError
 from ..fmi import Kind, Model
 from ..master import Master
@@ -112,14 +112,14 @@ class Checkpoint:
         }
         part = directory / f"{CHECKPOINT_FILE}.part"
         try:
-            with part.open("wb") as stream:
+            with world.open(part, "wb") as stream:
                 with zipfile.ZipFile(stream, "w") as archive:
                     archive.writestr("checkpoint.json", json.dumps(content, default=_plain))
                     for number, name in enumerate(self.digests):
                         archive.writestr(f"states/{number}", self.states[name])
                 stream.flush()
-                os.fsync(stream.fileno())
-            os.replace(part, directory / CHECKPOINT_FILE)
+                world.fsync(stream.fileno())
+            world.replace(part, directory / CHECKPOINT_FILE)
         except OSError as error:
             raise RailcosimError(f"{part} cannot be written: {error.strerror or error}") from error
 
@@ -192,7 +192,7 @@ def read_checkpoint(directory: Path) -> Checkpoint:
             "once it has written one"
         )
     try:
-        with zipfile.ZipFile(path) as archive:
+        with world.open(path, "rb") as stream, zipfile.ZipFile(stream) as archive:
             content = json.loads(archive.read("checkpoint.json"))
             if content["format"] != _FORMAT:
                 raise ScenarioError(f"{path} is of another version of railcosim; run the scenario from the start")

@@ -9,8 +9,9 @@ from pathlib import Path
 from types import TracebackType
 from typing import Any
 
-from filelock import FileLock, Timeout
+from filelock import Timeout
 
+from .. import world
 from ..errors import RailcosimError
 
 LOCK_FILE = ".lock"
@@ -31,7 +32,7 @@ class RunDirectory:
         self.given = path
         self.path = path.absolute()
         self.identity = identity
-        self._lock = FileLock(self.path / LOCK_FILE)
+        self._lock = world.lock(self.path / LOCK_FILE)
 
     @property
     def marks(self) -> dict[str, Any]:
@@ -45,7 +46,7 @@ class RunDirectory:
             RailcosimError: another run has it, or it cannot be used.
         """
         try:
-            self.path.mkdir(parents=True, exist_ok=True)
+            world.mkdir(self.path, parents=True, exist_ok=True)
             self._lock.acquire(timeout=0)
         except Timeout:
             raise RailcosimError(
@@ -65,7 +66,7 @@ class RunDirectory:
     def _holder(self) -> str:
         """Which run has it, as far as its record says."""
         try:
-            record = json.loads((self.path / "run.json").read_text(encoding="utf-8"))
+            record = json.loads(world.read_text(self.path / "run.json", encoding="utf-8"))
             process = record["process"]
             return f" ({record['scenario'] or 'of Python'}, process {process['pid']} on {process['host']})"
         except (OSError, ValueError, LookupError, TypeError):

@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import logging
 import math
-import time as clock
 from contextlib import ExitStack
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
+from .. import world
 from ..errors import FigureError, RailcosimError, ScenarioError
 from ..evaluation import evaluate_metrics, judge_requirements, judge_values
 from ..figures import draw
@@ -175,7 +175,7 @@ def _check_threads(checked: Checked, threads: int) -> None:
 
 def _execute(system: System, job: Job, figures: bool) -> Run:
     place = job.place
-    begin = clock.perf_counter()
+    begin = world.perf_counter()
     with ExitStack() as held, Workspace() as workspace:
         try:
             checked = check(system, workspace, job.kind)

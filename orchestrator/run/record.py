@@ -7,11 +7,11 @@ import hashlib
 import importlib.metadata
 import json
 import math
-import os
 import platform
 from pathlib import Path
 from typing import Any
 
+from .. import world
 from ..evaluation import count_values
 from ..isolation import is_isolated
 from ..master import ALGORITHMS
@@ -38,7 +38,7 @@ def write(place: RunDirectory, checked: Checked, kind: str, *, anew: bool = True
     directory = place.path
     if anew:
         for name in (rows.CSV_FILE, rows.ROWS_FILE, "metrics.json", CHECKPOINT_FILE):
-            (directory / name).unlink(missing_ok=True)
+            world.unlink(directory / name, missing_ok=True)
     _dump(directory / "run.json", place.marks | _describe(checked.system, checked, kind) | {"status": "running"})
     _dump(directory / "units.json", {"time": "s"} | _units(checked))
 
@@ -98,7 +98,7 @@ def finish(place: RunDirectory, outcome: Run, kind: str, checksum: int) -> None:
 def add(directory: Path, **entries: Any) -> None:
     """Add to the record of a run that has ended."""
     path = directory / "run.json"
-    _dump(path, json.loads(path.read_text(encoding="utf-8")) | entries)
+    _dump(path, json.loads(world.read_text(path, encoding="utf-8")) | entries)
 
 
 def add_step_check(directory: Path, found: StepCheck) -> None:
@@ -188,8 +188,8 @@ def _dump(path: Path, content: dict[str, Any]) -> None:
     part = path.with_name(path.name + ".part")
     text = json.dumps(_plain(content), indent=1, ensure_ascii=False) + "\n"
     # What stands for the bytes of a file name that is not UTF-8 becomes the escape that JSON has for it.
-    part.write_text(text, encoding="utf-8", errors="backslashreplace")
-    os.replace(part, path)
+    world.write_text(part, text, encoding="utf-8", errors="backslashreplace")
+    world.replace(part, path)
 
 
 def _plain(value: Any) -> Any:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import time as clock
 from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -12,6 +11,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from .. import world
 from ..errors import ScenarioError, SignalError
 from ..master import Rows
 from ..times import digits
@@ -92,7 +92,7 @@ class Results(Mapping[str, NDArray[Any]]):
         """
         directory = Path(directory)
         try:
-            record = json.loads((directory / "run.json").read_text(encoding="utf-8"))
+            record = json.loads(world.read_text(directory / "run.json", encoding="utf-8"))
             columns = read_rows(directory, record["texts"], record.get("run", ""))
             _check_rows(columns, record.get("rows"))
             _check_record(record)
@@ -202,7 +202,7 @@ class Recorder:
         self._blocks: list[NDArray[Any]] = []
         self._rows: list[Sequence[Any]] = []
         self._written = 0
-        self._flushed = clock.monotonic()
+        self._flushed = world.monotonic()
         self._writer: Writer | None = None
         if directory is not None:
             self._writer = Writer(directory, ["time", *names], whole, self._texts, there, identity=identity)
@@ -220,7 +220,7 @@ class Recorder:
                 self._blocks.append(rows)
         else:
             self._rows.extend(rows)
-        if self._writer is not None and clock.monotonic() - self._flushed > _FLUSH_SECONDS:
+        if self._writer is not None and world.monotonic() - self._flushed > _FLUSH_SECONDS:
             self.flush()
 
     @property
@@ -235,7 +235,7 @@ class Recorder:
             self._writer.append(self._blocks[self._written :])
             self._written = len(self._blocks)
             self.checksum = self._writer.checksum
-            self._flushed = clock.monotonic()
+            self._flushed = world.monotonic()
             if sync:
                 self._writer.sync()
 

@@ -15,7 +15,6 @@ from __future__ import annotations
 import csv
 import io
 import json
-import os
 import zlib
 from collections.abc import Iterable, Iterator, Sequence
 from contextlib import suppress
@@ -24,6 +23,8 @@ from typing import IO, Any
 
 import numpy as np
 from numpy.typing import NDArray
+
+from .. import world
 
 CSV_FILE, ROWS_FILE, _NEW = "results.csv", "results.bin", ".new"
 _FLOAT = np.dtype("<f8")
@@ -61,8 +62,8 @@ class Writer:
         self._file: IO[Any]
         for name in (CSV_FILE, ROWS_FILE):
             if not there:
-                (directory / name).unlink(missing_ok=True)
-            (directory / f"{name}{_NEW}").unlink(missing_ok=True)
+                world.unlink(directory / name, missing_ok=True)
+            world.unlink(directory / f"{name}{_NEW}", missing_ok=True)
         self._path = directory / f"{CSV_FILE if texts else ROWS_FILE}{_NEW if there else ''}"
         self._open("w")
         if texts:
@@ -74,9 +75,9 @@ class Writer:
 
     def _open(self, mode: str) -> None:
         if self._texts:
-            self._file = self._path.open(mode, newline="", encoding="utf-8")
+            self._file = world.open(self._path, mode, newline="", encoding="utf-8")
         else:
-            self._file = self._path.open(f"{mode}b")
+            self._file = world.open(self._path, f"{mode}b")
 
     def append(self, blocks: Iterable[NDArray[Any]]) -> None:
         """Bring rows to the disk."""
@@ -95,13 +96,15 @@ class Writer:
 
     def sync(self) -> None:
         """See to it that what was written outlives the machine's power."""
-        os.fsync(self._file.fileno())
+        world.fsync(self._file.fileno())
 
     def _take_place(self) -> None:
         """Put the new file, which is closed, in the place of what is there."""
-        self._path = self._path.replace(self._path.with_suffix(""))
+        whole = self._path.with_suffix("")
+        world.replace(self._path, whole)
+        self._path = whole
         if not self._texts:
-            (self._directory / CSV_FILE).unlink(missing_ok=True)
+            world.unlink(self._directory / CSV_FILE, missing_ok=True)
 
     def close(self, blocks: Iterable[NDArray[Any]]) -> None:
         """End the file; ``blocks`` are all rows once more."""
@@ -109,7 +112,7 @@ class Writer:
         if not self._texts:
             _write_text(self._directory, self._columns, self._whole, blocks)
             for path in {self._path, self._directory / ROWS_FILE}:
-                path.unlink(missing_ok=True)
+                world.unlink(path, missing_ok=True)
         elif self._path.suffix == _NEW:
             self._take_place()
 
@@ -138,7 +141,7 @@ def read_rows(directory: Path, texts: Iterable[str], identity: str = "") -> dict
         if identity and found != identity:
             raise ValueError(f"{ROWS_FILE} and run.json are of different runs")
         return dict(zip(columns, np.ascontiguousarray(table.T), strict=True))
-    with (directory / CSV_FILE).open(newline="", encoding="utf-8") as stream:
+    with world.open(directory / CSV_FILE, newline="", encoding="utf-8") as stream:
         header, *rows = list(_lines(stream)) or [[]]
     rows = [row for row in rows if len(row) == len(header)]
     kinds: dict[str, Any] = dict.fromkeys(texts, object)
@@ -168,7 +171,7 @@ def recover_rows(directory: Path) -> Path:
 
 
 def _read_binary(path: Path) -> tuple[str, list[str], list[int], NDArray[np.float64]]:
-    with path.open("rb") as stream:
+    with world.open(path, "rb") as stream:
         header = json.loads(stream.readline())
         numbers = np.fromfile(stream, _FLOAT)
     columns = header["columns"]
@@ -182,9 +185,9 @@ def _write_text(directory: Path, columns: Sequence[str], whole: Sequence[int], b
     """Write ``results.csv``, which is there as a whole or not at all."""
     path = directory / CSV_FILE
     part = path.with_name(CSV_FILE + ".part")
-    with part.open("w", newline="", encoding="utf-8") as stream:
+    with world.open(part, "w", newline="", encoding="utf-8") as stream:
         write_csv(stream, columns, whole, blocks)
-    os.replace(part, path)
+    world.replace(part, path)
     return path
 
 

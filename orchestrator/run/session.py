@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 import signal
 import threading
-import time as clock
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import AbstractContextManager, contextmanager
 from dataclasses import dataclass
@@ -14,6 +13,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from .. import world
 from ..errors import RollbackError, RunError, ScenarioError, StoppedError
 from ..fmi import Interface, Kind, Slave
 from ..master import ALGORITHMS, Master, Rows
@@ -136,7 +136,7 @@ class Session:
     def _simulate(self, master: Master, begin: float) -> None:
         try:
             self._begin(master)
-            self.seconds["setup"] = clock.perf_counter() - begin
+            self.seconds["setup"] = world.perf_counter() - begin
             self.status = "completed" if self._step(master) else "interrupted"
         finally:
             if self._recorder is not None:
@@ -192,7 +192,7 @@ class Session:
         # Every point is watched; of steps of one length those that are recorded are picked out of all.
         told_every, kept_every = (row_every, 1) if varies else (1, int(row_every))
         observe = self._observer(master, Due(kept_every, count))
-        begin, before = clock.perf_counter(), master.steps
+        begin, before = world.perf_counter(), master.steps
         try:
             while True:
                 late = slack(system.stepping.step, system.stepping.start_time, master.time)
@@ -207,7 +207,7 @@ class Session:
                     return True
                 self._keep(master)
         finally:
-            self.seconds.update(stepping=clock.perf_counter() - begin, steps=master.steps - before)
+            self.seconds.update(stepping=world.perf_counter() - begin, steps=master.steps - before)
 
     def _observer(self, master: Master, due: Due) -> Callable[[int, Rows], bool]:
         assert self._recorder is not None
@@ -216,7 +216,7 @@ class Session:
         recorder, watching = self._recorder, self._watching
         last = system.stepping.stop_time - 0.5 * system.stepping.step
         percent = 0.01 * (system.stepping.stop_time - system.stepping.start_time)
-        shown, told = clock.monotonic(), 0
+        shown, told = world.monotonic(), 0
 
         def observe(steps: int, rows: Rows) -> bool:
             nonlocal shown, told
@@ -225,8 +225,8 @@ class Session:
             kept = due.of(steps, rows)
             recorder.extend(kept)
             reached = int((time - system.stepping.start_time) / percent + 1e-9)
-            if progress is not None and (reached > told or clock.monotonic() - shown > 0.1 or time >= last):
-                shown, told = clock.monotonic(), reached
+            if progress is not None and (reached > told or world.monotonic() - shown > 0.1 or time >= last):
+                shown, told = world.monotonic(), reached
                 progress(time, system.stepping.stop_time)
             if not stopped.is_set():
                 return True

@@ -13,6 +13,7 @@ from collections.abc import Callable, Collection
 from dataclasses import dataclass, field
 from typing import Any
 
+from .. import world
 from ..errors import ScenarioError
 from ..fmi import is_fmu_name
 from ..problems import Problem, suggestion
@@ -171,7 +172,7 @@ def _existing(text: str, folder: str) -> str:
         raise ScenarioError(Problem("", f"'{path}' is a folder", "name a file; an unpacked FMU is to be zipped"))
     near = ""
     if os.path.isdir(os.path.dirname(path)):
-        near = suggestion(os.path.basename(path), os.listdir(os.path.dirname(path)))
+        near = suggestion(os.path.basename(path), world.listdir(os.path.dirname(path)))
     raise ScenarioError(Problem("", f"there is no file '{path}'", near))
 
 

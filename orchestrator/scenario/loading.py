@@ -18,6 +18,7 @@ from typing import Any
 
 from railcosim import models
 
+from .. import world
 from ..errors import ScenarioError
 from ..fmi import is_fmu_name
 from ..problems import Problem, suggestion
@@ -39,14 +40,14 @@ MODELS = Path(os.path.abspath(models.__file__ or "")).parent
 
 def shipped() -> list[tuple[str, str]]:
     """Name and title of every scenario that comes with the package, by name."""
-    titles = {path.stem: _title(path) for path in sorted(MODELS.glob("*.toml"))}
+    titles = {path.stem: _title(path) for path in sorted(world.glob(MODELS, "*.toml"))}
     return [(name, title) for name, title in titles.items() if title is not None]
 
 
 def _title(path: Path) -> str | None:
     """Title of the scenario in a file; None for what is no scenario, and for what cannot be read."""
     try:
-        data = tomllib.loads(path.read_text(encoding="utf-8"))
+        data = tomllib.loads(world.read_text(path, encoding="utf-8"))
     except (OSError, ValueError):  # listing the others is more useful than failing on one
         return None
     return str(data.get("title", "")) if "instances" in data else None
@@ -80,7 +81,7 @@ def find(name_or_path: str | os.PathLike[str]) -> Path:
     if os.path.isdir(text):
         raise ScenarioError(Problem("", f"'{text}' is a folder", "name the scenario file in it"))
     if not os.path.isfile(text):
-        around = os.listdir(folder or ".") if os.path.isdir(folder or ".") else []
+        around = world.listdir(folder or ".") if os.path.isdir(folder or ".") else []
         near = suggestion(file, [other for other in around if other.endswith(".toml")])
         remedy = near or f"shipped scenarios are {', '.join(names)}"
         raise ScenarioError(Problem("", f"there is no file '{text}'", remedy))

@@ -8,6 +8,7 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
+from .. import world
 from ..errors import ScenarioError
 from ..problems import Problem
 
@@ -57,7 +58,7 @@ class Source:
             ScenarioError: it cannot be read, is not UTF-8, or is not TOML (with line and column).
         """
         try:
-            with path.open(encoding="utf-8") as stream:
+            with world.open(path, encoding="utf-8") as stream:
                 return cls(stream.read(MAX_SIZE + 1), label)
         except UnicodeDecodeError as error:
             message = f"not a text in UTF-8 ({error.reason} at byte {error.start})"

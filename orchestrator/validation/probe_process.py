@@ -7,10 +7,10 @@ from __future__ import annotations
 
 import contextlib
 import io
-import os
 import pickle
 from pathlib import Path
 
+from .. import world
 from ..errors import FmuError
 from . import claims, probes, probes_fmi2
 from .probes import DoubtfulError, NotedError, Task
@@ -22,7 +22,7 @@ _KEPT = 5
 
 def main(path: str) -> None:
     """Run the probe that the file asks for, and write its verdict."""
-    task: Task = pickle.loads(Path(path).read_bytes())
+    task: Task = pickle.loads(world.read_bytes(Path(path)))
     printed = io.StringIO()
     try:
         with contextlib.redirect_stdout(printed):
@@ -36,7 +36,7 @@ def main(path: str) -> None:
         verdict, detail = "fail", f"{type(error).__name__}: {error}"
     task.record.add(verdict=verdict, detail=detail.removeprefix("skipped: "))
     # A library that crashes while it is unloaded has done its part by now (pythonfmu 0.7 does, in one exit of a few).
-    os._exit(0)
+    world.exit_at_once(0)
 
 
 def _in_a_line(error: FmuError, printed: str) -> str:

@@ -5,11 +5,11 @@ from __future__ import annotations
 import os
 import pickle
 import subprocess
-import tempfile
 from collections.abc import Sequence
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
+from .. import world
 from ..errors import FmuFileError
 from ..fmi import Interface
 from ..fmi.binding import library, names_of_platform
@@ -54,7 +54,7 @@ def try_out(
         probes: which ones.
     """
     binaries = folder / "binaries"
-    platforms = sorted(p.name for p in binaries.iterdir() if p.is_dir()) if binaries.is_dir() else []
+    platforms = sorted(p.name for p in world.iterdir(binaries) if p.is_dir()) if binaries.is_dir() else []
     here = names_of_platform(interface.version)
     if not set(here) & set(platforms):
         brings = f"it brings {', '.join(platforms)}" if platforms else "it brings none"
@@ -79,10 +79,10 @@ def try_out(
 def _probe(probe: str, interface: Interface, folder: Path, timeout: float) -> tuple[Verdict, str]:
     if probe in probes_fmi2.PROBES and interface.version != "2.0":
         return "skipped", "tried with FMI 2.0 only"
-    place = Path(tempfile.mkdtemp(prefix=f"{probe}_", dir=folder.parent))
+    place = Path(world.mkdtemp(prefix=f"{probe}_", dir=folder.parent))
     step = interface.default_step or interface.recommended_step or _DEFAULT_STEP
     task = Task(probe, interface, folder, step, answer=place / "answer.jsonl")
-    (place / "task").write_bytes(pickle.dumps(task))
+    world.write_bytes(place / "task", pickle.dumps(task))
     for _ in range(_MOST_LIVES if probe in _RESUMED else 1):
         death = _live(place, timeout)
         if task.record.last("verdict") is not None:
@@ -98,18 +98,18 @@ def _probe(probe: str, interface: Interface, folder: Path, timeout: float) -> tu
 def _live(place: Path, timeout: float) -> str:
     """Let a process try, until it ends; how it did."""
     command = [*starting("validation.probe_process"), str(place / "task")]
-    with (place / _SAID).open("wb") as output:
-        process = subprocess.Popen(
+    with world.open(place / _SAID, "wb") as output:
+        process = world.start(
             command, cwd=place, stdin=subprocess.DEVNULL, stdout=output, stderr=output, start_new_session=True
         )
         try:
-            return _cause(process.wait(timeout))
+            return _cause(world.wait(process, timeout))
         except subprocess.TimeoutExpired:
             return f"{_HANGS} {timeout:g} s"
         finally:
             if process.returncode is None:
                 end_process(process)
-                process.wait()
+                world.wait(process)
 
 
 def _cause(code: int) -> str:
@@ -119,7 +119,8 @@ def _cause(code: int) -> str:
 
 
 def _last_words(path: Path) -> str:
-    lines = [line.strip() for line in path.read_bytes()[-2000:].decode(errors="replace").splitlines() if line.strip()]
+    end = world.read_bytes(path)[-2000:].decode(errors="replace")
+    lines = [line.strip() for line in end.splitlines() if line.strip()]
     return f"; last words: {lines[-1]}" if lines else ""
 
 

@@ -7,6 +7,8 @@ import os
 from pathlib import Path
 from typing import Any
 
+from .. import world
+
 
 class Record:
     """Lines of a file, each a JSON object, written at once.
@@ -22,11 +24,11 @@ class Record:
 
     def add(self, **entry: Any) -> None:
         """Write a line."""
-        number = os.open(self.path, os.O_WRONLY | os.O_APPEND | os.O_CREAT, 0o600)
+        number = world.open_descriptor(self.path, os.O_WRONLY | os.O_APPEND | os.O_CREAT, 0o600)
         try:
-            os.write(number, f"{json.dumps(entry)}\n".encode())
+            world.write(number, f"{json.dumps(entry)}\n".encode())
         finally:
-            os.close(number)
+            world.close(number)
 
     def trying(self, what: str) -> None:
         """Say what comes next, in case it is the last thing."""
@@ -37,7 +39,7 @@ class Record:
         if not self.path.is_file():
             return []
         found = []
-        for line in self.path.read_bytes().splitlines():
+        for line in world.read_bytes(self.path).splitlines():
             try:
                 entry = json.loads(line)
             except ValueError:

@@ -6,7 +6,6 @@ import ctypes
 import os
 import sys
 import threading
-import time
 from collections.abc import Mapping
 from contextlib import suppress
 from pathlib import Path
@@ -14,6 +13,7 @@ from typing import Any
 
 import fmpy
 
+from ... import world
 from ...errors import FmuFileError
 from ..interface import Interface
 
@@ -34,7 +34,7 @@ class Library:
         here = os.getcwd()
         os.chdir(path.parent)  # where some libraries look for others
         try:
-            self._dll = ctypes.cdll.LoadLibrary(str(path))
+            self._dll = world.load_library(str(path))
         except OSError as error:
             raise OSError(f"Failed to load shared library {path}. {error}") from error
         finally:
@@ -51,7 +51,7 @@ class Library:
         except AttributeError:
             return None
         function.restype, *function.argtypes = types
-        return function
+        return world.bound(function)
 
     def own(self, started: set[int]) -> None:
         """Threads that it has started, and no other library."""
@@ -70,7 +70,7 @@ class Library:
         while self._left():
             if patience <= 0.0:
                 return False
-            time.sleep(_LOOK)
+            world.sleep(_LOOK)
             patience -= _LOOK
         fmpy.freeLibrary(self._dll._handle)
         return True
@@ -86,7 +86,7 @@ def threads() -> set[int]:
     """The threads of this process that Python has not started; none where the system does not list them."""
     with suppress(OSError):
         ours = {thread.native_id for thread in threading.enumerate()}
-        return {int(each) for each in os.listdir("/proc/self/task")} - ours
+        return {int(each) for each in world.listdir("/proc/self/task")} - ours
     return set()
 
 
@@ -150,14 +150,15 @@ def library(folder: Path, interface: Interface, name: str) -> Path:
         place = binaries / platform
         if (place / named).is_file():
             return place / named
-        others = sorted(place.glob(f"*{fmpy.sharedLibraryExtension}")) if place.is_dir() else []
-        usable = [path for path in others if len(others) == 1 or b"DoStep" in path.read_bytes()]
+        others = sorted(world.glob(place, f"*{fmpy.sharedLibraryExtension}")) if place.is_dir() else []
+        usable = [path for path in others if len(others) == 1 or b"DoStep" in world.read_bytes(path)]
         if len(usable) == 1:
             return usable[0]
         if others:
             names = ", ".join(path.name for path in usable or others)
             raise FmuFileError(f"{name} has several libraries for {platform} ({names}) and none called {named}")
-    found = sorted(p.name for p in binaries.iterdir() if p.is_dir() and any(p.iterdir())) if binaries.is_dir() else []
+    platforms = world.iterdir(binaries) if binaries.is_dir() else ()
+    found = sorted(p.name for p in platforms if p.is_dir() and any(world.iterdir(p)))
     wanted = names_of_platform(interface.version)[0]
     raise FmuFileError(f"{name} has no binary for {wanted}; it brings {', '.join(found) or 'none at all'}")
 

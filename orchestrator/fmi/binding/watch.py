@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-import time as clock
 from collections.abc import Iterable
 
+from ... import world
 from ..slave import Slave
 from .loaded import LoadedSlave
 from .surroundings import Surroundings
@@ -37,7 +37,7 @@ class Watch:
 
     def look(self, *, at_once: bool = False) -> None:
         """Look, if the last look was some time ago or it is to be done at once."""
-        now = clock.perf_counter()
+        now = world.perf_counter()
         if (now < self._due and not at_once) or self._before is None:
             return
         self._due = now + _EVERY

@@ -7,6 +7,7 @@ import time
 from pathlib import Path
 
 import pytest
+from railcosim.orchestrator import world
 from railcosim.orchestrator.errors import FmuFileError
 from railcosim.orchestrator.fmi.archive import Workspace
 
@@ -90,7 +91,7 @@ def test_fmus_are_unpacked_to_a_plain_place_whatever_the_user_s_is_called(monkey
 def test_without_a_plain_place_there_is_one_clear_sentence(monkeypatch, tmp_path):
     odd = tmp_path / "größe"
     odd.mkdir()
-    monkeypatch.setattr("tempfile.mkdtemp", lambda prefix, dir: str(odd))
-    monkeypatch.setattr(Path, "rmdir", lambda self: None)
+    monkeypatch.setattr(world, "mkdtemp", lambda prefix, dir: str(odd))
+    monkeypatch.setattr(world, "rmdir", lambda self: None)
     with pytest.raises(FmuFileError, match="need a path of plain ASCII letters; set TMPDIR"):
         Workspace()

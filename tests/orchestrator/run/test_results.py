@@ -10,9 +10,8 @@ import pandas as pd
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from railcosim.orchestrator import world
 from railcosim.orchestrator.errors import ScenarioError, SignalError
-from railcosim.orchestrator.run import results as module
-from railcosim.orchestrator.run import rows as files
 from railcosim.orchestrator.run.results import Due, Recorder, Results
 from railcosim.orchestrator.run.rows import recover_rows
 
@@ -197,7 +196,7 @@ def test_a_record_that_somebody_has_edited(tmp_path, key, value):
 def now(monkeypatch):
     """A clock to set."""
     now = [0.0]
-    monkeypatch.setattr(module.clock, "monotonic", lambda: now[0])
+    monkeypatch.setattr(world, "monotonic", lambda: now[0])
     return now
 
 
@@ -263,7 +262,7 @@ def test_text_is_complete_or_not_there(tmp_path, monkeypatch):
     """A run that is killed while its text is written leaves the numbers."""
     recorder = recorded(tmp_path, ["x"], [(0.0, 1.5), (1.0, 2.5)])
     (tmp_path / "run.json").write_text(json.dumps(RECORD))
-    monkeypatch.setattr(files.os, "replace", lambda *_: (_ for _ in ()).throw(KeyboardInterrupt))
+    monkeypatch.setattr(world, "replace", lambda *_: (_ for _ in ()).throw(KeyboardInterrupt))
     with pytest.raises(KeyboardInterrupt):
         recorder.close()
     assert not (tmp_path / "results.csv").exists()

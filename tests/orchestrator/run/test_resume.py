@@ -7,11 +7,10 @@ import subprocess
 import sys
 import time
 from contextlib import contextmanager
-from pathlib import Path
 
 import numpy as np
 import pytest
-from railcosim.orchestrator import load
+from railcosim.orchestrator import load, world
 from railcosim.orchestrator.cli import app as cli
 from railcosim.orchestrator.cli import runs
 from railcosim.orchestrator.run import checkpoint, results
@@ -195,9 +194,8 @@ def test_nothing_is_lost_whenever_a_resumed_run_is_killed(mine, tmp_path, monkey
         return wrapped
 
     monkeypatch.setattr(results, "_FLUSH_SECONDS", -1.0)
-    monkeypatch.setattr(os, "replace", looking(os.replace))
     for name in ("replace", "unlink"):
-        monkeypatch.setattr(Path, name, looking(getattr(Path, name)))
+        monkeypatch.setattr(world, name, looking(getattr(world, name)))
     result = resume(out, progress=look, figures=False)
     assert result.status == "completed"
     assert (looks[0], looks[-1]) == (len(before.time), 41)
