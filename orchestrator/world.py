@@ -30,7 +30,7 @@ open = Path.open
 read_text, read_bytes, write_text, write_bytes = Path.read_text, Path.read_bytes, Path.write_text, Path.write_bytes
 mkdir, unlink, rmdir, chmod = Path.mkdir, Path.unlink, Path.rmdir, Path.chmod
 stat, iterdir, glob, rglob, listdir = Path.stat, Path.iterdir, Path.glob, Path.rglob, os.listdir
-replace, fsync, truncate = os.replace, os.fsync, os.ftruncate
+replace, fsync = os.replace, os.fsync
 rmtree, copyfileobj, mkdtemp, TemporaryDirectory = (
     shutil.rmtree,
     shutil.copyfileobj,
@@ -48,7 +48,7 @@ if sys.platform != "win32":
     fork, wait_for, signal_to, kill_group = os.fork, os.waitpid, os.kill, os.killpg
 
 # Messages.
-send, receive, receive_into = socket.socket.sendall, socket.socket.recv, socket.socket.recv_into
+send, send_part, receive = socket.socket.sendall, socket.socket.send, socket.socket.recv
 create_server, create_connection, socketpair = socket.create_server, socket.create_connection, socket.socketpair
 
 # FMUs.

@@ -9,12 +9,11 @@ import traceback
 from collections.abc import Callable, Iterable
 
 from .. import world
-from ..isolation import end_with_parent, signal_name
+from ..isolation import CRASHES, end_with_parent, signal_name
 from .options import FMU_FAILED
 from .printing import tell
 
 _PASSED_ON = {signal.SIGINT, signal.SIGTERM, *({signal.SIGHUP, signal.SIGQUIT} if os.name == "posix" else ())}
-_CRASHES = ("SIGSEGV", "SIGBUS", "SIGFPE", "SIGILL", "SIGABRT", "SIGTRAP", "SIGSYS")
 _UNEXPECTED = 1
 """The exit code that Python has for an exception that nobody expected."""
 _REMEDY = "--isolate finds the culprit, and keeps what was computed until then"
@@ -79,7 +78,7 @@ def _untimely(code: int, mask: Iterable[int]) -> int:
         tell(f"error: something in the run, most likely an FMU, ended the process (exit code {code}); {_REMEDY}")
         return FMU_FAILED
     name = signal_name(-code)
-    if name in _CRASHES:
+    if name in CRASHES:
         tell(f"error: something in the run, most likely an FMU, crashed ({name}); {_REMEDY}")
         return FMU_FAILED
     if name == "SIGKILL":

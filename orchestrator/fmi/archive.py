@@ -8,18 +8,11 @@ import zipfile
 from pathlib import Path
 from typing import NamedTuple
 
-from filelock import Timeout
-
 from .. import world
 from ..errors import FmuFileError
+from ..leftovers import PREFIX, own, sweep
 from .members import extract, list_members
 from .recognition import describe_file
-
-_PREFIX = "railcosim_"
-_OWNED = ".in-use"
-"""The lock in such a folder, which its owner holds for as long as it lives, however it ends."""
-_NEW = 60.0
-"""Age in s below which a folder may be one whose owner is about to take the lock."""
 
 
 class Unpacked(NamedTuple):
@@ -47,9 +40,8 @@ class Workspace:
 
     def __init__(self) -> None:
         self._place = _plain_folder()
-        self._lock = world.lock(self._place / _OWNED)
-        self._lock.acquire(timeout=0)
-        _sweep(self._place)
+        self._lock = own(self._place)
+        sweep(self._place)
         self.folder = self._place / "fmus"
         world.mkdir(self.folder)
         self._unpacked: dict[str, tuple[Path, tuple[str, ...]]] = {}
@@ -92,7 +84,7 @@ class Workspace:
 def _plain_folder() -> Path:
     for parent in (None, "/tmp", "/var/tmp", "C:/Temp"):
         try:
-            folder = Path(world.mkdtemp(prefix=_PREFIX, dir=parent)).resolve()
+            folder = Path(world.mkdtemp(prefix=PREFIX, dir=parent)).resolve()
         except OSError:
             continue
         if (
@@ -105,19 +97,6 @@ def _plain_folder() -> Path:
         f"FMUs cannot be unpacked below {tempfile.gettempdir()!r}: Python FMUs need a path of plain ASCII letters; "
         "set TMPDIR to such a folder"
     )
-
-
-def _sweep(own: Path) -> None:
-    """Remove what runs left behind that were killed: folders beside our own whose lock is there and held by nobody."""
-    for folder in world.glob(own.parent, f"{_PREFIX}*"):
-        try:
-            lock = folder / _OWNED
-            if folder == own or not lock.is_file() or world.now() - world.stat(lock).st_mtime < _NEW:
-                continue
-            with world.lock(lock).acquire(timeout=0):
-                world.rmtree(folder, ignore_errors=True)
-        except (OSError, Timeout):  # in use, or somebody else's
-            continue
 
 
 def _extract(path: Path, target: Path) -> tuple[str, ...]:

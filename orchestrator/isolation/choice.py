@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import threading
 from collections.abc import Iterable, Mapping
 from dataclasses import replace
 
@@ -21,8 +22,13 @@ def is_isolated(model: Model, instance: Instance) -> bool:
     return instance.isolate and model.plain is None
 
 
-def instantiate(model: Model, instance: Instance) -> Slave:
+def instantiate(model: Model, instance: Instance, stopped: threading.Event | None = None) -> Slave:
     """One instance, in a process of its own if it asks for that.
+
+    Args:
+        model: its model.
+        instance: how it is used.
+        stopped: is set when the run is to stop: an isolated instance is not waited for long then.
 
     Raises:
         FmuError: it cannot be loaded or instantiated; of an isolated one, its first call says so.
@@ -35,6 +41,7 @@ def instantiate(model: Model, instance: Instance) -> Slave:
         model.folder,
         step_timeout=instance.step_timeout,
         memory_limit=instance.memory_limit,
+        stopped=stopped,
     )
 
 

@@ -1,18 +1,17 @@
 """The process of an isolated instance: it loads the FMU and does what the master asks for, until told to end.
 
-It is started without the rest of the package (see `process`), so what is imported here at the top is little.
+It is started without the rest of the package (see `launch`), so what is imported here at the top is little.
 """
 
 from __future__ import annotations
 
 import contextlib
 import ctypes
+import errno
 import mmap
 import os
-import signal
 import socket
 import sys
-import threading
 from collections import deque
 from collections.abc import Callable, Iterable, Sequence
 from pathlib import Path
@@ -21,22 +20,18 @@ from typing import TYPE_CHECKING, Any
 import psutil
 
 from .. import world
-from . import messages
-from .launch import end_with_parent
-from .messages import NOTE_CALL, NOTE_MEMORY, Cells, Door, note
+from . import guard, messages
+from .guard import Look
+from .messages import NOTE_BASE, NOTE_CALL, NOTE_LINE, NOTE_MEMORY, Cells, Door, note
 
 if TYPE_CHECKING:
     from ..fmi import Channel, Slave
 
 _LOG_LINES = 50
-_LOOK_SECONDS = 0.25
-"""How often the caretaker looks after the process."""
-_MOST_OUTPUT = 4 << 20
-"""Bytes of output kept in the file: an FMU that prints at every step must not fill the disk."""
 
 
 class _Heard(deque[str]):
-    """What the FMU says, kept as ever and written into the file of its output, where it outlives a crash."""
+    """What the FMU says, kept as ever and printed for the guard, with whom it outlives a crash."""
 
     def extend(self, lines: Iterable[str]) -> None:
         for line in lines:
@@ -44,8 +39,7 @@ class _Heard(deque[str]):
 
     def append(self, line: str) -> None:
         super().append(line)
-        with contextlib.suppress(OSError):
-            world.write(1, f"{line}\n".encode(errors="replace"))
+        guard.say(line)
 
 
 class Host:
@@ -65,6 +59,7 @@ class Host:
         self._notes = notes
         self._before = before
         self._limit = limit
+        self._process = os.getpid()
         self._slave: Slave | None = None
         self._channels: list[tuple[Channel, Cells | None]] = []
         self._texts: dict[int, Sequence[Any]] = {}
@@ -120,8 +115,7 @@ class Host:
         if told:
             self._report(told)
         else:
-            self._notes[NOTE_CALL] = 0
-            self._door.send(messages.ANSWER)
+            self._answer(messages.ANSWER)
 
     def _call(self, dirty: Sequence[int], operation: str, arguments: tuple[Any, ...]) -> None:
         """Set what waits to be set, then do what has a name."""
@@ -150,13 +144,24 @@ class Host:
         self._notes[NOTE_CALL] = note("free")
         if self._slave is not None:
             self._slave.free()
-        self._door.send(messages.ANSWER)
+        self._answer(messages.ANSWER)
         # Not by the usual way: some FMUs crash when their libraries are torn down, and all has been given back.
         world.exit_at_once(0)
 
     def _report(self, told: dict[str, Any]) -> None:
-        self._notes[NOTE_CALL] = 0
-        self._door.send(messages.frame(messages.REPORT, told | {"time": self._slave.time if self._slave else 0.0}))
+        time = self._slave.time if self._slave else 0.0
+        self._answer(messages.frame(messages.REPORT, told | {"time": time}))
+
+    def _answer(self, frame: bytes) -> None:
+        if os.getpid() != self._process:  # a process that an FMU has forked, and that came back from the call
+            world.exit_at_once(0)
+        call, self._notes[NOTE_CALL] = self._notes[NOTE_CALL], 0
+        try:
+            self._door.send(frame)
+        except OSError as error:
+            if error.errno in _NO_LINE:
+                self._notes[NOTE_CALL], self._notes[NOTE_LINE] = call, 1
+            raise
 
     @property
     def _instance(self) -> Slave:
@@ -165,7 +170,7 @@ class Host:
 
     def _describe(self, error: Exception) -> dict[str, Any]:
         told = messages.describe(error)
-        used = _memory_in_use() - self._before
+        used = _memory_in_use(self._process) - self._before
         if isinstance(error, MemoryError) and self._limit is not None:
             used = self._limit
         told["message"] += messages.memory_hint(used, self._limit)
@@ -234,13 +239,15 @@ class Host:
 
 
 _STEPPING = note("step")
+_NO_LINE = (errno.EBADF, errno.ENOTSOCK)
+"""What the system says of a line that was closed on this side, and of a file that has its number since."""
 
 
 # -------------------------------------------------------------------- the process
 
 
 def main(folder: str, door: str) -> None:
-    """Serve one instance; called by the few lines that `process` starts.
+    """Serve one instance; called by the few lines that `launch` starts.
 
     Args:
         folder: of the files that are shared with the master.
@@ -248,37 +255,50 @@ def main(folder: str, door: str) -> None:
     """
     end = _connect(door)
     start: dict[str, Any] = messages.content(world.read_bytes(Path(folder) / "start"))
-    with contextlib.suppress(ValueError):  # a Ctrl-C is for the master, which ends the run properly
-        signal.signal(signal.SIGINT, signal.SIG_IGN)
     sys.path[:] = start["path"]
-    _stay_with_parent(start["of_main_thread"])
+    _be_chosen_first()
     _print_by_lines()
-    with world.open(Path(folder) / "memory", "r+b") as stream:
-        memory = world.map_memory(stream.fileno(), 0)
-    notes = memoryview(memory)[: messages.HEAD].cast("q")
+    memory, notes = _shared(folder)
     from ..fmi.binding import SLAVES, read_interface  # noqa: PLC0415 (after the path is set; and what it needs is not the FMU's memory)
 
     name, folder_of_fmu, interface = start["name"], Path(start["folder"]), read_interface(start["interface"])
-    before = _memory_in_use()
+    before = notes[NOTE_BASE] = _memory_in_use(os.getpid())
     limit = _limit_memory(before, start["memory_limit"])
     host = Host(end, memory, notes, before, limit)
-    threading.Thread(target=_take_care, args=(start["parent"], notes, before), daemon=True).start()
     try:
-        end.send(messages.frame(messages.READY, limit))
+        end.send(messages.frame(messages.READY, [limit, os.getpid()]))
         host.instantiate(lambda log: SLAVES[interface.version](name, interface, folder_of_fmu, log))
         host.serve()
     except (EOFError, OSError):  # the master is gone
         world.exit_at_once(1)
 
 
+def watching(folder: str, door: str) -> Look:
+    """What the guard does now and then: it notes the most memory that is used."""
+    _, notes = _shared(folder)
+
+    def look(process: int) -> None:
+        with contextlib.suppress(psutil.Error):
+            if notes[NOTE_BASE]:
+                notes[NOTE_MEMORY] = max(notes[NOTE_MEMORY], _memory_in_use(process) - notes[NOTE_BASE])
+
+    return look
+
+
+def _shared(folder: str) -> tuple[mmap.mmap, memoryview]:
+    """The memory that is shared with the master, and the notes at its head."""
+    with world.open(Path(folder) / "memory", "r+b") as stream:
+        memory = world.map_memory(stream.fileno(), 0)
+    return memory, memoryview(memory)[: messages.HEAD].cast("q")
+
+
 def _connect(door: str) -> Door:
     if door.isdigit():
-        os.set_inheritable(int(door), False)  # for no process that the FMU starts
-        return Door(socket.socket(fileno=int(door)))
+        return Door(socket.socket(fileno=guard.high(int(door))))
     address, _, port = door.rpartition(":")
     end = world.create_connection((address, int(port)))
     world.send(end, sys.stdin.buffer.readline().strip())
-    return Door(end)
+    return Door(socket.socket(fileno=guard.high(end.detach())))
 
 
 def _print_by_lines() -> None:
@@ -293,17 +313,11 @@ _LINES = 1
 """_IOLBF, on Linux and on macOS."""
 
 
-def _stay_with_parent(of_main_thread: bool) -> None:
-    """Let Linux end this process with the master, and choose it, not the master, when memory runs out.
-
-    The signal comes when the *thread* ends that has started us: it is asked for where that is the master's main thread.
-    """
-    if not sys.platform.startswith("linux"):
-        return
-    if of_main_thread:
-        end_with_parent()
-    with contextlib.suppress(OSError):
-        world.write_text(Path("/proc/self/oom_score_adj"), "1000")
+def _be_chosen_first() -> None:
+    """Let Linux choose this process, not the master, when memory runs out."""
+    if sys.platform.startswith("linux"):
+        with contextlib.suppress(OSError):
+            world.write_text(Path("/proc/self/oom_score_adj"), "1000")
 
 
 def _limit_memory(before: int, mebibytes: float) -> int | None:
@@ -315,19 +329,6 @@ def _limit_memory(before: int, mebibytes: float) -> int | None:
     return limit
 
 
-def _memory_in_use() -> int:
-    """What this process has allocated, in KiB, as Linux counts it for its limit; 0 elsewhere."""
-    return int(getattr(psutil.Process().memory_info(), "data", 0)) // 1024
-
-
-def _take_care(parent: int, notes: memoryview, before: int) -> None:
-    """End the process with its master, even inside a long step; watch its memory and the size of its output."""
-    with contextlib.suppress(psutil.NoSuchProcess):
-        master = psutil.Process(parent)
-        while master.is_running() and not (os.name == "posix" and os.getppid() != parent):  # adopted by another
-            notes[NOTE_MEMORY] = max(notes[NOTE_MEMORY], _memory_in_use() - before)
-            with contextlib.suppress(OSError):
-                if os.fstat(1).st_size > _MOST_OUTPUT:
-                    world.truncate(1, 0)
-            world.sleep(_LOOK_SECONDS)
-    world.exit_at_once(1)
+def _memory_in_use(process: int) -> int:
+    """What a process has allocated, in KiB, as Linux counts it for its limit; 0 elsewhere."""
+    return int(getattr(psutil.Process(process).memory_info(), "data", 0)) // 1024

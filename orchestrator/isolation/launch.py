@@ -10,7 +10,7 @@ import signal
 import socket
 import subprocess
 import sys
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import IO
 
@@ -24,19 +24,24 @@ rooms = [room for room in os.listdir(folder) if os.path.isfile(os.path.join(fold
 for package, path in [(name, folder), *((name + "." + room, os.path.join(folder, room)) for room in rooms)]:
     sys.modules[package] = types.ModuleType(package)
     sys.modules[package].__path__ = [path]
-import_module(name + "." + module).main(*sys.argv[4:])
+import_module(name + ".isolation.guard").run(import_module(name + "." + module), *sys.argv[4:])
 """
 """Starts a module without the ``__init__`` of any room, which imports what all of it needs: 0.1 s instead of 0.4 s."""
 
+MOMENT = 0.25
+"""Wall time in s after which whoever waits for a process looks up, and may give up."""
+GRACE = 10.0
+"""Wall time in s for a process to be gone once it has left: writing a large core file takes a while."""
+_PASSWORD_SECONDS = 5.0
 INHERITS = os.name == "posix"
 """Whether a process can be given an open socket; it connects to one where it cannot."""
 
 
 def starting(module: str) -> list[str]:
-    """The command, but for its arguments, that runs the ``main`` of a module of ours (``"isolation.host"``) alone."""
+    """The command, but for its arguments, that runs a module of ours (``"isolation.host"``) alone, and guarded."""
     orchestrator = Path(__file__).parents[1]
     package = (__package__ or "").rpartition(".")[0]
-    return [sys.executable, "-u", "-P", "-c", _BOOT, package, str(orchestrator), module]
+    return [sys.executable, "-u", "-P", "-c", _BOOT, package, str(orchestrator), module, str(os.getpid())]
 
 
 @contextlib.contextmanager
@@ -58,7 +63,7 @@ def start_process(command: list[str], output: IO[bytes]) -> tuple[subprocess.Pop
     if INHERITS:
         near, far = world.socketpair()
         with far, _closed_on_failure(near):
-            # In a session of its own: a Ctrl-C in the terminal is for the master, which ends the run properly.
+            # In a session of its own: a Ctrl-C in the terminal is for the master, which ends the run in order.
             process = world.start(
                 [*command, str(far.fileno())],
                 stdin=subprocess.DEVNULL,
@@ -93,23 +98,34 @@ def _new_group() -> int:
     return 0
 
 
-def accept(server: socket.socket, process: subprocess.Popen[bytes], password: bytes, seconds: float) -> socket.socket:
+def accept(
+    server: socket.socket,
+    process: subprocess.Popen[bytes],
+    password: bytes,
+    wait: Callable[[], None],
+    moment: float,
+) -> socket.socket:
     """The connection of a process that knows the password.
 
-    Raises:
-        TimeoutError: it has not come within some time.
+    Args:
+        server: where it connects to.
+        process: the process.
+        password: what it shows.
+        wait: called after each moment without a connection.
+        moment: its length in s.
     """
-    until = world.monotonic() + seconds
-    server.settimeout(0.1)
-    while world.poll(process) is None and world.monotonic() < until:
-        with contextlib.suppress(OSError):
+    server.settimeout(moment)
+    while world.poll(process) is None:
+        try:
             end, _ = server.accept()
-            end.settimeout(seconds)
+        except TimeoutError:
+            wait()
+            continue
+        end.settimeout(_PASSWORD_SECONDS)
+        with contextlib.suppress(OSError):
             if secrets.compare_digest(world.receive(end, len(password), socket.MSG_WAITALL), password):
                 return end
-            end.close()
-    if world.poll(process) is None:
-        raise TimeoutError
+        end.close()
     return socket.socket()  # not connected: its first use tells that the process is lost
 
 
@@ -123,13 +139,19 @@ _KILL_WITH_PARENT = 1
 
 
 def end_process(process: subprocess.Popen[bytes]) -> None:
-    """End a process, and what it has started: they are a group of their own, which outlives the process."""
-    if sys.platform == "win32":
-        with contextlib.suppress(OSError):
-            world.kill(process)
-        return
+    """End a process, and what it has started: its guard sees to that, and is ended itself if it does not."""
     with contextlib.suppress(OSError):
-        world.kill_group(process.pid, signal.SIGKILL)
+        process.terminate()
+        if sys.platform != "win32":
+            process.send_signal(signal.SIGCONT)  # an FMU may have stopped its parent
+        with contextlib.suppress(subprocess.TimeoutExpired):
+            world.wait(process, GRACE)
+        world.kill(process)
+        world.wait(process, GRACE)
+
+
+CRASHES = ("SIGSEGV", "SIGBUS", "SIGFPE", "SIGILL", "SIGABRT", "SIGTRAP", "SIGSYS")
+"""Names of signals that tell of a fault of the program, not of somebody's wish."""
 
 
 def signal_name(number: int) -> str:

@@ -11,16 +11,19 @@ import json
 import mmap
 import socket
 import struct
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, TypeVar
 
 from .. import world
 from ..errors import FmuError, RollbackError, StoppedError
+from .launch import MOMENT
 
 if TYPE_CHECKING:
     from ..fmi import Type
 
+A = TypeVar("A")
+T = TypeVar("T")
 STEP, CALL, CHANNEL, WATCH, VALUES, RESTORE, FORGET = range(7)
 """Frames to the host. The first two are answered; what went wrong with one of the others comes with the next answer."""
 READY, DONE, REPORT = range(16, 19)
@@ -35,14 +38,17 @@ ANSWER = FRAME.pack(DONE, 0)
 
 HEAD = 64
 """Bytes before the values: notes of the host as whole numbers of 64 bits, which outlive it."""
-NOTE_CALL, NOTE_MEMORY = range(2)
-"""What it is doing (see `note`), and the most memory it has been seen to use, in KiB."""
+NOTE_CALL, NOTE_MEMORY, NOTE_BASE, NOTE_LINE = range(4)
+"""What it is doing (see `note`); the most memory it has been seen to use beyond what Python has, which is the third, in
+KiB; whether it has lost its line to the master."""
 CALLS = ("", "instantiate", "setup", "enter_initialization", "exit_initialization", "set", "step", "get", "save",
          "restore", "forget", "serialize", "deserialize", "directional_derivatives", "interpolate", "terminate",
          "roll_back", "free")  # fmt: skip
 """What an FMU is asked to do, by number in `NOTE_CALL`."""
 NUMBERS = {name: number for number, name in enumerate(CALLS)}
-_CHUNK = 1 << 16
+_FRAMES = {*range(STEP, FORGET + 1), *range(READY, REPORT + 1)}
+_CHUNK, _LARGE = 1 << 16, 1 << 20
+_SHOWN = 20
 _SUSPICIOUS = 0.5
 """The part of the memory limit in use from which on it is named as a likely reason of a failure."""
 
@@ -119,57 +125,67 @@ class Report:
 
 
 class Door:
-    """One end of the socket."""
+    """One end of the socket.
 
-    def __init__(self, end: socket.socket) -> None:
+    Args:
+        end: the socket.
+        wait: called after each moment of silence; without it, silence may last.
+        moment: its length in s.
+    """
+
+    def __init__(self, end: socket.socket, wait: Callable[[], None] | None = None, moment: float = MOMENT) -> None:
         self._end = end
-        self._rest = b""
+        self._wait = wait
+        self._rest = bytearray()
+        if wait is not None:
+            end.settimeout(moment)
         if end.family != getattr(socket, "AF_UNIX", None):
             end.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
 
     def send(self, frames: bytes) -> None:
-        """Ring."""
-        world.send(self._end, frames)
+        """Ring.
+
+        Raises:
+            OSError: the other is gone.
+        """
+        rest = memoryview(frames)
+        while rest:
+            rest = rest[self._patiently(world.send_part, rest) :]
 
     def receive(self) -> tuple[int, bytes]:
         """The next frame.
 
         Raises:
             EOFError: the other is gone.
-            OSError: so it is, or it does not answer in time.
+            OSError: so it is.
+            ValueError: it is no frame of ours.
         """
         while len(self._rest) < FRAME.size:
-            self._more()
+            self._more(_CHUNK)
         kind, length = FRAME.unpack_from(self._rest)
-        if length > _CHUNK:
-            self._rest = self._collect(FRAME.size + length)
-        while len(self._rest) < FRAME.size + length:
-            self._more()
-        body = self._rest[FRAME.size : FRAME.size + length]
-        self._rest = self._rest[FRAME.size + length :]
+        if kind not in _FRAMES:
+            raise ValueError(f"no frame begins with {bytes(self._rest[:_SHOWN])!r}")
+        size = FRAME.size + length
+        while len(self._rest) < size:
+            self._more(min(max(size - len(self._rest), _CHUNK), _LARGE))
+        body = bytes(self._rest[FRAME.size : size])
+        del self._rest[:size]
         return kind, body
 
-    def _more(self) -> None:
-        chunk = world.receive(self._end, _CHUNK)
+    def _more(self, most: int) -> None:
+        chunk = self._patiently(world.receive, most)
         if not chunk:
             raise EOFError
         self._rest += chunk
 
-    def _collect(self, size: int) -> bytes:
-        """As many bytes as a long frame has, without copying them again for each chunk."""
-        whole = bytearray(size)
-        whole[: len(self._rest)] = self._rest
-        view, have = memoryview(whole), len(self._rest)
-        while have < size:
-            count = world.receive_into(self._end, view[have:])
-            if not count:
-                raise EOFError
-            have += count
-        return bytes(whole)
-
-    def wait_at_most(self, seconds: float | None) -> None:
-        """How long `send` and `receive` wait for the other."""
-        self._end.settimeout(seconds)
+    def _patiently(self, act: Callable[[socket.socket, A], T], argument: A) -> T:
+        while True:
+            try:
+                return act(self._end, argument)
+            except TimeoutError:
+                if self._wait is None:
+                    raise
+                self._wait()
 
     def close(self) -> None:
         """Leave."""

@@ -15,23 +15,26 @@ from ..errors import cut
 from ..fmi import Interface
 from ..fmi.binding import plain_interface
 from . import messages
-from .launch import accept, end_process, signal_name, start_process, starting
-from .messages import NOTE_CALL, NOTE_MEMORY, Door
+from .launch import CRASHES, GRACE, MOMENT, accept, end_process, signal_name, start_process, starting
+from .messages import NOTE_CALL, NOTE_LINE, NOTE_MEMORY, Door
 
 PATIENCE = 60.0
 """Default wall time in s for one call, and the least for Python to start on a busy machine."""
-_GRACE = 10.0
-"""Wall time in s for a process to be gone once it has left: writing a large core file takes a while."""
+LAST_PATIENCE = 10.0
+"""The wall time in s that an instance's calls may take, all together, once the run is to stop."""
 _LINES, _LINE = 20, 500
 """How much of what it wrote is shown after a crash."""
 
 
 class HostLostError(Exception):
-    """The process of an instance is gone: its message says how. `log` holds the last lines it wrote."""
+    """The process of an instance is gone: its message says how.
 
-    def __init__(self, message: str, log: list[str]) -> None:
+    Attributes: `log` (the last lines it wrote), `is_stopped` (whether that is because the run was to stop).
+    """
+
+    def __init__(self, message: str, log: list[str], *, is_stopped: bool = False) -> None:
         super().__init__(message)
-        self.log = log
+        self.log, self.is_stopped = log, is_stopped
 
 
 class HostProcess:
@@ -45,6 +48,7 @@ class HostProcess:
         name_call: the name of the FMU's function that `note` speaks of.
         patience: wall time in s after which a call counts as hanging; None for the default.
         memory_limit: what the FMU may allocate, in MiB; None for half of what the machine has.
+        stopped: is set when the run is to stop; calls are given `LAST_PATIENCE` from then on.
     """
 
     def __init__(
@@ -57,17 +61,20 @@ class HostProcess:
         name_call: Callable[[str, int], str],
         patience: float | None,
         memory_limit: float | None,
+        stopped: threading.Event | None = None,
     ) -> None:
         self.patience = PATIENCE if patience is None else patience
         self.is_ready = False
+        self._stopped = stopped
+        self._moment = min(MOMENT, self.patience)
+        self._left, self._last_left = max(self.patience, PATIENCE), LAST_PATIENCE
+        """Wall time in s that the present call may still take; that all calls may, once the run is to stop."""
         self._name_call = name_call
         self._limit_given = memory_limit is not None
         self._limit: int | None = None
         self._folder = Path(world.mkdtemp(prefix="host_", dir=folder.parent))
         start = {
             "path": sys.path,
-            "parent": os.getpid(),
-            "of_main_thread": threading.current_thread() is threading.main_thread(),
             "memory_limit": _default_limit() if memory_limit is None else memory_limit,
             "name": name,
             "folder": str(folder),
@@ -82,11 +89,8 @@ class HostProcess:
             command = [*starting("isolation.host"), str(self._folder)]
             self._process, self._end, self._password = start_process(command, output)
         self._door: Door | None = None
-
-    @property
-    def pid(self) -> int:
-        """The number by which the system knows it."""
-        return self._process.pid
+        self.pid = self._process.pid
+        """The number by which the system knows it; until it is ready, that of its guard."""
 
     # ---------------------------------------------------------------- talk
 
@@ -96,17 +100,13 @@ class HostProcess:
         Raises:
             HostLostError: it does not start.
         """
-        try:
-            self._door = Door(
-                accept(self._end, self._process, self._password, PATIENCE) if self._password else self._end
-            )
-        except TimeoutError as error:
-            raise self._hangs() from error
-        self._door.wait_at_most(max(self.patience, PATIENCE))
-        _, body = self.receive()
-        self._limit = messages.content(body)
+        end = (
+            accept(self._end, self._process, self._password, self._wait, self._moment) if self._password else self._end
+        )
+        self._door = Door(end, self._wait, self._moment)
+        _, body = self._told(self._door.receive)
+        self._limit, self.pid = messages.content(body)
         self.is_ready = True
-        self._door.wait_at_most(self.patience)
 
     def send(self, frames: bytes) -> None:
         """Ring.
@@ -115,10 +115,9 @@ class HostProcess:
             HostLostError: it is gone, or does not listen.
         """
         assert self._door is not None
+        self._left = self.patience
         try:
             self._door.send(frames)
-        except TimeoutError as error:
-            raise self._hangs() from error
         except OSError as error:
             raise self._is_lost() from error
 
@@ -129,12 +128,29 @@ class HostProcess:
             HostLostError: it is gone, or does not answer; it is ended then.
         """
         assert self._door is not None
+        self._left = self.patience
+        return self._told(self._door.receive)
+
+    def _told(self, receive: Callable[[], tuple[int, bytes]]) -> tuple[int, bytes]:
         try:
-            return self._door.receive()
-        except TimeoutError as error:
-            raise self._hangs() from error
+            return receive()
+        except ValueError as error:
+            raise self.garbled(error) from error
         except (OSError, EOFError) as error:
             raise self._is_lost() from error
+
+    def garbled(self, error: ValueError) -> HostLostError:
+        """How it is lost that sends what cannot be read, most likely because an FMU writes there; it is ended."""
+        end_process(self._process)
+        return self._lost(f"its process sends what cannot be read ({error}) and was ended")
+
+    def _wait(self) -> None:
+        """A moment has passed in silence; counted, because a clock runs on while the master is suspended (Ctrl-Z)."""
+        self._left -= self._moment
+        if self._stopped is not None and self._stopped.is_set():
+            self._last_left -= self._moment
+        if min(self._left, self._last_left) <= 0.0:
+            raise self._hangs()
 
     def last_call(self) -> tuple[str, int]:
         """What it is doing, or was when it was lost: a name of `messages.CALLS`, and the channel where that matters.
@@ -155,14 +171,12 @@ class HostProcess:
         """End it, and what it has started, at once."""
         if self._process.returncode is None:
             end_process(self._process)
-            self._reap(_GRACE)
         self._close()
 
     def wait(self) -> None:
         """Wait for the end that it was asked for."""
-        if not self._reap(self.patience):
+        if not self._reap():
             end_process(self._process)
-            self._reap(_GRACE)
         self._close()
 
     def _close(self) -> None:
@@ -173,6 +187,7 @@ class HostProcess:
             self._notes.release()
             self._notes = None
             self.memory.close()
+            world.rmtree(self._folder, ignore_errors=True)
 
     def _lost(self, message: str) -> HostLostError:
         return HostLostError(message, self._last_lines())
@@ -181,35 +196,41 @@ class HostProcess:
         if world.poll(self._process) is not None:  # what it has started holds the line open
             return self._is_lost()
         end_process(self._process)
-        self._reap(_GRACE)
-        if not self.is_ready:
+        is_stopped = self._last_left <= 0.0
+        if not self.is_ready and not is_stopped:
             return self._lost(f"its process did not start within {max(self.patience, PATIENCE):g} s")
         call = self._name_call(*self.last_call()) or "what it was asked for"
-        return self._lost(
-            f"did not return from {call} within {self.patience:g} s; its process was ended; set step_timeout to allow "
-            "more wall time"
-        )
+        told = f"did not return from {call} within"
+        if is_stopped:
+            told = f"{told} {LAST_PATIENCE:g} s after the run was to stop; its process was ended"
+        else:
+            told = f"{told} {self.patience:g} s; its process was ended; set step_timeout to allow more wall time"
+        return HostLostError(told, self._last_lines(), is_stopped=is_stopped)
 
     def _is_lost(self) -> HostLostError:
         """How it went: a signal, or an exit code."""
-        forced = not self._reap(_GRACE)
-        end_process(self._process)  # what it has started, too
-        self._reap(_GRACE)
+        forced = not self._reap()
+        if forced:
+            end_process(self._process)
         code = self._process.returncode or 0
         if not self.is_ready:
             return self._lost(f"its process could not be started (exit code {code})")
         where = self._where()
-        if forced:
-            return self._lost(f"its process left {where} and was ended")
-        if code == -_KILL:
-            return self._lost(
-                f"its process was killed {where} (SIGKILL), most likely by the system, for lack of memory"
-            )
-        if code < 0:
-            return self._lost(f"its process crashed {where} ({signal_name(-code)}){self._hint()}")
-        if code > 0xFFFF:  # as Windows tells of a crash
-            return self._lost(f"its process crashed {where} (exit code {code:#x}){self._hint()}")
-        return self._lost(f"its process ended {where} (exit code {code})")
+        if self._notes is not None and self._notes[NOTE_LINE]:
+            how = f"lost its line to the master {where} or before: the FMU closes descriptors that are not its own"
+        elif forced:
+            how = f"left {where} and was ended"
+        elif code == -_KILL:
+            how = f"was killed {where} (SIGKILL), most likely by the system, for lack of memory"
+        elif code < 0 and signal_name(-code) not in CRASHES:
+            how = f"was ended {where} by a signal ({signal_name(-code)})"
+        elif code < 0:
+            how = f"crashed {where} ({signal_name(-code)}){self._hint()}"
+        elif code > 0xFFFF:  # as Windows tells of a crash
+            how = f"crashed {where} (exit code {code:#x}){self._hint()}"
+        else:
+            how = f"ended {where} (exit code {code})"
+        return self._lost(f"its process {how}")
 
     def _hint(self) -> str:
         """Whether memory may be the reason."""
@@ -219,10 +240,10 @@ class HostProcess:
             return hint
         return f"; its memory_limit was {self._limit / 1024:g} MiB"
 
-    def _reap(self, seconds: float) -> bool:
+    def _reap(self) -> bool:
         """Wait for its end; False if it does not come."""
         with contextlib.suppress(subprocess.TimeoutExpired):
-            world.wait(self._process, seconds)
+            world.wait(self._process, GRACE)
         return self._process.returncode is not None
 
     def _last_lines(self) -> list[str]:

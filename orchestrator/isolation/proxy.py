@@ -9,7 +9,9 @@ from __future__ import annotations
 
 import logging
 import struct
-from collections.abc import Iterable, Sequence
+import threading
+from collections.abc import Iterable, Iterator, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -47,6 +49,7 @@ class IsolatedSlave:
         folder: where the FMU was unpacked.
         step_timeout: wall time in s after which a call counts as hanging; None for a minute.
         memory_limit: what it may allocate, in MiB; None for half of the machine's memory.
+        stopped: is set when the run is to stop: its calls do not take long any more then.
 
     Raises:
         FmuError: no process can be started.
@@ -60,6 +63,7 @@ class IsolatedSlave:
         *,
         step_timeout: float | None = None,
         memory_limit: float | None = None,
+        stopped: threading.Event | None = None,
     ) -> None:
         self.name = name
         self.interface = interface
@@ -77,6 +81,7 @@ class IsolatedSlave:
                 name_call=self._name_call,
                 patience=step_timeout,
                 memory_limit=memory_limit,
+                stopped=stopped,
             )
         except OSError as error:
             raise FmuError(f"its process cannot be started: {error}", instance=name) from error
@@ -103,7 +108,7 @@ class IsolatedSlave:
 
     @property
     def pid(self) -> int:
-        """The number by which the system knows its process."""
+        """The number of its process; until that is ready, of its guard."""
         return self._process.pid
 
     # ---------------------------------------------------------------- the face of an instance
@@ -179,21 +184,18 @@ class IsolatedSlave:
 
     def serialize(self, state: _Saved) -> bytes:
         """A saved state as bytes, as they are without isolation."""
-        content: bytes = self._ask("serialize", state.number)
-        return content
+        return bytes(self._ask("serialize", state.number))
 
     def deserialize(self, content: bytes) -> _Saved:
         """A saved state, out of its bytes."""
         self._saved += 1
-        time: float = self._ask("deserialize", self._saved, content)
-        return _Saved(self._saved, time)
+        return _Saved(self._saved, self._ask("deserialize", self._saved, content))
 
     def directional_derivatives(
         self, unknowns: Sequence[str], knowns: Sequence[str], seed: Sequence[float]
     ) -> list[float]:
         """How the unknowns change when the knowns change by ``seed``; all are Real variables."""
-        found: list[float] = self._ask("directional_derivatives", list(unknowns), list(knowns), list(seed))
-        return found
+        return list(self._ask("directional_derivatives", list(unknowns), list(knowns), list(seed)))
 
     def interpolate(self, names: Sequence[str], orders: Sequence[int], values: Sequence[float]) -> None:
         """Time derivatives of inputs over the coming step: one name, order (from 1) and value each."""
@@ -264,12 +266,11 @@ class IsolatedSlave:
         """Wait for a step that is under way."""
         report = self._receive()
         end, self.end = self.end, None
-        if report is None:
-            assert end is not None
+        if report is None and end is not None:
             self.time = end
             for channel in self._watched:
                 channel.moment, channel.texts = self.moment, None
-        else:
+        elif report is not None:
             self._take(self._watched, self._checked(report))
 
     def _ask(self, operation: str, *arguments: Any) -> Any:
@@ -291,18 +292,15 @@ class IsolatedSlave:
         if not self._is_made:
             self._await()
         ring, self._queue, self._dirty = self._queue + ring, b"", []
-        try:
+        with self._mourning():
             self._process.send(ring)
-        except HostLostError as lost:
-            raise self._mourn(lost) from lost
 
     def _await(self) -> None:
         """Wait for the process and for the instance in it."""
-        try:
+        with self._mourning():
             self._process.wait_until_ready()
+        try:
             self._checked(self._receive())
-        except HostLostError as lost:
-            raise self._mourn(lost) from lost
         except FmuError as error:
             self._lost = error
             raise
@@ -312,15 +310,24 @@ class IsolatedSlave:
         """What the process tells; None if there is nothing to tell."""
         if self._lost is not None:
             raise self._lost
-        try:
+        with self._mourning():
             kind, body = self._process.receive()
-            return Report.read(body, self.name) if kind == messages.REPORT else None
+            try:
+                return Report.read(body, self.name) if kind == messages.REPORT else None
+            except ValueError as error:
+                raise self._process.garbled(error) from error
+
+    @contextmanager
+    def _mourning(self) -> Iterator[None]:
+        """Make an error of what ends the process, and nothing to be waited for of a process that is given up."""
+        try:
+            yield
         except HostLostError as lost:
-            raise self._mourn(lost) from lost
-        except ValueError as error:  # an FMU has written there
-            message = f"its process sends what cannot be read ({error}) and was ended"
-            self._process.kill()
-            raise self._mourn(HostLostError(message, [])) from error
+            error = self._mourn(lost)
+            if lost.is_stopped:
+                _LOG.warning("%s", error)
+                raise KeyboardInterrupt from lost
+            raise error from lost
         except BaseException:  # a second Ctrl-C: it is not waited for
             self._process.kill()
             self._lost = FmuError("was interrupted", instance=self.name, time=self.time)

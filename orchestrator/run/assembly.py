@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+import threading
 from collections.abc import Collection, Iterator
-from contextlib import contextmanager
+from contextlib import ExitStack, contextmanager
 
 from ..fmi import Slave
 from ..fmi.binding import LoadedSlave
@@ -13,22 +14,30 @@ from .checking import Checked
 
 
 @contextmanager
-def assembled(checked: Checked, *, threads: int = 1, restoring: Collection[str] = ()) -> Iterator[Master]:
+def assembled(
+    checked: Checked,
+    *,
+    threads: int = 1,
+    restoring: Collection[str] = (),
+    stopped: threading.Event | None = None,
+) -> Iterator[Master]:
     """A master of all instances, each in a process of its own if it asks for that; they are freed at the end.
 
     Args:
         checked: the system, found fit to run.
         threads: how many step instances in parallel.
         restoring: instances that are restored after steps that they discard.
+        stopped: is set when the run is to stop: isolated instances are not waited for long then.
 
     Raises:
         FmuError: an instance cannot be loaded or instantiated.
     """
     system, wiring = checked.system, checked.wiring
     slaves: dict[str, Slave] = {}
-    try:
+    with ExitStack() as given_back:  # each of them, also when another interruption comes meanwhile
         for name, model in checked.models.items():
-            slaves[name] = slave = instantiate(model, system.instances[name])
+            slaves[name] = slave = instantiate(model, system.instances[name], stopped)
+            given_back.callback(slave.free)
             if name in restoring and isinstance(slave, LoadedSlave | IsolatedSlave):
                 slave.roll_back()
         yield Master(
@@ -39,6 +48,3 @@ def assembled(checked: Checked, *, threads: int = 1, restoring: Collection[str] 
             system.stepping.algorithm,
             settings=Settings.of(system, threads),
         )
-    finally:
-        for slave in slaves.values():
-            slave.free()

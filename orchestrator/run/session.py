@@ -117,7 +117,7 @@ class Session:
         return True
 
     def _assembled(self) -> AbstractContextManager[Master]:
-        return assembled(self.checked, threads=self.job.threads, restoring=self._restoring)
+        return assembled(self.checked, threads=self.job.threads, restoring=self._restoring, stopped=self._stopped)
 
     @contextmanager
     def _ending(self) -> Iterator[None]:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import math
 import struct
 from collections.abc import Callable, Iterator
@@ -11,8 +12,9 @@ from decimal import Decimal
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from .. import world
 from ..errors import FmuError
-from ..fmi.binding import SLAVES, LoadedSlave, call_name
+from ..fmi.binding import SLAVES, LoadedSlave, call_name, plain_interface, read_interface
 from ..times import digits
 from .agreement import Rows, compare, typical_deviation
 from .record import Record
@@ -54,6 +56,18 @@ class Task:
     folder: Path
     step: float
     answer: Path
+
+    def write(self, path: Path) -> None:
+        """Write it to a file as JSON, for `read`."""
+        told = {"probe": self.probe, "interface": plain_interface(self.interface), "folder": str(self.folder)}
+        world.write_text(path, json.dumps(told | {"step": self.step, "answer": str(self.answer)}), encoding="utf-8")
+
+    @classmethod
+    def read(cls, path: Path) -> Task:
+        """Out of a file."""
+        told = json.loads(world.read_text(path, encoding="utf-8"))
+        interface = read_interface(told["interface"])
+        return cls(told["probe"], interface, Path(told["folder"]), told["step"], Path(told["answer"]))
 
     @property
     def record(self) -> Record:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import os
-import pickle
 import subprocess
 from collections.abc import Sequence
 from concurrent.futures import ThreadPoolExecutor
@@ -82,7 +81,7 @@ def _probe(probe: str, interface: Interface, folder: Path, timeout: float) -> tu
     place = Path(world.mkdtemp(prefix=f"{probe}_", dir=folder.parent))
     step = interface.default_step or interface.recommended_step or _DEFAULT_STEP
     task = Task(probe, interface, folder, step, answer=place / "answer.jsonl")
-    world.write_bytes(place / "task", pickle.dumps(task))
+    task.write(place / "task.json")
     for _ in range(_MOST_LIVES if probe in _RESUMED else 1):
         death = _live(place, timeout)
         if task.record.last("verdict") is not None:
@@ -97,7 +96,7 @@ def _probe(probe: str, interface: Interface, folder: Path, timeout: float) -> tu
 
 def _live(place: Path, timeout: float) -> str:
     """Let a process try, until it ends; how it did."""
-    command = [*starting("validation.probe_process"), str(place / "task")]
+    command = [*starting("validation.probe_process"), str(place / "task.json")]
     with world.open(place / _SAID, "wb") as output:
         process = world.start(
             command, cwd=place, stdin=subprocess.DEVNULL, stdout=output, stderr=output, start_new_session=True
@@ -109,7 +108,6 @@ def _live(place: Path, timeout: float) -> str:
         finally:
             if process.returncode is None:
                 end_process(process)
-                world.wait(process)
 
 
 def _cause(code: int) -> str:

@@ -6,9 +6,11 @@
    Where: instantiate, setup, enter, exit, set, get, step, save, terminate, free. What: null (writes where nothing is),
    abort, exit (with code 7), kill (by SIGKILL), hang, slow (0.3 s), leak (16 MiB, and an error when there are no more),
    gulp (the same, and a crash), print (100 lines), say (a line to the logger and one printed), cry (the same, and null), fork (a child that stays),
-   discard, error, fatal, nan, once (nothing but the process's first instance is made). */
+   discard, error, fatal, nan, once (nothing but the process's first instance is made), and those of deeds.h. */
 
+#define _GNU_SOURCE
 #include "fmi2.h"
+#include "deeds.h"
 
 typedef struct {
     double reals[6], slope, time;
@@ -90,6 +92,8 @@ static int misbehave(Hostile *s, const char *here)
         return instances > 1;
     } else if (IS("nan")) {
         s->v.reals[2] = NAN;
+    } else {
+        return do_deed(what);
     }
     return 0;
 }

@@ -48,20 +48,20 @@ def test_frames_arrive_whole_and_in_order_however_long_they_are(doors, size):
     """Also what comes close behind: the next frame begins where the last one ends."""
     one, other = doors
     bodies = [b"a" * size, b"b", b"c" * (size // 2)]
-    sent = b"".join(struct.pack("<BI", 20 + k, len(body)) + body for k, body in enumerate(bodies))
+    sent = b"".join(struct.pack("<BI", k, len(body)) + body for k, body in enumerate(bodies))
     sender = threading.Thread(target=one.send, args=(sent,))
     sender.start()
-    assert [other.receive() for _ in bodies] == [(20 + k, body) for k, body in enumerate(bodies)]
+    assert [other.receive() for _ in bodies] == [(k, body) for k, body in enumerate(bodies)]
     sender.join()
 
 
 def test_frames_arrive_in_pieces(doors):
     one, other = doors
-    for byte in struct.pack("<BI", 7, 3):
+    for byte in struct.pack("<BI", 6, 3):
         one.send(bytes([byte]))
     for byte in b"xyz":
         one.send(bytes([byte]))
-    assert other.receive() == (7, b"xyz")
+    assert other.receive() == (6, b"xyz")
 
 
 @pytest.mark.parametrize(
@@ -75,10 +75,34 @@ def test_an_end_in_the_middle_is_told(doors, begun):
         other.receive()
 
 
-def test_silence_has_a_limit(doors):
-    _, other = doors
-    other.wait_at_most(0.05)
-    with pytest.raises(TimeoutError):
+def test_whoever_waits_is_told_of_each_moment_of_silence_and_may_give_up(doors):
+    """Nothing is lost by that: what had come stays, and what is not yet sent is sent after."""
+    one, other = doors
+    moments = []
+
+    def wait():
+        moments.append(1)
+        if len(moments) == 2:
+            one.send(b"23")
+        elif len(moments) == 4:
+            raise InterruptedError("enough")
+
+    patient = Door(other._end, wait, 0.02)
+    one.send(struct.pack("<BI", 1, 3) + b"1")
+    assert patient.receive() == (1, b"123")
+    assert len(moments) == 2
+    with pytest.raises(InterruptedError):
+        patient.receive()
+    moments[:] = [1, 1, 1]
+    with pytest.raises(InterruptedError):
+        patient.send(bytes(1 << 26))  # whom nobody reads
+
+
+@pytest.mark.parametrize("begun", [b"hello", b"\x07\x00\x00\x00\x00", struct.pack("<BI", 200, 1 << 31)])
+def test_what_begins_no_frame_is_not_waited_for(doors, begun):
+    one, other = doors
+    one.send(begun)
+    with pytest.raises(ValueError, match="no frame begins with b'"):
         other.receive()
 
 
