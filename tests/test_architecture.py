@@ -33,6 +33,8 @@ ORDER = (
 )
 """The rooms and root files of the orchestrator; each imports itself and what stands in lines below."""
 RANKS = {room: rank for rank, rooms in enumerate(ORDER) for room in rooms}
+EXECUTING = {"pickle", "marshal", "shelve", "dill", "cloudpickle", "joblib", "multiprocessing", "runpy"}
+"""Modules whose files and messages can name code that is executed when they are read."""
 MOST_FILES, MOST_LINES, MOST_TEST_LINES = 15, 400, 500
 
 
@@ -128,6 +130,18 @@ def test_rooms_are_entered_by_the_door():
             wrong.append(f"{each.place}: {other} does not offer {each.name!r} in its __all__")
         elif each.target not in FOLDERS and each.target.count(".") > 1:  # a file at the root has no door
             wrong.append(f"{each.place}: import from {other}, not from {each.target}")
+    assert not wrong, "\n".join(wrong)
+
+
+def test_nothing_is_read_that_can_execute_something_by_being_read():
+    wrong = []
+    for package in PACKAGES:
+        for path in code(package, "py"):
+            for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+                names = [x.name for x in node.names] if isinstance(node, ast.Import) else []
+                names += [node.module or ""] if isinstance(node, ast.ImportFrom) and not node.level else []
+                found = {name.partition(".")[0] for name in names} & EXECUTING
+                wrong += [f"{path.relative_to(ROOT)}:{node.lineno}: {name}" for name in found]
     assert not wrong, "\n".join(wrong)
 
 

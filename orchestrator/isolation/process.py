@@ -66,6 +66,7 @@ class HostProcess:
         self.patience = PATIENCE if patience is None else patience
         self.is_ready = False
         self._stopped = stopped
+        self._is_over = False
         self._moment = min(MOMENT, self.patience)
         self._left, self._last_left = max(self.patience, PATIENCE), LAST_PATIENCE
         """Wall time in s that the present call may still take; that all calls may, once the run is to stop."""
@@ -146,6 +147,9 @@ class HostProcess:
 
     def _wait(self) -> None:
         """A moment has passed in silence; counted, because a clock runs on while the master is suspended (Ctrl-Z)."""
+        if self._is_over:  # and what it has started holds the line open
+            raise self._is_lost()
+        self._is_over = world.poll(self._process) is not None  # its last answer may have come since
         self._left -= self._moment
         if self._stopped is not None and self._stopped.is_set():
             self._last_left -= self._moment
@@ -193,8 +197,6 @@ class HostProcess:
         return HostLostError(message, self._last_lines())
 
     def _hangs(self) -> HostLostError:
-        if world.poll(self._process) is not None:  # what it has started holds the line open
-            return self._is_lost()
         end_process(self._process)
         is_stopped = self._last_left <= 0.0
         if not self.is_ready and not is_stopped:

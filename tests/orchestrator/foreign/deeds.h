@@ -9,7 +9,8 @@
 #include <sys/stat.h>
 #include <sys/wait.h>
 
-#define OWN_LINES 100000
+#define FLOOD_LINES 20000 /* 2 MB */
+#define OWN_LINES 100000 /* 5.7 MB */
 
 static const char *own_log(void)
 {
@@ -78,7 +79,7 @@ static int disturb_streams(const char *what)
         printf("mine\n");
         fflush(stdout);
     } else if (DOES("flood")) {
-        for (int k = 0; k < 1000000; k++) {
+        for (int k = 0; k < FLOOD_LINES; k++) {
             printf("%099d\n", k);
         }
     } else if (DOES("garbage")) {

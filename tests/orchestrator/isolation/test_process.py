@@ -5,6 +5,7 @@ import re
 import signal
 import subprocess
 import sys
+import threading
 import time
 from pathlib import Path
 
@@ -127,21 +128,6 @@ def test_a_crash_tells_what_the_fmu_said_last(apart, begin):
     assert str(caught.value).endswith("(SIGSEGV)\n    [warning] it: beware\n    printed at 1 s")
 
 
-@pytest.mark.long
-def test_what_an_fmu_prints_is_not_shown_and_does_not_fill_the_disk(apart, workspace, capfd):
-    it = apart("step print", begun=True)
-    (output,) = workspace.folder.glob("host_*/output")
-    most = 0
-    for k in range(3000):
-        it.step(0.1 * k, 0.1)
-        most = max(most, output.stat().st_size)
-    until = time.monotonic() + 10.0
-    while output.stat().st_size >= most and time.monotonic() < until:
-        time.sleep(0.1)
-    assert output.stat().st_size < most, "it was cut"
-    assert capfd.readouterr() == ("", "")
-
-
 def test_slow_is_not_hanging(apart):
     it = apart("step slow 0.5", step_timeout=5.0, begun=True)
     x = it.channel("Real", ["calls"])
@@ -174,29 +160,6 @@ def test_a_limit_that_leaves_enough(apart):
     for k in range(3):
         it.step(0.5 * k, 0.5)
     it.terminate()
-
-
-def test_what_a_lost_process_has_started_is_ended_too(apart):
-    it = apart("step fork", step_timeout=1.0, begun=True)
-    with pytest.raises(FmuError, match=r"its process crashed in fmi2DoStep \(SIGABRT\)"):
-        it.step(0.0, 1.0)
-    until = time.monotonic() + 10.0
-    while members_of(it.pid) and time.monotonic() < until:
-        time.sleep(0.05)
-    assert not members_of(it.pid)
-
-
-def members_of(group):
-    """Processes of a group, the dead ones aside."""
-    found = []
-    for place in Path("/proc").glob("[0-9]*/stat"):
-        try:
-            state, _, member = place.read_text().rpartition(")")[2].split()[:3]
-        except OSError:
-            continue
-        if int(member) == group and state != "Z":
-            found.append(place.parent.name)
-    return found
 
 
 def test_a_process_that_does_not_start(apart, monkeypatch):
@@ -246,6 +209,35 @@ def test_what_cannot_be_read_is_no_answer(apart, monkeypatch):
     assert not Path(f"/proc/{it.pid}").exists()
 
 
+@pytest.mark.parametrize(
+    ("where", "call"), [("instantiate", "Instantiate"), ("step", "DoStep"), ("free", "FreeInstance")]
+)
+def test_once_the_run_is_to_stop_a_call_is_not_waited_for_long(
+    apart, hostile, live, monkeypatch, caplog, *, where, call
+):
+    """The run is interrupted then; not so by an instance that is given back."""
+    monkeypatch.setattr(host_process, "LAST_PATIENCE", 0.5)
+    stopped = threading.Event()
+    it = apart(path=hostile(f"{where} hang"), stopped=stopped)
+
+    def stop():
+        while it._process.last_call()[0] != where:
+            time.sleep(0.01)
+        stopped.set()
+
+    threading.Thread(target=stop).start()
+    if where == "free":
+        assert live(it) is None
+        it.free()
+    else:
+        with pytest.raises(KeyboardInterrupt):
+            live(it)
+    assert not Path(f"/proc/{it.pid}").exists()
+    assert (
+        f"did not return from fmi2{call} within 0.5 s after the run was to stop; its process was ended" in caplog.text
+    )
+
+
 def test_a_second_interruption_does_not_wait(apart):
     it = apart("step hang 1", begun=True)
     it.step(0.0, 1.0)
@@ -264,53 +256,6 @@ def test_a_second_interruption_does_not_wait(apart):
     assert not Path(f"/proc/{it.pid}").exists()
     with pytest.raises(FmuError, match="was interrupted"):
         it.terminate()
-
-
-# -------------------------------------------------------------------- nobody is left
-
-MASTER = """
-import sys, threading, time
-from pathlib import Path
-from railcosim.orchestrator.fmi.archive import Workspace
-from railcosim.orchestrator.isolation.proxy import IsolatedSlave
-from railcosim.orchestrator.fmi.models import load_fmu
-
-def work():
-    model = load_fmu(Path(sys.argv[1]), Workspace())
-    it = IsolatedSlave("it", model.interface, model.folder)
-    it.channel("String", ["deed"]).set([sys.argv[2]])
-    it.setup(0.0, 10.0)
-    it.enter_initialization()
-    it.exit_initialization()
-    print(it.pid, flush=True)
-    it.step(0.0, 1.0)
-    time.sleep(60)
-
-if sys.argv[3] == "thread":
-    thread = threading.Thread(target=work)
-    thread.start()
-    thread.join()
-else:
-    work()
-"""
-
-
-@pytest.mark.long
-@pytest.mark.parametrize("thread", ["main", "thread"])
-@pytest.mark.parametrize("deed", ["step hang", "nothing"])
-def test_a_process_ends_with_its_master_even_inside_a_step(hostile, deed, thread, tmp_path):
-    command = [sys.executable, "-c", MASTER, hostile(), deed, thread]
-    with subprocess.Popen(
-        command, stdout=subprocess.PIPE, text=True, env=os.environ | {"TMPDIR": str(tmp_path)}
-    ) as master:
-        process = Path(f"/proc/{int(master.stdout.readline())}")
-        time.sleep(0.3)
-        assert process.exists()
-        master.kill()
-    until = time.monotonic() + 10.0
-    while process.exists() and time.monotonic() < until:
-        time.sleep(0.05)
-    assert not process.exists()
 
 
 def test_an_instance_that_was_never_used(apart):
