@@ -6,12 +6,15 @@ grants it. ``--write`` writes that file anew. Its numbers may only fall: a branc
 it stands, with the reason (``# pragma: no cover: it is for Windows``).
 
 What the parts ``python`` and ``c`` find is kept in ``build/coverage`` and told by the part ``report``; without a part
-all three are done, from nothing. ``--select`` names the tests for Python: several calls of ``python`` add up.
+all three are done, from nothing. ``--select`` names the tests for Python: several calls of ``python`` add up, and so
+does any other run of tests with the environment that the part ``environment`` prints: continuous integration has its
+one run of the quick tier measured by it.
 """
 
 import argparse
 import json
 import os
+import shlex
 import shutil
 import subprocess
 import sys
@@ -57,9 +60,9 @@ class Reached:
         return self.branches - self.branches_reached
 
 
-def run_tests(arguments: Iterable[str], prefix: Iterable[str] = (), **environment: str) -> None:
+def run_tests(arguments: Iterable[str], **environment: str) -> None:
     """A failure here is none of the code's: measured code is slower, and the tests themselves have run before."""
-    command = [sys.executable, *prefix, "-m", "pytest", "-p", "no:cacheprovider", *arguments]
+    command = [sys.executable, "-m", "pytest", "-p", "no:cacheprovider", *arguments]
     print("+", *command[1:], flush=True)
     code = subprocess.run(command, cwd=ROOT, env=os.environ | environment, check=False).returncode
     if code > 1:
@@ -69,14 +72,22 @@ def run_tests(arguments: Iterable[str], prefix: Iterable[str] = (), **environmen
 # -------------------------------------------------------------------- Python
 
 
+def measured() -> dict[str, str]:
+    """The environment in which every Python that has coverage installed writes down what it reaches."""
+    return {"COVERAGE_PROCESS_START": str(ROOT / "pyproject.toml"), "COVERAGE_FILE": str(DATA / "python")}
+
+
 def measure_python(tests: list[str]) -> None:
     """Run tests, and what they start in other processes, under coverage."""
-    DATA.mkdir(parents=True, exist_ok=True)
-    file = {"COVERAGE_FILE": str(DATA / "python")}
-    run_tests([*tests, "-n", "2"], ["-m", "coverage", "run", f"--rcfile={ROOT / 'pyproject.toml'}"], **file)
+    run_tests([*tests, "-n", "2"], **measured())
+
+
+def combine_python() -> None:
+    """Add up what the processes of all measured runs so far have written down."""
     coverage = [sys.executable, "-m", "coverage"]
-    environment = os.environ | file
-    subprocess.run([*coverage, "combine", "--append", "--quiet"], cwd=ROOT, env=environment, check=True)
+    environment = os.environ | {"COVERAGE_FILE": str(DATA / "python")}
+    if any(DATA.glob("python.*")):
+        subprocess.run([*coverage, "combine", "--append", "--quiet"], cwd=ROOT, env=environment, check=True)
     target = str(DATA / "covered.json")
     # Files that a test adds to a copy of the checkout are not there.
     subprocess.run(
@@ -116,7 +127,7 @@ def measure_c() -> None:
     command += [f"-I{sysconfig.get_paths()['include']}", "-dumpdir", f"{notes / 'kernel'}/", *map(str, KERNEL)]
     subprocess.run([*command, "-o", str(library)], check=True)
     plugin = str(ROOT / "tests" / "orchestrator" / "master")
-    run_tests(["-p", "own_kernel", "-n", "0", *LOOP_TESTS], KERNEL=str(library), PYTHONPATH=plugin)
+    run_tests(["-p", "own_kernel", "-n", "2", *LOOP_TESTS], KERNEL=str(library), PYTHONPATH=plugin)
     compiler = notes / "cc"
     compiler.write_text(COMPILER)
     compiler.chmod(0o755)
@@ -189,6 +200,7 @@ def granted() -> dict[str, tuple[int, str]]:
 
 def report(write: bool) -> int:
     """Print the tables; how many files have more unreached branches than they are granted."""
+    combine_python()
     python, c = read_python(), read_c()
     rooms: dict[str, Reached] = defaultdict(Reached)
     for name, row in sorted(python.items()):
@@ -215,13 +227,18 @@ def report(write: bool) -> int:
 
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("parts", nargs="*", choices=["python", "c", "report", []], help="all if none is named")
+    parser.add_argument(
+        "parts", nargs="*", choices=["environment", "python", "c", "report", []], help="all but the first"
+    )
     parser.add_argument("--select", nargs="+", default=["tests"], help="the tests for Python")
     parser.add_argument("--write", action="store_true", help="write tests/uncovered.txt")
     chosen = parser.parse_args()
     if not chosen.parts:
         shutil.rmtree(DATA, ignore_errors=True)
+    DATA.mkdir(parents=True, exist_ok=True)
     parts = chosen.parts or ["python", "c", "report"]
+    if "environment" in parts:
+        print(*(f"{name}={shlex.quote(value)}" for name, value in measured().items()))
     if "python" in parts:
         measure_python(chosen.select)
     if "c" in parts:

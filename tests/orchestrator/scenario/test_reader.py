@@ -4,6 +4,7 @@ from pathlib import Path
 
 import pytest
 from railcosim.orchestrator.errors import ScenarioError
+from railcosim.orchestrator.figures import check_figures
 from railcosim.orchestrator.scenario.loading import loads
 
 EXAMPLE = Path(__file__).with_name("two_trains.toml").read_text(encoding="utf-8")
@@ -175,6 +176,16 @@ MISTAKES = [
     ),
     (
         "[instances.target]",
+        '[instances."class[1]"]\ncomponent = "A"\n[instances.target]',
+        "two.toml:20: instances.\"class[1]\": an instance's name is taken; choose another for 'class'",
+    ),
+    (
+        "[instances.target]",
+        '[instances."x[1]"]\nstart.speed = 1.0\n[instances.target]',
+        'two.toml:20: instances."x[1]": says neither component = ... nor fmu = ...; name the model',
+    ),
+    (
+        "[instances.target]",
         '[instances."x[2]"]\ncomponent = "A"\n[instances.target]',
         'two.toml:20: instances."x[2]": there is no x[1]; number from 1 without gaps',
     ),
@@ -199,6 +210,16 @@ MISTAKES = [
         "scale = 2",
         "scale = nan",
         'two.toml:28: connections."cruise[i].target_speed".scale: takes a finite number, not nan',
+    ),
+    (
+        "scale = 2",
+        'threshold = "high"',
+        "two.toml:28: connections.\"cruise[i].target_speed\".threshold: takes a finite number, not 'high'",
+    ),
+    (
+        "scale = 2",
+        "optional = 1",
+        'two.toml:28: connections."cruise[i].target_speed".optional: takes true or false, not 1',
     ),
     (
         'from = "target.value", ',
@@ -345,6 +366,22 @@ def test_a_preset_nobody_defined_is_told_once_for_all_published_values():
     text = edited(('default_preset = "nominal"\n', ""))
     text += '\n[[published]]\nmetric = "settling"\npreset = "nominal"\nclaim = "x"\norigin = "stated"\n'
     assert len([p for p in problems(text) if "nominal" in p]) == 1
+
+
+def test_a_connection_without_quotes_is_one():
+    """A dotted key of TOML is a table in a table."""
+    quoted, plain = (
+        loads(edited(("[presets.gentle]", f'{key} = "train[1].speed"\n[presets.gentle]')))
+        for key in ('"target.gain"', "target.gain")
+    )
+    assert quoted.connections[-1].target == "target.gain"
+    assert plain.connections == quoted.connections
+
+
+def test_a_panel_that_is_no_table_is_left_to_those_who_draw():
+    system = loads(edited(('y = ["train[:].speed", "target.value"]', "panels = [3]")))
+    (problem,) = check_figures(system.judged.figures, [])
+    assert str(problem).endswith("panels must be a list of tables, each with y")
 
 
 def test_no_instances():

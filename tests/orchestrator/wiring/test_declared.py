@@ -127,3 +127,14 @@ def test_what_belongs_beside_an_input_comes_from_where_that_comes(resolve, more,
     )
     assert (note in wiring.notes) == (bool(sources) and not more)
     assert wiring.problems == []
+
+
+def test_nothing_comes_beside_an_input_where_its_source_has_no_such_output(resolve):
+    """The slope from elsewhere than a line: curves and tunnels stay at their start value."""
+    system = System()
+    system.add("gust", "Gust")
+    system.add("train", "PointMassTrain", force=0.0)
+    system.connect("gust.acceleration", "train.line_resistance")
+    wiring = resolve(system)
+    assert [str(link.target) for link in wiring.links] == ["train.line_resistance"]
+    assert not any("curve_resistance" in note for note in wiring.notes)
