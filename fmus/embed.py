@@ -95,12 +95,17 @@ def _add_user_file(path: Path, cls: type[Component], files: dict[str, str]) -> N
     text = path.read_text(encoding="utf-8-sig")
     files[name] = ""  # known from here on: two local modules may import one another
     replacements = []
-    for node in ast.walk(ast.parse(text, str(path))):
-        if isinstance(node, ast.Import | ast.ImportFrom):
-            replacement = _localised(node, path, cls, files)
-            if replacement is not None:
-                replacements.append((node, replacement))
+    for node in _imports(text, path):
+        replacement = _localised(node, path, cls, files)
+        if replacement is not None:
+            replacements.append((node, replacement))
     files[name] = _replaced(text, replacements)
+
+
+@functools.lru_cache(maxsize=32)
+def _imports(text: str, path: Path) -> tuple[ast.Import | ast.ImportFrom, ...]:
+    """The import statements of a file; a scenario asks for those of one file once for each instance."""
+    return tuple(node for node in ast.walk(ast.parse(text, str(path))) if isinstance(node, ast.Import | ast.ImportFrom))
 
 
 def _localised(

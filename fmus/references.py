@@ -3,14 +3,16 @@
 from __future__ import annotations
 
 import contextlib
+import functools
 import hashlib
 import importlib
+import importlib.machinery
 import importlib.util
 import json
 import sys
 from collections.abc import Iterator, Mapping
 from pathlib import Path
-from types import ModuleType
+from types import CodeType, ModuleType
 from typing import Any
 
 from ..components import CATALOGUE, Component, ComponentError
@@ -81,18 +83,29 @@ def _load_file(path: Path) -> ModuleType:
     if not path.is_file():
         raise ComponentError(f"there is no file {path}")
     name = f"railcosim_user_{hashlib.sha256(str(path).encode()).hexdigest()[:16]}"
-    spec = importlib.util.spec_from_file_location(name, path)
-    if spec is None or spec.loader is None:
-        raise ComponentError(f"{path} cannot be read as Python")
-    module = importlib.util.module_from_spec(spec)
+    loader = _Loader(name, str(path))
+    module = importlib.util.module_from_spec(importlib.machinery.ModuleSpec(name, loader, origin=str(path)))
+    module.__file__ = str(path)
     sys.modules[name] = module
     try:
         with _neighbours(path.parent):
-            spec.loader.exec_module(module)
+            loader.exec_module(module)
     except Exception as error:
         line = _line_in(error, path)
         raise ComponentError(f"{path}{f':{line}' if line else ''}: {type(error).__name__}: {error}") from error
     return module
+
+
+class _Loader(importlib.machinery.SourceFileLoader):
+    """Compiles what the file holds now, and the same text once; a compiled file beside it could be older."""
+
+    def get_code(self, fullname: str) -> CodeType:
+        return _compiled(self.get_data(self.path), self.path)
+
+
+@functools.lru_cache(maxsize=32)
+def _compiled(source: bytes, path: str) -> CodeType:
+    return compile(source, path, "exec", dont_inherit=True)
 
 
 @contextlib.contextmanager

@@ -7,6 +7,7 @@ bytes.
 
 from __future__ import annotations
 
+import functools
 import html
 from typing import Any
 
@@ -43,34 +44,42 @@ class Formulas:
         return f'<svg width="0" height="0" style="position:absolute" aria-hidden="true"><defs>{letters}</defs></svg>'
 
     def _svg(self, latex: str) -> str:
-        from matplotlib.font_manager import FontProperties  # noqa: PLC0415 (slow; a cache hit does not need it)
-        from matplotlib.textpath import TextToPath  # noqa: PLC0415
-
-        font, text = FontProperties(math_fontfamily="cm"), TextToPath()
-        try:
-            letters, outlines, bars = text.get_glyphs_mathtext(font, f"${latex}$")
-            extent = text.get_text_width_height_descent(f"${latex}$", font, ismath=True)
-        except ValueError as error:
-            reason = str(error).strip().splitlines()[-1]
-            raise ComponentError(f"the formula {latex!r} cannot be read: {reason}") from None
+        letters, outlines, bars, box, (width, height, depth) = _laid_out(latex)
         places = list(self._outlines)
         drawn = []
         for name, x, y, size in letters:
             if name not in self._outlines:
-                self._outlines[name] = _path(*outlines[name])
+                self._outlines[name] = outlines[name]
                 places.append(name)
             place = f"translate({_number(x)} {_number(-y)})" + (f"scale({_number(size)})" if size != 1.0 else "")
             drawn.append(f'<use href="#letter{places.index(name)}" transform="{place}"/>')
-        drawn += (f'<path d="{_path(*bar)}"/>' for bar in bars)
-        # The layout is in units of which a font has FONT_SCALE to its size, the extent in points of the font's size.
-        width, height, depth = (float(x) / font.get_size_in_points() * _SIZE for x in extent)
-        unit = text.FONT_SCALE / _SIZE
-        box = " ".join(_number(x * unit) for x in (0.0, depth - height, width, height))
+        drawn += (f'<path d="{bar}"/>' for bar in bars)
         return (
             f'<svg role="img" aria-label="{html.escape(latex)}" viewBox="{box}" width="{_number(width)}" '
             f'height="{_number(height)}" style="vertical-align:{_number(-depth)}px" fill="currentColor">'
             f"{''.join(drawn)}</svg>"
         )
+
+
+@functools.cache
+def _laid_out(latex: str) -> tuple[list[Any], dict[str, str], list[str], str, tuple[float, ...]]:
+    """Letters with their places, outlines by letter, bars, the box, and width, height and depth; the same each time."""
+    from matplotlib.font_manager import FontProperties  # noqa: PLC0415 (slow; a cache hit does not need it)
+    from matplotlib.textpath import TextToPath  # noqa: PLC0415
+
+    font, text = FontProperties(math_fontfamily="cm"), TextToPath()
+    try:
+        letters, outlines, bars = text.get_glyphs_mathtext(font, f"${latex}$")
+        extent = text.get_text_width_height_descent(f"${latex}$", font, ismath=True)
+    except ValueError as error:
+        reason = str(error).strip().splitlines()[-1]
+        raise ComponentError(f"the formula {latex!r} cannot be read: {reason}") from None
+    # The layout is in units of which a font has FONT_SCALE to its size, the extent in points of the font's size.
+    width, height, depth = (float(x) / font.get_size_in_points() * _SIZE for x in extent)
+    unit = text.FONT_SCALE / _SIZE
+    box = " ".join(_number(x * unit) for x in (0.0, depth - height, width, height))
+    drawn = {name: _path(*outline) for name, outline in outlines.items()}
+    return list(letters), drawn, [_path(*bar) for bar in bars], box, (width, height, depth)
 
 
 def _path(points: Any, codes: Any) -> str:

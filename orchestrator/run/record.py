@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import functools
 import hashlib
 import importlib.metadata
 import json
@@ -24,6 +25,7 @@ from .outcome import Run
 from .step_check import StepCheck
 
 _PACKAGES = ("railcosim", "fmpy", "pythonfmu", "numpy", "scipy")
+_version = functools.cache(importlib.metadata.version)  # which reads a file of 20 kB each time
 
 
 def write(place: RunDirectory, checked: Checked, kind: str, *, anew: bool = True) -> None:
@@ -131,7 +133,7 @@ def _describe(system: System, checked: Checked, kind: str) -> dict[str, Any]:
         "delays": {c.target: c.delay for c in system.connections if c.delay},
         "kind": kind,
         "notes": list(checked.notes),
-        "versions": {package: importlib.metadata.version(package) for package in _PACKAGES},
+        "versions": {package: _version(package) for package in _PACKAGES},
         "python": platform.python_version(),
         "platform": platform.platform(),
         "instances": {
