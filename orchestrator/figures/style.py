@@ -5,6 +5,7 @@ matplotlib is imported where it is used: importing it costs more than most comma
 
 from __future__ import annotations
 
+import io
 import textwrap
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -80,8 +81,9 @@ def page(
         lines = [line for part in title.splitlines() for line in textwrap.wrap(part, letters)]
         figure.suptitle("\n".join(lines), x=0.01, ha="left", fontsize=title_size, fontweight="bold")
         yield list(figure.subplots(panels, 1, sharex=share_x, squeeze=False)[:, 0])
-        with world.open(path, "wb") as stream:
-            figure.savefig(stream, format=path.suffix[1:], metadata=_NAMELESS[path.suffix])
+        drawn = io.BytesIO()  # of a figure that cannot be drawn, no file is begun
+        figure.savefig(drawn, format=path.suffix[1:], metadata=_NAMELESS[path.suffix])
+        world.write_bytes(path, drawn.getvalue())
 
 
 def colour(k: int, count: int) -> Any:

@@ -30,16 +30,17 @@ def test_a_ratio_has_the_unit_of_output_over_input(output, input, ratio):
 
 def test_a_bode_diagram_has_the_unit_of_output_over_input(a_model, tmp_path, monkeypatch):
     """A lag of a speed behind an acceleration: |G| is in seconds, though the speed itself is not."""
-    labels = {}
+    kept = []
 
-    def keep(figure, path, **_):
-        labels[path.name] = [ax.get_ylabel() for ax in figure.axes]
+    def keep(figure, *_, **__):
+        kept.append([ax.get_ylabel() for ax in figure.axes])
 
     monkeypatch.setattr(Figure, "savefig", keep)
     model = replace(
         a_model([[-1.0]], [1.0], [1.0], outputs=["train.speed"]), units={"train.speed": "m/s", "u0": "m/s2"}
     )
-    draw_linear(model, stability(model), [], tmp_path)
+    paths = draw_linear(model, stability(model), [], tmp_path)
+    labels = {path.name: shown for path, shown in zip(paths, kept, strict=True)}
     assert labels["bode.png"] == ["train speed\n|G| [s]", "phase [°]"]
     assert labels["step-u0.png"] == ["train speed [m/s]"]
 
@@ -52,15 +53,15 @@ def test_figures_are_written_in_the_format_asked_for(a_model, tmp_path):
 
 
 def test_a_gap_has_the_colour_of_the_train_behind_it_in_all_panels(a_model, tmp_path, monkeypatch):
-    kept = {}
+    kept = []
 
-    def keep(figure, path, **_):
-        kept[path.name] = [{line.get_label(): line.get_color() for line in ax.lines} for ax in figure.axes]
+    def keep(figure, *_, **__):
+        kept.append([{line.get_label(): line.get_color() for line in ax.lines} for ax in figure.axes])
 
     monkeypatch.setattr(Figure, "savefig", keep)
     names = [f"train[{i}].{what}" for what in ("position", "speed") for i in (1, 2, 3)]
     model = a_model(-np.eye(6), [1.0] * 6, np.eye(6), outputs=names)
-    draw_linear(model, stability(model), [], tmp_path)
-    gaps, speeds = kept["step-u0.png"]
+    names = [path.name for path in draw_linear(model, stability(model), [], tmp_path)]
+    gaps, speeds = kept[names.index("step-u0.png")]
     assert gaps == {"train 1 – 2": speeds["train 2"], "train 2 – 3": speeds["train 3"]}
     assert len(set(speeds.values())) == 3
