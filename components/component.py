@@ -266,9 +266,9 @@ class Component(ABC):
 
 def evaluated(component: Component, method: Method) -> Any:
     """What one of a component's equation methods returns; nothing changes and every trip is kept where it has none."""
-    equations: Callable[[], Any] | None = getattr(component, method, None)
-    if equations is None:
+    if not hasattr(type(component), method):  # the instance would look for what might have been meant
         return True if method == "keep" else {}
+    equations: Callable[[], Any] = getattr(component, method)
     return equations()
 
 

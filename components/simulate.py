@@ -265,7 +265,7 @@ class Simulation:
 
     def _computed_start_names(self) -> frozenset[str]:
         """The states and memory that ``initial`` computes."""
-        if not hasattr(self.component, "initial"):
+        if not hasattr(type(self.component), "initial"):
             return frozenset()
         try:
             computed, _ = initial_dependencies(self.component)
