@@ -73,6 +73,10 @@ class CouplingError(RunError):
     """The values that instances exchange do not settle: a coupling diverges, or a loop has no solution."""
 
 
+class RecordError(RunError):
+    """What a run records cannot be written: a disk is full, or a directory is gone."""
+
+
 class FmuError(RunError):
     """An FMU failed while it ran.
 

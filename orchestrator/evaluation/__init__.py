@@ -27,8 +27,8 @@ from .published import (
     judge_values,
     split_metric,
 )
-from .requirements import Verdict, check_requirements, judge_requirements, parse_requirement
-from .signals import Signals
+from .requirements import Verdict, check_requirements, judge_requirements, needed_signals, parse_requirement
+from .signals import Part, Signals
 from .syntax import Call, Node, Number, Operation, Reference
 
 __all__ = [
@@ -48,6 +48,7 @@ __all__ = [
     "Node",
     "Number",
     "Operation",
+    "Part",
     "Reference",
     "Signals",
     "Verdict",
@@ -63,6 +64,7 @@ __all__ = [
     "judge_requirements",
     "judge_values",
     "metric_indices",
+    "needed_signals",
     "parse",
     "parse_requirement",
     "split_metric",

@@ -6,18 +6,20 @@ arrays from anywhere.
 
 import re
 from collections.abc import Collection, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cached_property, lru_cache
 from typing import Any
 
 import numpy as np
 
-from ..errors import ExpressionError
+from ..errors import ExpressionError, WindowError
 from ..names import INDEX, plainly
 from ..problems import Problem, suggestion
-from .functions import ARITHMETIC, LOGIC, Function, Value, call_problem, logical, where
-from .signals import Signals
-from .syntax import Call, Group, Name, Node, Number, Operation, Reference, Span
+from .folds import Fold
+from .functions import ARITHMETIC, LOGIC, WINDOWS, Function, Value, call_problem, logical, where
+from .signals import Part, Signals, parts_of
+from .syntax import Call, Group, Name, Node, Number, Operation, Reference, Span, walk
+from .time_windows import scalar, span_of, window_of
 
 
 @dataclass(frozen=True)
@@ -28,6 +30,23 @@ class Scope:
     signals: Signals
     functions: Mapping[str, Function]
     constants: Mapping[str, Any]
+    whole: "Scope | None" = None
+    """The scope of the whole run, where this one is that of a part."""
+    reduced: dict[int, Value] = field(default_factory=dict)
+    """What calls of reducers gave, by the identity of the node."""
+
+    def of(self, part: Part) -> "Scope":
+        """The same for some points of the run."""
+        whole, constants = self.whole or self, self.constants
+        constants = {**constants, "time": part.time} if "time" in constants else constants
+        return Scope(self.text, part, self.functions, constants, whole)
+
+    def reduce(self, node: Call) -> Value:
+        """The value of a call of a reducer, which always sees the whole run."""
+        whole = self.whole or self
+        if id(node) not in whole.reduced:
+            whole.reduced[id(node)] = _reduce(node, whole)
+        return whole.reduced[id(node)]
 
     def error(self, problem: str | Problem) -> ExpressionError:
         """An error that quotes the expression."""
@@ -36,6 +55,8 @@ class Scope:
     @cached_property
     def names(self) -> frozenset[str]:
         """Recorded signals and parameters."""
+        if self.whole is not None:
+            return self.whole.names
         recorded, fixed = frozenset(self.signals.names()), self.signals.parameters
         return recorded | frozenset(fixed) if fixed else recorded
 
@@ -131,6 +152,8 @@ def evaluate(node: Node, scope: Scope) -> Value:  # noqa: PLR0911 (one a kind of
             if problem := call_problem(node, scope.functions):
                 raise scope.error(problem)
             function = scope.functions[name]
+            if function.reduces:
+                return scope.reduce(node)
             values = [_argument(argument, scope) for argument in arguments]
             named = dict(zip(keywords, values[len(values) - len(keywords) :], strict=True))
             first = [scope.signals] if function.takes_signals else []
@@ -146,6 +169,33 @@ def evaluate(node: Node, scope: Scope) -> Value:  # noqa: PLR0911 (one a kind of
                 result = logical(LOGIC[operator], result, value)
             return result
     raise scope.error("a list is only understood as an argument")
+
+
+def _reduce(node: Call, scope: Scope) -> Value:
+    """Show a reducer the whole run, part by part."""
+    function = scope.functions[node.name]
+    plain = len(node.arguments) - len(node.keywords)
+    signature = function.arguments
+    named = dict(zip(node.keywords, node.arguments[plain:], strict=True))
+    given = signature.bind(*node.arguments[:plain], **named).arguments
+    fixed = {
+        name: scalar(_argument(argument, scope), f"the {name} of {node.name}")
+        for name, argument in given.items()
+        if signature.parameters[name].annotation is float
+    }
+    bounds = {name: _argument(given[name], scope) if name in given else None for name in WINDOWS["span"]}
+    span = span_of(scope.signals, **bounds, half_open=function.window == "phase")
+    varying = {name: given[name] for name in given if name not in fixed and name not in bounds}
+    beyond = sum(isinstance(part, Call) and part.name == "at_sample" for part in walk(node))
+    fold: Fold | None = None
+    for part in parts_of(scope.signals, beyond):
+        inside = scope.of(part)
+        rows, new = function.call(span, **fixed, **{name: _argument(x, inside) for name, x in varying.items()})
+        fold = new if fold is None else fold
+        fold.see(window_of(part, rows, span))
+    if fold is None:
+        raise WindowError(Problem("", "no recorded point lies in the window", "widen it, or record more often"))
+    return np.asarray(fold.value())
 
 
 def _argument(node: Node, scope: Scope) -> Any:

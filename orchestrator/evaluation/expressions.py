@@ -133,7 +133,9 @@ class Expression:
         return any(any(alone.resolve(names, index)) for index in alone.instances(names))
 
     def _scope(self, signals: Signals, constants: Mapping[str, Any]) -> Scope:
-        every = {**CONSTANTS, "time": signals.time, **constants}
+        every = {**CONSTANTS, **constants}
+        if re.search(r"\btime\b", self.text):
+            every["time"] = signals.time
         if "count" in self.text and "count" not in every:
             every["count"] = self.count([*signals.names(), *signals.parameters])
         return Scope(self.text, signals, self.functions, every)

@@ -7,7 +7,7 @@ import inspect
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Any, TypeAlias
+from typing import Any, Literal, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,18 +15,30 @@ from numpy.typing import NDArray
 from ..problems import Problem, suggestion
 from .syntax import Call, Group
 
+WINDOWS = {"span": ("after", "until", "outside"), "phase": ("after", "until")}
+"""The arguments by which a user bounds what is reduced; a phase does not contain the point at its end."""
 CONSTANTS = {"pi": np.pi, "inf": np.inf, "nan": np.nan, "true": True, "false": False}
 Value: TypeAlias = NDArray[Any]
 
 
 @dataclass(frozen=True)
 class Function:
-    """A function expressions may call. With `takes_signals` its first argument is the run, which the user omits."""
+    """A function expressions may call. With `takes_signals` its first argument is the run, which the user omits.
+
+    With a `window` it reduces the run to one number. Its first argument, which the user omits too, is then the `Span`
+    that counts. It returns the rows to be looked at, shape (T,) or (n, T), and the `Fold` that looks at them. Arguments
+    annotated as `float` are one number for the whole run, the others vary over time.
+    """
 
     call: Callable[..., Any]
     unit: str = ""  # of the result: a unit, "same" as the first argument, "per s" of it, or unknown
     takes_signals: bool = False
-    reduces: bool = False  # over time, to one number
+    window: Literal["", "all", "span", "phase"] = ""
+
+    @property
+    def reduces(self) -> bool:
+        """Whether it makes one number of all time."""
+        return bool(self.window)
 
     @cached_property
     def arguments(self) -> inspect.Signature:
@@ -35,7 +47,14 @@ class Function:
             names = ("x",) if self.call.nin == 1 else ("a", "b")
             return inspect.Signature([inspect.Parameter(name, inspect.Parameter.POSITIONAL_ONLY) for name in names])
         signature = inspect.signature(self.call)
-        return signature.replace(parameters=list(signature.parameters.values())[int(self.takes_signals) :])
+        own = list(signature.parameters.values())[int(self.takes_signals or self.reduces) :]
+        window = [inspect.Parameter(name, inspect.Parameter.KEYWORD_ONLY, default=None) for name in self.bounds]
+        return signature.replace(parameters=[*own, *window])
+
+    @property
+    def bounds(self) -> tuple[str, ...]:
+        """The arguments that bound the window in time."""
+        return WINDOWS.get(self.window, ())
 
 
 def logical(operation: Callable[..., Value], *operands: Value) -> Value:

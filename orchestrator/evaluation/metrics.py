@@ -1,26 +1,26 @@
 """Named figures of merit: expressions over reducers, which turn recorded signals into one number.
 
-Every reducer is defined in `docs/metrics.md`. They see the recorded points only. Over several rows (`train[:].speed`)
-a reducer gives one number for the whole. NaN in the window gives NaN; a window the run does not cover is an error
-(`WindowError`), never a number.
+Every reducer is defined in `docs/metrics.md`. Over several rows (`train[:].speed`) it gives one number for the whole.
+NaN in the window gives NaN; a window the run does not cover is an error (`WindowError`), never a number.
 """
 
 from collections.abc import Callable, Collection, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from ..errors import ExpressionError, WindowError
+from ..errors import ExpressionError
 from ..problems import Problem
-from ..times import digits
+from . import folds
 from .expressions import Expression, parse
+from .folds import Fold
 from .functions import ELEMENTWISE, Function
 from .platoon import PLATOON
 from .signals import Signals
 from .syntax import Call, Node, Number, Operation, Reference
-from .time_windows import Window, scalar, time_windows, window_of
+from .time_windows import Span
 
 Array = NDArray[np.float64]
 
@@ -37,98 +37,35 @@ COMFORT_SCALE = (
 )
 
 
-def _largest(values: Array) -> float:
-    """The value of largest magnitude with its sign: one number for rows that each have one."""
-    return float(values[np.argmax(np.abs(values))])
+def _plain(make: Callable[[], Fold]) -> Callable[..., tuple[Array, Fold]]:
+    """The common form of a reducer: one signal."""
+    return lambda _, x: (x, make())
 
 
-def _spread(window: Window) -> float:
-    return float((window.kept.max(axis=0) - window.kept.min(axis=0)).max())
+def _traction_energy(_: Span, force: Array, speed: Array) -> tuple[Array, Fold]:
+    return np.maximum(force * speed, 0.0), folds.integral()
 
 
-def _duration(window: Window) -> float:
-    return float(replace(window, rows=(window.rows != 0).astype(np.float64)).integral().max())
+def _braking_energy(_: Span, force: Array, speed: Array) -> tuple[Array, Fold]:
+    return np.maximum(-force * speed, 0.0), folds.integral()
 
 
-def _rms(window: Window) -> float:
-    return float(np.sqrt(replace(window, rows=np.square(window.rows)).mean().max()))
+def _at(span: Span, x: Array, t: float) -> tuple[Array, Fold]:
+    return x, folds.Value(t, span)
 
 
-def _plain(rule: Callable[[Window], Any]) -> Callable[..., float]:
-    """The common form of a reducer: one signal and the three window arguments."""
-
-    def reducer(signals: Signals, x: Any, *, after: Any = None, until: Any = None, outside: Any = None) -> float:
-        return window_of(signals, x, after, until, outside).reduce(rule)
-
-    return reducer
+def _settling_time(_: Span, x: Array, band: float) -> tuple[Array, Fold]:
+    return x, folds.settling(lambda rows: np.abs(rows) > band, tolerates_nan=False)
 
 
-def _traction_energy(
-    signals: Signals, force: Array, speed: Array, *, after: Any = None, until: Any = None, outside: Any = None
-) -> float:
-    window = window_of(signals, np.maximum(force * speed, 0.0), after, until, outside)
-    return window.reduce(lambda w: w.integral().sum())
+def _overshoot(_: Span, x: Array, reference: Array) -> tuple[Array, Fold]:
+    return x - reference, folds.overshoot()
 
 
-def _braking_energy(
-    signals: Signals, force: Array, speed: Array, *, after: Any = None, until: Any = None, outside: Any = None
-) -> float:
-    return _traction_energy(signals, -force, speed, after=after, until=until, outside=outside)
-
-
-def _at(signals: Signals, x: Any, t: Any) -> float:
-    moment, time = scalar(t, "the time of at(x, t)"), signals.time
-    slack = 1e-6 * signals.step
-    if not time.size or not time[0] - slack <= moment <= time[-1] + slack:
-        raise WindowError(f"no recorded points around t = {digits(moment)} s")
-    values = np.array([np.interp(moment, time, row) for row in window_of(signals, x).rows])
-    return np.nan if np.isnan(values).any() else _largest(values)
-
-
-def _settling_time(
-    signals: Signals, x: Any, band: Any, *, after: Any = None, until: Any = None, outside: Any = None
-) -> float:
-    limit = scalar(band, "the band of settling_time")
-
-    def settled(window: Window) -> float:
-        times = window.time[window.points]
-        beyond = np.flatnonzero((np.abs(window.kept) > limit).any(axis=0))
-        first = int(beyond[-1]) + 1 if beyond.size else 0
-        return float(times[first]) if first < times.size else np.inf
-
-    return window_of(signals, x, after, until, outside).reduce(settled)
-
-
-def _overshoot(
-    signals: Signals, x: Array, reference: Array, *, after: Any = None, until: Any = None, outside: Any = None
-) -> float:
-    def beyond(window: Window) -> float:
-        # the side a row starts on tells which way is "over"; from a start on the reference both are
-        side = -np.sign(window.kept[:, :1])
-        return float(np.where(side == 0, np.abs(window.kept), side * window.kept).max(initial=0.0))
-
-    return window_of(signals, x - reference, after, until, outside).reduce(beyond)
-
-
-def _mean_jerk(
-    signals: Signals, x: Any, window: Any = 1.0, *, after: Any = None, until: Any = None, outside: Any = None
-) -> float:
-    width, slack = scalar(window, "the window of mean_jerk"), 1e-6 * signals.step
-    if not width > 0:
+def _mean_jerk(span: Span, x: Array, window: float = 1.0) -> tuple[Array, Fold]:
+    if not window > 0:
         raise ExpressionError("the window of mean_jerk must be longer than 0 s")
-    excluded = [] if outside is None else time_windows(outside)
-
-    def steepest(seen: Window) -> float:
-        time = seen.time
-        starts = seen.points & (time + width <= time[seen.points][-1] + slack)
-        for a, b in excluded:
-            starts &= ~((time <= b + slack) & (time + width >= a - slack))
-        if not starts.any():
-            raise WindowError(f"mean_jerk needs recorded points {digits(width)} s apart in the window")
-        later = np.array([np.interp(time[starts] + width, time, row) for row in seen.rows])
-        return float(np.abs(later - seen.rows[:, starts]).max() / width)
-
-    return window_of(signals, x, after, until, outside).reduce(steepest)
+    return x, folds.MeanJerk(window, span)
 
 
 def _at_sample(signals: Signals, x: Array) -> Array:
@@ -140,25 +77,24 @@ def _at_sample(signals: Signals, x: Array) -> Array:
     return np.concatenate([x[..., 1:], x[..., -1:]], axis=-1)
 
 
-EVERY_STEP = Problem("", "at_sample needs every communication step recorded", "set record = step, or leave record out")
-_PLAIN: dict[str, tuple[str, Callable[[Window], Any]]] = {  # name: unit, rule
-    "min": ("same", lambda w: w.kept.min()),
-    "max": ("same", lambda w: w.kept.max()),
-    "peak": ("same", lambda w: np.abs(w.kept).max()),
-    "comfort": ("same", lambda w: np.abs(w.kept).max()),
-    "initial": ("same", lambda w: _largest(w.kept[:, 0])),
-    "final": ("same", lambda w: _largest(w.kept[:, -1])),
-    "mean": ("same", lambda w: w.mean().mean()),
-    "rms": ("same", _rms),
-    "spread": ("same", _spread),
-    "integral": ("", lambda w: w.integral().sum()),
-    "duration": ("s", _duration),
-    "first_time": ("s", lambda w: w.times().min(initial=np.inf)),
-    "last_time": ("s", lambda w: w.times()[-1] if w.times().size else np.inf),
-    "jerk": ("per s", lambda w: np.abs(w.slopes()).max()),
+EVERY_STEP = Problem("", "at_sample needs steps of one length", "take an algorithm that keeps the step")
+_PLAIN: dict[str, tuple[str, Callable[[], Fold]]] = {  # name: unit, fold
+    "min": ("same", folds.minimum),
+    "max": ("same", folds.maximum),
+    "peak": ("same", folds.peaks),
+    "comfort": ("same", folds.peaks),
+    "initial": ("same", folds.initial),
+    "final": ("same", folds.final),
+    "mean": ("same", lambda: folds.means(np.mean)),
+    "rms": ("same", lambda: folds.means(lambda means: np.sqrt(means.max()), squares=True)),
+    "spread": ("same", folds.spread),
+    "integral": ("", folds.integral),
+    "duration": ("s", folds.duration),
+    "first_time": ("s", folds.first_time),
+    "last_time": ("s", folds.last_time),
+    "jerk": ("per s", folds.jerk),
 }
 _OTHERS: dict[str, tuple[str, Callable[..., Any]]] = {
-    "at": ("same", _at),
     "overshoot": ("same", _overshoot),
     "settling_time": ("s", _settling_time),
     "mean_jerk": ("per s", _mean_jerk),
@@ -166,12 +102,10 @@ _OTHERS: dict[str, tuple[str, Callable[..., Any]]] = {
     "braking_energy": ("J", _braking_energy),
 }
 REDUCERS: dict[str, Function] = {
-    name: Function(call, unit, takes_signals=True, reduces=True)
-    for name, (unit, call) in {
-        **{name: (unit, _plain(rule)) for name, (unit, rule) in _PLAIN.items()},
-        **_OTHERS,
-        **PLATOON,
-    }.items()
+    **{name: Function(_plain(make), unit, window="span") for name, (unit, make) in _PLAIN.items()},
+    **{name: Function(call, unit, window="span") for name, (unit, call) in _OTHERS.items()},
+    "at": Function(_at, "same", window="all"),
+    **PLATOON,
 }
 FUNCTIONS: dict[str, Function] = {
     **ELEMENTWISE,
@@ -266,14 +200,14 @@ class MetricChange:
 
 
 def check_metrics(
-    table: Mapping[str, str], names: Collection[str], every_step: bool = True, parameters: Collection[str] | None = None
+    table: Mapping[str, str], names: Collection[str], steady: bool = True, parameters: Collection[str] | None = None
 ) -> list[Problem]:
     """Every problem of a [metrics] table that can be found before a run.
 
     Args:
         table: the expressions by name.
         names: the signals to be recorded and the parameters.
-        every_step: whether each communication step is recorded.
+        steady: whether communication steps are of one length.
         parameters: which of the names are parameters; without it a forgotten reducer shows only after the run.
     """
     problems: list[Problem] = []
@@ -288,7 +222,7 @@ def check_metrics(
         if not found and parameters is not None and _varies(expression, expression.tree, names, parameters):
             found = [_not_reduced(text)]
         problems += [problem.at(place) for problem in found]
-        if expression.calls("at_sample") and not every_step:
+        if expression.calls("at_sample") and not steady:
             problems.append(EVERY_STEP.at(f"{place}: '{text}'"))
     return problems
 

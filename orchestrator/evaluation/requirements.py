@@ -6,9 +6,10 @@ Numbers that differ by rounding are equal: their margin is 0. The grammar and it
 """
 
 import re
-from collections.abc import Collection, Iterator, Mapping
+from collections.abc import Callable, Collection, Iterator, Mapping
 from dataclasses import dataclass
-from typing import Any, Literal, NamedTuple
+from functools import partial
+from typing import Literal, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,19 +18,17 @@ from ..errors import ExpressionError, WindowError
 from ..names import SignalName
 from ..problems import Problem, suggestion
 from ..times import digits, slack
-from .calculation import Scope, evaluate
+from .calculation import Scope
 from .expressions import Expression, evaluate_constant, parse
 from .functions import CONSTANTS
 from .metrics import EVERY_STEP, FUNCTIONS
-from .signals import Rehearsal, Signals
+from .signals import Rehearsal, Signals, parts_of
+from .slack import COMPARISONS, slack_of
 from .syntax import Call, Name, Node, Number, Operation, Reference, walk
-from .time_windows import scalar, select
+from .time_windows import Span, ends_of, scalar, window_of
 
 QUANTIFIERS = ("always", "eventually", "finally")
 CLAUSES = ("from", "until", "outside")
-COMPARISONS = ("<", "<=", ">", ">=", "==", "!=")
-ROUNDING = 4 * float(np.finfo(np.float64).eps)
-"""Numbers that differ by less than this share of what they are made of are equal: a start on a bound is on it."""
 _MISSING = "write always, eventually or finally, then a condition: always abs(train[i].acceleration) <= 1.0"
 
 
@@ -52,13 +51,6 @@ class Verdict:
     reason: str = ""
 
 
-class Slack(NamedTuple):
-    """Whether a condition holds, and by how much (negative: missed by; infinite: no measure), of one shape."""
-
-    holds: NDArray[np.bool_]
-    slack: NDArray[np.float64]
-
-
 @dataclass(frozen=True)
 class _Worst:
     """The deciding point for one index."""
@@ -67,62 +59,6 @@ class _Worst:
     slack: float
     time: float
     index: int | None
-
-
-def slack_of(node: Node, scope: Scope) -> Slack:
-    """The slack of a condition: b - a for a < b, the least for `and`, the most for `or`, negated for `not`.
-
-    A bare signal is a boolean: it holds where it is not zero and has no measure. NaN never holds.
-    """
-    match node:
-        case Operation(operator="not", operands=(operand,)):
-            holds, slack = slack_of(operand, scope)
-            return Slack(~holds & ~np.isnan(slack), -slack)
-        case Operation(operator="and" | "or" as operator, operands=operands):
-            parts = [slack_of(operand, scope) for operand in operands]
-            smaller = operator == "and"
-            slack = (np.minimum if smaller else np.maximum).reduce(np.broadcast_arrays(*(part.slack for part in parts)))
-            every = np.broadcast_arrays(*(part.holds for part in parts))
-            holds = (np.logical_and if smaller else np.logical_or).reduce(every)
-            return Slack(np.asarray(holds & ~np.isnan(slack)), np.asarray(slack))
-        case Operation(operator="if", operands=(condition, then, otherwise)):
-            choice = np.asarray(evaluate(condition, scope), dtype=np.float64)
-            yes, no = slack_of(then, scope), slack_of(otherwise, scope)
-            slack = np.where(np.isnan(choice), np.nan, np.where(choice, yes.slack, no.slack))
-            return Slack(np.where(choice, yes.holds, no.holds) & ~np.isnan(slack), slack)
-        case Operation(operator=operator, operands=(left, right)) if operator in COMPARISONS:
-            rounding = ROUNDING * np.maximum(_size(left, scope), _size(right, scope))
-            return _compare(operator, evaluate(left, scope), evaluate(right, scope), rounding)
-    value = np.asarray(evaluate(node, scope), dtype=np.float64)
-    slack = np.where(np.isnan(value), np.nan, np.where(value, np.inf, -np.inf))
-    return Slack(slack > 0, slack)
-
-
-def _size(node: Node, scope: Scope) -> NDArray[np.float64]:
-    """How large the numbers are that a value is made of: the rounding of a gap is that of the two positions."""
-    match node:
-        case Operation(operator="+" | "-" | "negative" | "positive", operands=operands):
-            parts = [_size(operand, scope) for operand in operands]
-        case Call(name="abs" | "minimum" | "maximum", arguments=arguments):
-            parts = [_size(argument, scope) for argument in arguments]
-        case _:
-            return np.abs(np.asarray(evaluate(node, scope), dtype=np.float64))
-    return np.asarray(np.maximum.reduce(np.broadcast_arrays(*parts)))
-
-
-def _compare(operator: str, left: NDArray[Any], right: NDArray[Any], rounding: NDArray[np.float64]) -> Slack:
-    a, b = np.asarray(left, dtype=np.float64), np.asarray(right, dtype=np.float64)
-    equal = (a == b) | (np.abs(b - a) <= np.where(np.isfinite(rounding), rounding, 0.0))
-    difference = np.where(equal, 0.0, b - a)  # inf - inf would be NaN
-    slack, holds = {
-        "<": (difference, (a < b) & ~equal),
-        "<=": (difference, (a <= b) | equal),
-        ">": (-difference, (a > b) & ~equal),
-        ">=": (-difference, (a >= b) | equal),
-        "==": (-np.abs(difference), equal),
-        "!=": (np.abs(difference), ~equal & ~np.isnan(difference)),
-    }[operator]
-    return Slack(np.asarray(holds), np.asarray(slack))
 
 
 class _Times(NamedTuple):
@@ -199,25 +135,28 @@ class Requirement:
             times = self.times(signals)
         except ExpressionError as error:
             return Verdict(self.name, self.text, "inconclusive", reason=str(error))
-        points = select(signals, times.start, times.end, times.outside)
+        first, last = ends_of(signals)
+        span = Span(times.start, times.end, times.outside, forgiven=slack(signals.step, first, last))
         indices = self.condition.instances([*signals.names(), *signals.parameters])
-        if not points.any() or not indices:
-            reason = "no signal has such an index" if points.any() else "no recorded point lies in its window"
-            return Verdict(self.name, self.text, "inconclusive", reason=reason)
+        if not indices:
+            return Verdict(self.name, self.text, "inconclusive", reason="no signal has such an index")
         try:
-            worst = min((self._worst(signals, points, index) for index in indices), key=_badness)
+            seen = [self.condition.apply(partial(self._look, span, index), signals, index) for index in indices]
         except WindowError as error:
             return Verdict(self.name, self.text, "inconclusive", reason=str(error))
-        verdict, reason = self._verdict(worst, signals, times.end)
+        judged = seen[0].points
+        if not judged:
+            return Verdict(self.name, self.text, "inconclusive", reason="no recorded point lies in its window")
+        worst = min((look.decisive() for look in seen), key=_badness)
+        verdict, reason = self._verdict(worst, signals, times.end, last)
         margin = None if np.isinf(worst.slack) else worst.slack
-        judged = 1 if self.quantifier == "finally" else int(points.sum())
+        judged = 1 if self.quantifier == "finally" else judged
         return Verdict(self.name, self.text, verdict, margin, worst.time, worst.index, judged, reason)
 
     def _verdict(
-        self, worst: _Worst, signals: Signals, end: float | None
+        self, worst: _Worst, signals: Signals, end: float | None, last: float
     ) -> tuple[Literal["pass", "fail", "inconclusive"], str]:
-        """The verdict and the reason for it, where it needs one."""
-        last = float(signals.time[-1])
+        """The verdict of a run that ends at the time `last`, and the reason for it, where it needs one."""
         reached = signals.completed if end is None else end <= last + slack(signals.step, last)
         # A number over the whole run (final, settling_time, ...) is not final before the run is.
         reducers = (isinstance(x, Call) and self.condition.functions[x.name].reduces for x in walk(self.condition.tree))
@@ -233,35 +172,69 @@ class Requirement:
             return "inconclusive", f"its window lasts until {digits(end)} s, the run only until {digits(last)} s"
         return "pass", ""
 
-    def _worst(self, signals: Signals, points: NDArray[np.bool_], index: int | None) -> _Worst:
-        """The point that decides for one index."""
-        holds, slack = self.condition.apply(slack_of, signals, index)
-        shape = np.broadcast_shapes(np.atleast_2d(slack).shape, (1, signals.time.size))
-        holds = np.broadcast_to(np.atleast_2d(holds), shape)[:, points]
-        slack = np.broadcast_to(np.atleast_2d(slack), shape)[:, points]
-        times = signals.time[points]
-        if self.quantifier == "finally":
-            holds, slack, times = holds[:, -1:], slack[:, -1:], times[-1:]
-        # The worst point: NaN before a violation before the smallest slack.
-        unknown = np.isnan(slack)
-        row, column = np.unravel_index(
-            int(np.lexsort((slack.ravel(), holds.ravel(), ~unknown.ravel()))[0]), slack.shape
+    def _look(self, span: Span, index: int | None, node: Node, scope: Scope) -> "_Look":
+        """At the condition for one index over the whole run, part by part."""
+        look = _Look(
+            self.quantifier, lambda row, rows: index if index is not None else self._row_number(scope, row, rows)
         )
-        met = bool(holds[row, column])
-        if self.quantifier == "eventually" and not unknown.any():
-            every = np.atleast_1d(holds.all(axis=0))  # the rows of a slice count together, at the best moment
-            column = np.lexsort((-slack.min(axis=0), ~every))[0]
-            row, met = np.argmin(slack[:, column]), bool(every[column])
-        number = index if index is not None else self._row_number(signals, int(row), slack.shape[0])
-        return _Worst(met, float(slack[row, column]), float(times[column]), number)
+        beyond = sum(isinstance(part, Call) and part.name == "at_sample" for part in walk(node))
+        for part in parts_of(scope.signals, beyond):
+            met, slack = (window_of(part, x, span) for x in np.broadcast_arrays(*slack_of(node, scope.of(part))))
+            look.see(slack.times, met.kept != 0.0, slack.kept)
+        return look
 
-    def _row_number(self, signals: Signals, row: int, rows: int) -> int | None:
+    def _row_number(self, scope: Scope, row: int, rows: int) -> int | None:
         """The index a row of a slice stands for: 3 for the second row of `train[2:].speed`."""
-        resolved = self.condition.resolve([*signals.names(), *signals.parameters])
+        resolved = self.condition.resolve(scope.names)
         for reference, names in zip(self.condition.references, resolved, strict=True):
             if reference.stacked and len(names) == rows:
                 return next(iter(SignalName.parse(names[row]).indices), None)
         return None
+
+
+class _Look:
+    """What decides a requirement, of what was seen so far.
+
+    Args:
+        quantifier: of the requirement. number: the index that a row stands for, of so many rows.
+    """
+
+    def __init__(self, quantifier: str, number: Callable[[int, int], int | None]) -> None:
+        self._quantifier, self._number = quantifier, number
+        self._worst: tuple[tuple[bool, bool, float, int], _Worst] | None = None
+        self._best: tuple[tuple[bool, float], _Worst] | None = None
+        self.points = 0
+
+    def see(self, time: NDArray[np.float64], holds: NDArray[np.bool_], slack: NDArray[np.float64]) -> None:
+        """Take in points that count: their times (T,), and the condition and its slack there (n, T)."""
+        self.points += len(time)
+        if not len(time):
+            return
+        if self._quantifier == "finally":
+            self._worst, time, holds, slack = None, time[-1:], holds[:, -1:], slack[:, -1:]
+        # The worst point: NaN before a violation before the smallest slack, before a row further ahead.
+        known = ~np.isnan(slack)
+        order = np.lexsort((slack.ravel(), holds.ravel(), known.ravel()))
+        row, column = (int(k) for k in np.unravel_index(int(order[0]), slack.shape))
+        key = (bool(known[row, column]), bool(holds[row, column]), float(slack[row, column]), row)
+        if self._worst is None or key < self._worst[0]:
+            self._worst = key, self._at(time, slack, bool(holds[row, column]), row, column)
+        if self._quantifier == "eventually":
+            every = holds.all(axis=0)  # the rows of a slice count together, at the best moment
+            column = int(np.lexsort((-slack.min(axis=0), ~every))[0])
+            best = (not every[column], -float(slack[:, column].min()))
+            if self._best is None or best < self._best[0]:
+                row = int(np.argmin(slack[:, column]))
+                self._best = best, self._at(time, slack, bool(every[column]), row, column)
+
+    def _at(self, time: NDArray[np.float64], slack: NDArray[np.float64], holds: bool, row: int, column: int) -> _Worst:
+        return _Worst(holds, float(slack[row, column]), float(time[column]), self._number(row, len(slack)))
+
+    def decisive(self) -> _Worst:
+        """The point that decides."""
+        assert self._worst is not None
+        worst = self._worst[1]
+        return worst if self._best is None or np.isnan(worst.slack) else self._best[1]
 
 
 def _badness(worst: _Worst) -> tuple[bool, bool, float]:
@@ -374,7 +347,7 @@ def parse_requirement(name: str, text: str) -> Requirement:
 
 
 def check_requirements(
-    table: Mapping[str, str], names: Collection[str], every_step: bool = True, parameters: Collection[str] | None = None
+    table: Mapping[str, str], names: Collection[str], steady: bool = True, parameters: Collection[str] | None = None
 ) -> list[Problem]:
     """Every problem of a [require] table that can be found before a run, as `metrics.check_metrics` does it."""
     problems: list[Problem] = []
@@ -386,9 +359,24 @@ def check_requirements(
             problems += error.at(place)
             continue
         problems += [problem.at(place) for problem in requirement.check(names, parameters)]
-        if requirement.condition.calls("at_sample") and not every_step:
+        if requirement.condition.calls("at_sample") and not steady:
             problems.append(EVERY_STEP.at(place))
     return problems
+
+
+def needed_signals(metrics: Mapping[str, str], requirements: Mapping[str, str], names: Collection[str]) -> set[str]:
+    """The signals and parameters that checked tables look at.
+
+    Args:
+        metrics: a [metrics] table.
+        requirements: a [require] table.
+        names: the signals to be recorded and the parameters.
+    """
+    parsed = [parse_requirement(name, text) for name, text in requirements.items()]
+    looks = [parse(text, FUNCTIONS) for text in metrics.values()]
+    looks += [look for requirement in parsed for look in (requirement.condition, *requirement.moments)]
+    found = (look.resolve(names, index) for look in looks for index in look.instances(names))
+    return {name for group in found for resolved in group for name in resolved}
 
 
 def judge_requirements(table: Mapping[str, str], signals: Signals) -> list[Verdict]:

@@ -1,10 +1,15 @@
-"""What recorded signals are to an expression: a run, or the rehearsal of one."""
+"""What recorded signals are to an expression: a run, some of its points, or the rehearsal of one."""
 
-from collections.abc import Collection, Mapping
+from collections.abc import Collection, Iterator, Mapping
+from dataclasses import dataclass
 from typing import Any, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
+
+BLOCK = 8192
+"""Points that are looked at together. Sums are made of those of blocks, so that it does not matter where these come
+from: memory, a file, or a run that still goes on."""
 
 
 class Signals(Protocol):
@@ -13,6 +18,13 @@ class Signals(Protocol):
     @property
     def time(self) -> NDArray[np.float64]:
         """Recorded points [s], shape (T,)."""
+
+    @property
+    def points(self) -> int:
+        """How many there are: T."""
+
+    def part(self, first: int, last: int, /) -> Mapping[str, NDArray[Any]]:
+        """The signals, and `time`, at the points from a number up to another, which is not among them."""
 
     @property
     def step(self) -> float:
@@ -40,10 +52,86 @@ class Signals(Protocol):
     def __getitem__(self, name: str, /) -> NDArray[Any]: ...
 
 
+@dataclass(frozen=True)
+class Part:
+    """A run at some of its points.
+
+    Attributes:
+        whole: all of it. columns: the signals, and `time`, at these points.
+        overlap: how many of the first points are those of the part before. beyond: how many of the last are those of
+            the next one.
+    """
+
+    whole: Signals
+    columns: Mapping[str, NDArray[Any]]
+    overlap: int
+    beyond: int
+
+    @property
+    def time(self) -> NDArray[np.float64]:
+        """As `Signals` has it."""
+        return self.columns["time"]
+
+    @property
+    def points(self) -> int:
+        """As `Signals` has it."""
+        return len(self.time)
+
+    def part(self, first: int, last: int, /) -> Mapping[str, NDArray[Any]]:
+        """As `Signals` has it."""
+        raise NotImplementedError("parts have no parts")  # pragma: no cover: what reduces sees the whole
+
+    @property
+    def step(self) -> float:
+        """As `Signals` has it."""
+        return self.whole.step
+
+    @property
+    def completed(self) -> bool:
+        """As `Signals` has it."""
+        return self.whole.completed
+
+    @property
+    def stop_time(self) -> float:
+        """As `Signals` has it."""
+        return self.whole.stop_time
+
+    @property
+    def units(self) -> Mapping[str, str]:
+        """As `Signals` has it."""
+        return self.whole.units
+
+    @property
+    def parameters(self) -> Mapping[str, float | int | bool | str]:
+        """As `Signals` has it."""
+        return self.whole.parameters
+
+    def names(self) -> Collection[str]:
+        """As `Signals` has it."""
+        return self.whole.names()
+
+    def __getitem__(self, name: str, /) -> NDArray[Any]:
+        return self.columns[name]
+
+
+def parts_of(signals: Signals, beyond: int = 0) -> Iterator[Part]:
+    """A run in parts that overlap by a point, so that every interval is in one of them.
+
+    Args:
+        signals: the run.
+        beyond: how many points of the next part each has as well.
+    """
+    count = signals.points
+    for first in range(0, count, BLOCK):
+        last, overlap = min(first + BLOCK, count), int(first > 0)
+        end = min(last + beyond, count)
+        yield Part(signals, signals.part(first - overlap, end), overlap, end - last)
+
+
 class Rehearsal:
     """Signals that have names but only made-up values: what can go wrong with shapes goes wrong before the run."""
 
-    step, completed, stop_time = 1.0, True, 2.0
+    step, completed, stop_time, points = 1.0, True, 2.0, 3
     time: NDArray[np.float64] = np.arange(3.0)
 
     def __init__(self, names: Collection[str]) -> None:
@@ -57,3 +145,15 @@ class Rehearsal:
 
     def __getitem__(self, name: str, /) -> NDArray[Any]:
         return np.ones(3)
+
+    def part(self, first: int, last: int, /) -> Mapping[str, NDArray[Any]]:
+        """As `Signals` has it."""
+        return _Ones(self.time[first:last])
+
+
+class _Ones(dict[str, NDArray[Any]]):
+    def __init__(self, time: NDArray[np.float64]) -> None:
+        super().__init__(time=time)
+
+    def __missing__(self, name: str) -> NDArray[Any]:
+        return np.ones(len(self["time"]))

@@ -1,6 +1,6 @@
-"""Which recorded points of a signal count: the windows that every reducer takes."""
+"""Which points of a signal count: the windows that every reducer takes."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -10,49 +10,85 @@ from numpy.typing import NDArray
 from ..errors import ExpressionError, WindowError
 from ..problems import Problem
 from ..times import digits, slack
-from .signals import Signals
+from .signals import Part, Signals
 
 Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)
+class Span:
+    """Which points of a run count.
+
+    Attributes:
+        after, until: the first and the last time in s, if there are such; outside: closed intervals that do not count.
+        half_open: whether the point at `until` does not count either: at the end of a phase the reference has already
+            the next one's value.
+        begin: what times in the window are counted from, in s.
+        forgiven: how far beside a time a point may lie, because 3 * 0.1 is not 0.3.
+    """
+
+    after: float | None
+    until: float | None
+    outside: Sequence[tuple[float, float]] = ()
+    half_open: bool = False
+    begin: float = 0.0
+    forgiven: float = 0.0
+
+    def points(self, time: Array) -> NDArray[np.bool_]:
+        """Whether each of some times counts; shape (T,)."""
+        chosen, forgiven = np.ones(time.shape, dtype=np.bool_), self.forgiven
+        if self.after is not None:
+            chosen &= time >= self.after - forgiven
+        if self.until is not None:
+            chosen &= time < self.until - forgiven if self.half_open else time <= self.until + forgiven
+        for first, last in self.outside:
+            chosen &= ~((time >= first - forgiven) & (time <= last + forgiven))
+        return chosen
+
+    def intervals(self, time: Array, points: NDArray[np.bool_]) -> NDArray[np.bool_]:
+        """Whether each interval between two times counts: both ends do, and nothing between them is excluded."""
+        chosen = points[:-1] & points[1:]
+        for first, last in self.outside:
+            chosen &= ~((time[:-1] <= last) & (time[1:] >= first))
+        return chosen
+
+
+@dataclass(frozen=True)
 class Window:
-    """The rows (n, T) of a signal, the points of time (T,) and which of them, and of the intervals, count."""
+    """What a reducer sees of a signal at once: its rows (n, T), the points of time (T,), and which of them count.
+
+    The first point may be the last of the window before: then only the interval from there counts.
+    """
 
     rows: Array
     time: Array
-    points: NDArray[np.bool_]  # (T,)
-    intervals: NDArray[np.bool_]  # (T-1,): both ends count and nothing between them is excluded
+    points: NDArray[np.bool_]
+    intervals: NDArray[np.bool_]
+    span: Span
 
     @property
     def kept(self) -> Array:
         """The rows at the points that count."""
         return np.asarray(self.rows[:, self.points])
 
-    def reduce(self, rule: "Callable[[Window], Any]") -> float:
-        """The rule's result, or NaN when there is a NaN among the points that count."""
-        return np.nan if np.isnan(self.kept).any() else float(rule(self))
+    @property
+    def times(self) -> Array:
+        """The points that count, in s."""
+        return self.time[self.points]
 
-    def integral(self) -> Array:
-        """Trapezoid rule over the intervals that count, one value a row."""
-        areas = 0.5 * (self.rows[:, 1:] + self.rows[:, :-1]) * np.diff(self.time)
+    def integral(self, rows: Array | None = None) -> Array:
+        """Trapezoid rule over the intervals that count, one value a row; of other rows if they are given."""
+        values = self.rows if rows is None else rows
+        areas = 0.5 * (values[:, 1:] + values[:, :-1]) * np.diff(self.time)
         return np.asarray(areas[:, self.intervals].sum(axis=1))
 
-    def mean(self) -> Array:
-        """Time-weighted mean of each row."""
-        duration = np.diff(self.time)[self.intervals].sum()
-        return self.integral() / duration if duration > 0 else np.asarray(self.kept.mean(axis=1))
-
-    def times(self) -> Array:
-        """The times that count at which some row is not zero."""
-        return np.asarray(self.time[self.points][(self.kept != 0).any(axis=0)])
+    def duration(self) -> float:
+        """Of the intervals that count, in s."""
+        return float(np.diff(self.time)[self.intervals].sum())
 
     def slopes(self) -> Array:
         """Difference quotients over the intervals that count, shape (n, intervals)."""
-        slopes = np.diff(self.rows, axis=1)[:, self.intervals] / np.diff(self.time)[self.intervals]
-        if not slopes.size:
-            raise WindowError("jerk needs two neighbouring recorded points in the window")
-        return np.asarray(slopes)
+        return np.asarray(np.diff(self.rows, axis=1)[:, self.intervals] / np.diff(self.time)[self.intervals])
 
 
 def scalar(value: Any, what: str) -> float:
@@ -86,47 +122,37 @@ def time_windows(outside: Any) -> list[tuple[float, float]]:
     return windows
 
 
-def select(
-    signals: Signals, after: float | None, until: float | None, outside: Sequence[tuple[float, float]]
-) -> NDArray[np.bool_]:
-    """Which recorded points lie in after <= t <= until and in none of the closed intervals `outside`; shape (T,).
-
-    Rounding is forgiven, because 3 * 0.1 is not 0.3.
-    """
-    time, forgiven = signals.time, slack(signals.step, *_ends(signals.time))
-    points = np.ones(time.shape, dtype=np.bool_)
-    if after is not None:
-        points &= time >= after - forgiven
-    if until is not None:
-        points &= time <= until + forgiven
-    for first, last in outside:
-        points &= ~((time >= first - forgiven) & (time <= last + forgiven))
-    return points
-
-
-def _ends(time: NDArray[np.float64]) -> list[float]:
-    return [float(time[0]), float(time[-1])] if time.size else []
-
-
-def window_of(signals: Signals, x: Any, after: Any = None, until: Any = None, outside: Any = None) -> Window:
-    """What a reducer sees of a signal.
+def span_of(signals: Signals, after: Any, until: Any, outside: Any, *, half_open: bool = False) -> Span:
+    """The window that is asked for in a call of a reducer.
 
     Raises:
         ExpressionError: the arguments are not of the right kind.
-        WindowError: the recorded points do not cover the window.
+        WindowError: the run does not cover it.
     """
     start = None if after is None else scalar(after, "after")
     end = None if until is None else scalar(until, "until")
     excluded = [] if outside is None else time_windows(outside)
-    time = signals.time
-    last = float(time[-1]) if time.size else -np.inf
+    first, last = ends_of(signals)
     if end is not None and end > last + slack(signals.step, last):
         raise WindowError(f"the window lasts until {digits(end)} s but the recorded points end at {digits(last)} s")
-    points = select(signals, start, end, excluded)
-    if not points.any():
-        raise WindowError(Problem("", "no recorded point lies in the window", "widen it, or record more often"))
-    intervals = points[:-1] & points[1:]
-    for a, b in excluded:
-        intervals &= ~((time[:-1] <= b) & (time[1:] >= a))
+    return Span(start, end, excluded, half_open, first if start is None else start, slack(signals.step, first, last))
+
+
+def ends_of(signals: Signals) -> tuple[float, float]:
+    """The first and the last time of a run in s; infinite, the wrong way round, if there is none."""
+    count = signals.points
+    if not count:
+        return np.inf, -np.inf
+    return float(signals.part(0, 1)["time"][0]), float(signals.part(count - 1, count)["time"][0])
+
+
+def window_of(part: Part, x: Any, span: Span) -> Window:
+    """What counts of a signal, shape (T,) or (n, T), in a part of a run."""
+    time = part.time
     values = np.atleast_2d(np.asarray(x, dtype=np.float64))
-    return Window(np.broadcast_to(values, (values.shape[0], time.size)), time, points, intervals)
+    own = slice(None, len(time) - part.beyond)
+    time, values = time[own], np.broadcast_to(values, (values.shape[0], time.size))[:, own]
+    points = span.points(time)
+    intervals = span.intervals(time, points)
+    points[: part.overlap] = False
+    return Window(values, time, points, intervals, span)

@@ -6,8 +6,7 @@ from .checkpoint import CHECKPOINT_FILE, read_checkpoint
 from .execution import at_half_the_step, execute, go_on, resume, run
 from .outcome import Run
 from .record import add_step_check
-from .results import Results
-from .rows import ROWS_FILE, recover_rows
+from .recording import ROWS_FILE, Results, recover_rows
 from .session import Progress
 from .step_check import StepChange, StepCheck, check_step
 from .watching import Finding

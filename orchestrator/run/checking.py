@@ -62,18 +62,18 @@ def check(system: System, workspace: Workspace, kind: Kind = "auto") -> Checked:
     problems += wiring.problems
     problems += check_isolation(system) + check_once_per_process(system, interfaces)
     names = signal_names(interfaces, wiring)
-    every_step = (
+    steady = not ALGORITHMS[system.stepping.algorithm].varies_step
+    every_step = steady and (
         system.stepping.record is None
         or abs(system.stepping.record - system.stepping.step) < 1e-9 * system.stepping.step
     )
-    every_step &= not ALGORITHMS[system.stepping.algorithm].varies_step
-    system, left_out = _without_the_missing(system, interfaces, names, every_step)
+    system, left_out = _without_the_missing(system, interfaces, names, steady, every_step)
     problems += check_events(system, interfaces, wiring)
     problems += check_coupling(system, interfaces, wiring)
     parameters = {f"{name}.{v.name}" for name, interface in interfaces.items() for v in interface.of("parameter")}
     parameters |= wiring.left.keys()
-    problems += check_requirements(system.judged.requirements, names, every_step, parameters)
-    found = check_metrics(system.judged.metrics, names, every_step)
+    problems += check_requirements(system.judged.requirements, names, steady, parameters)
+    found = check_metrics(system.judged.metrics, names, steady)
     problems += found
     if not found:
         indices = metric_indices(system.judged.metrics, names)
@@ -89,7 +89,7 @@ def check(system: System, workspace: Workspace, kind: Kind = "auto") -> Checked:
 
 
 def _without_the_missing(
-    system: System, interfaces: Mapping[str, Interface], names: list[str], every_step: bool
+    system: System, interfaces: Mapping[str, Interface], names: list[str], steady: bool, every_step: bool
 ) -> tuple[System, list[str]]:
     """After a swap, a system without the tables that speak of variables the new model does not have, and what they are.
 
@@ -98,9 +98,9 @@ def _without_the_missing(
     if not any(instance.swapped for instance in system.instances.values()):
         return system, []
     requirements = {
-        k: v for k, v in system.judged.requirements.items() if not check_requirements({k: v}, names, every_step)
+        k: v for k, v in system.judged.requirements.items() if not check_requirements({k: v}, names, steady)
     }
-    metrics = {k: v for k, v in system.judged.metrics.items() if not check_metrics({k: v}, names, every_step)}
+    metrics = {k: v for k, v in system.judged.metrics.items() if not check_metrics({k: v}, names, steady)}
     figures = [figure for figure in system.judged.figures if not check_figures([figure], names, every_step)]
     published, references = (
         [entry for entry in entries if split_metric(str(entry.get("metric")))[0] in metrics]

@@ -24,7 +24,7 @@ from ..master import Master
 from ..system import Connection, Event, Instance, Judged, Provenance, Stepping, System
 
 CHECKPOINT_FILE = "checkpoint.zip"
-_FORMAT = 4
+_FORMAT = 5
 
 
 @dataclass(frozen=True)
@@ -33,35 +33,29 @@ class Checkpoint:
 
     Attributes:
         system: what is simulated. kind: how components became models.
-        rows: how many rows had been recorded.
+        marks: how many rows each file of the recording had, and their checksum.
         digests: of the models, by instance.
         progress: what the master carries between steps, from `Master.save`.
         states: the FMUs' serialized states, by instance.
         every: distance of checkpoints in s.
-        run: the identity of the run. checksum: of the rows, as a `Recorder` has it.
+        run: the identity of the run.
         seen: what was found on the way, from `Watching.save`.
     """
 
     system: System
     kind: Kind
-    rows: int
+    marks: list[list[int]]
     digests: Mapping[str, str]
     progress: Mapping[str, Any]
     states: Mapping[str, bytes]
     every: float | None
     seen: Any
     run: str
-    checksum: int
 
     @property
     def time(self) -> float:
         """How far the run had got, in s."""
         return float(self.progress["time"])
-
-    @property
-    def width(self) -> int:
-        """How many signals are recorded."""
-        return len(self.progress["values"])
 
     @classmethod
     def take(
@@ -71,11 +65,10 @@ class Checkpoint:
         master: Master,
         *,
         kind: Kind,
-        rows: int,
+        marks: list[list[int]],
         every: float | None,
         seen: Any,
         run: str,
-        checksum: int,
     ) -> Checkpoint:
         """That of a master between two steps.
 
@@ -90,7 +83,7 @@ class Checkpoint:
             finally:
                 slave.forget(state)
         digests = {name: model.digest for name, model in models.items()}
-        return cls(system, kind, rows, digests, master.save(), states, every, seen, run, checksum)
+        return cls(system, kind, marks, digests, master.save(), states, every, seen, run)
 
     def write(self, directory: Path) -> None:
         """Put it in the place of the one before.
@@ -101,10 +94,9 @@ class Checkpoint:
         content = {
             "format": _FORMAT,
             "run": self.run,
-            "checksum": self.checksum,
             "system": dataclasses.asdict(self.system),
             "kind": self.kind,
-            "rows": self.rows,
+            "marks": self.marks,
             "every": self.every,
             "digests": self.digests,
             "progress": self.progress,
@@ -201,17 +193,16 @@ def read_checkpoint(directory: Path) -> Checkpoint:
         point = Checkpoint(
             system=_system(content["system"]),
             kind=content["kind"],
-            rows=int(content["rows"]),
+            marks=[[int(number) for number in mark] for mark in content["marks"]],
             digests=content["digests"],
             progress=content["progress"],
             states=states,
             every=content["every"],
             seen=content["seen"],
             run=content["run"],
-            checksum=int(content["checksum"]),
         )
-        if point.rows < 1 or point.width < 0 or not math.isfinite(point.time):
-            raise ValueError(f"{point.rows} rows up to {point.time} s")
+        if not all(rows >= 1 for rows, _ in point.marks) or not point.marks or not math.isfinite(point.time):
+            raise ValueError(f"{point.marks} rows up to {point.time} s")
     except ScenarioError:
         raise
     except Exception as error:  # whatever may be in it

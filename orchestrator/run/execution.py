@@ -4,14 +4,14 @@ from __future__ import annotations
 
 import logging
 import math
-from contextlib import ExitStack
+from contextlib import ExitStack, suppress
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 from .. import world
-from ..errors import FigureError, RailcosimError, ScenarioError
-from ..evaluation import evaluate_metrics, judge_requirements, judge_values
+from ..errors import FigureError, RailcosimError, RecordError, ScenarioError
+from ..evaluation import Signals, evaluate_metrics, judge_requirements, judge_values
 from ..figures import draw
 from ..fmi import Kind, Workspace
 from ..fmi.binding import forget_paths
@@ -24,6 +24,7 @@ from .checking import Checked, check
 from .checkpoint import check_serializable
 from .directory import RunDirectory
 from .outcome import Run
+from .recording import ROWS_FILE, SEEN_FILE, Telling, finish_rows, remove_rows
 from .session import Job, Progress, Session, rows_before
 
 _log = logging.getLogger(__name__)
@@ -93,13 +94,17 @@ def execute(
     threads: int = 1,
     checkpoint_every: float | None = None,
     progress: Progress | None = None,
+    writing: Telling | None = None,
 ) -> Run:
-    """As `run`, but a model that fails ends the run with ``status = "failed"`` instead of raising."""
+    """As `run`, but a model that fails ends the run with ``status = "failed"`` instead of raising.
+
+    ``writing`` is told how many of how many rows of results.csv are written.
+    """
     place = RunDirectory(Path(output)) if output is not None else None
     _check_distance(checkpoint_every)
     if checkpoint_every is not None and place is None:
         raise ScenarioError("checkpoints are files: name an output directory for them")
-    return _execute(system, Job(kind, place, threads, checkpoint_every, None, progress), figures)
+    return _execute(system, Job(kind, place, threads, checkpoint_every, None, progress, writing), figures)
 
 
 def resume(
@@ -144,8 +149,12 @@ def go_on(
     threads: int = 1,
     checkpoint_every: float | None = None,
     progress: Progress | None = None,
+    writing: Telling | None = None,
 ) -> Run:
-    """As `resume`, but a model that fails ends the run with ``status = "failed"`` instead of raising."""
+    """As `resume`, but a model that fails ends the run with ``status = "failed"`` instead of raising.
+
+    ``writing`` is told how many of how many rows of results.csv are written.
+    """
     directory = Path(directory)
     _check_distance(checkpoint_every)
     checkpoint.read_checkpoint(directory)  # a folder without one is left as it is
@@ -159,7 +168,7 @@ def go_on(
                 f"time, {digits(system.stepping.stop_time)} s"
             )
         every = checkpoint_every if checkpoint_every is not None else point.every
-        return _execute(system, Job(point.kind, place, threads, every, point, progress), figures)
+        return _execute(system, Job(point.kind, place, threads, every, point, progress, writing), figures)
 
 
 def _check_distance(checkpoint_every: float | None) -> None:
@@ -218,12 +227,29 @@ def _completed(session: Session, figures: bool) -> Run:
             if finding.kind == "diverging":
                 outcome.error.explain(finding.message)
     outcome.notes += session.disturbances()
-    evaluate(outcome)
+    evaluate(outcome, session.judged(outcome.results))
     if place is not None:
-        record_file.finish(place, outcome, job.kind, session.checksum)
-        if figures and len(outcome.time):
+        _write(outcome, session, place)
+        if figures and outcome.results.points and not isinstance(outcome.error, RecordError):
             _draw(outcome, place)
     return outcome
+
+
+def _write(outcome: Run, session: Session, place: RunDirectory) -> None:
+    """Write the record down, then the text of the results; where there is no room for it the run has failed."""
+    job = session.job
+    try:
+        record_file.finish(place, outcome, job.kind, session.rows)
+        if (place.path / ROWS_FILE).exists():
+            finish_rows(place.path, job.writing)
+        if job.checkpoint_every is None:
+            remove_rows(place.path / SEEN_FILE)
+    except OSError as error:
+        if outcome.error is None:
+            outcome.error = RecordError(f"{error.filename or place.given} cannot be written: {error.strerror or error}")
+        outcome.status = "failed"
+        with suppress(OSError, ValueError):  # for this there may be no room either
+            record_file.add(place.path, status=outcome.status, error=str(outcome.error))
 
 
 def _draw(outcome: Run, place: RunDirectory) -> None:
@@ -241,13 +267,13 @@ def _all_notes(outcome: Run) -> list[str]:
     return [*outcome.checked.notes, *outcome.notes]
 
 
-def evaluate(outcome: Run) -> None:
-    """Fill in metrics, verdicts and known values from what was recorded."""
-    system, results = outcome.system, outcome.results
-    if not len(results.time):
+def evaluate(outcome: Run, seen: Signals) -> None:
+    """Fill in metrics, verdicts and known values from what was seen at every point."""
+    system = outcome.system
+    if not seen.points:
         return
-    outcome.metrics = evaluate_metrics(system.judged.metrics, results)
-    outcome.requirements = judge_requirements(system.judged.requirements, results)
+    outcome.metrics = evaluate_metrics(system.judged.metrics, seen)
+    outcome.requirements = judge_requirements(system.judged.requirements, seen)
     came = system.provenance
     outcome.published, outcome.references = (
         judge_values(

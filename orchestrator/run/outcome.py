@@ -14,7 +14,7 @@ from ..errors import RunError
 from ..evaluation import BAD, ComparedValue, Metric, Verdict
 from ..system import System
 from .checking import Checked
-from .results import Results
+from .recording import Results
 from .watching import Finding
 
 _SHOWN, _LONGEST = 3, 1500
@@ -59,6 +59,12 @@ class Run(Mapping[str, NDArray[Any]]):
     def time(self) -> NDArray[np.float64]:
         """Recorded points in s."""
         return self.results.time
+
+    @property
+    def time_reached(self) -> float | None:
+        """The last recorded point in s, if there is one."""
+        points = self.results.points
+        return float(self.results.part(points - 1, points)["time"][0]) if points else None
 
     def __getitem__(self, name: str) -> NDArray[Any]:
         return self.results[name]

@@ -9,19 +9,21 @@ import importlib.metadata
 import json
 import math
 import platform
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
 from .. import world
+from ..errors import ScenarioError
 from ..evaluation import count_values
 from ..isolation import is_isolated
 from ..master import ALGORITHMS
 from ..system import System
-from . import rows
 from .checking import Checked
 from .checkpoint import CHECKPOINT_FILE
 from .directory import RunDirectory
 from .outcome import Run
+from .recording import CSV_FILE, ROWS_FILE, SEEN_FILE, remove_rows
 from .step_check import StepCheck
 
 _PACKAGES = ("railcosim", "fmpy", "pythonfmu", "numpy", "scipy")
@@ -39,8 +41,10 @@ def write(place: RunDirectory, checked: Checked, kind: str, *, anew: bool = True
     """
     directory = place.path
     if anew:
-        for name in (rows.CSV_FILE, rows.ROWS_FILE, "metrics.json", CHECKPOINT_FILE):
+        for name in (CSV_FILE, "metrics.json", CHECKPOINT_FILE):
             world.unlink(directory / name, missing_ok=True)
+        for name in (ROWS_FILE, SEEN_FILE):
+            remove_rows(directory / name)
     _dump(directory / "run.json", place.marks | _describe(checked.system, checked, kind) | {"status": "running"})
     _dump(directory / "units.json", {"time": "s"} | _units(checked))
 
@@ -59,14 +63,21 @@ def abandon(directory: Path, error: BaseException) -> None:
     add(directory, status="failed", error=str(error))
 
 
-def finish(place: RunDirectory, outcome: Run, kind: str, checksum: int) -> None:
-    """Write the end of the run, and what was evaluated; the checksum of its rows tells whether they are its own."""
+def finish(place: RunDirectory, outcome: Run, kind: str, rows: Sequence[int]) -> None:
+    """Write the end of the run, and what was evaluated.
+
+    Args:
+        place: where.
+        outcome: the run.
+        kind: as which kind of model.
+        rows: how many results there are, and their checksum, which tells whether they are this run's own.
+    """
     directory = place.path
     record = place.marks | _describe(outcome.system, outcome.checked, kind)
-    record["rows"] = {"count": len(outcome.time), "crc32": checksum}
+    record["rows"] = dict(zip(("count", "crc32"), rows, strict=True))
     record["status"] = outcome.status
     record["error"] = None if outcome.error is None else str(outcome.error)
-    record["time_reached"] = float(outcome.time[-1]) if len(outcome.time) else None
+    record["time_reached"] = outcome.time_reached
     record["seconds"] = outcome.seconds
     record["coupling"] = outcome.coupling
     record["notes"] += outcome.notes
@@ -95,6 +106,19 @@ def finish(place: RunDirectory, outcome: Run, kind: str, checksum: int) -> None:
             "references": [dataclasses.asdict(row) for row in outcome.references],
         },
     )
+
+
+def read(directory: Path) -> dict[str, Any]:
+    """The record of a run.
+
+    Raises:
+        ScenarioError: there is none that can be read.
+    """
+    try:
+        record = json.loads(world.read_text(directory / "run.json", encoding="utf-8"))
+        return {"texts": record["texts"], **record}
+    except (OSError, ValueError, LookupError, TypeError, RecursionError) as error:
+        raise ScenarioError(f"{directory} holds no run that can be read: {error}") from error
 
 
 def add(directory: Path, **entries: Any) -> None:

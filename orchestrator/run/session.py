@@ -5,26 +5,26 @@ from __future__ import annotations
 import math
 import signal
 import threading
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import AbstractContextManager, contextmanager
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from .. import world
-from ..errors import RollbackError, RunError, ScenarioError, StoppedError
+from ..errors import RollbackError, RunError, StoppedError
+from ..evaluation import Signals, needed_signals
 from ..fmi import Interface, Kind, Slave
 from ..master import ALGORITHMS, Master, Rows
 from ..times import slack
 from . import record as record_file
 from .assembly import assembled
-from .checking import Checked
+from .checking import Checked, signal_names
 from .checkpoint import Checkpoint
 from .directory import RunDirectory
 from .outcome import Status
-from .results import Due, Recorder, Results, checksum_of
+from .recording import Due, Recording, Results, Telling, check_stored
 from .watching import Finding, Watching
 
 Progress = Callable[[float, float], None]
@@ -42,6 +42,7 @@ class Job:
         checkpoint_every: distance of checkpoints in s, if there are any.
         begin: the checkpoint to begin at, if the run goes on.
         progress: told of how far it has got.
+        writing: told of how far results.csv has got.
     """
 
     kind: Kind
@@ -50,6 +51,7 @@ class Job:
     checkpoint_every: float | None = None
     begin: Checkpoint | None = None
     progress: Progress | None = None
+    writing: Telling | None = None
 
 
 class Session:
@@ -58,7 +60,7 @@ class Session:
     Args:
         checked: the system, found fit to run.
         job: how to run it.
-        past: rows that were recorded before, if the run goes on.
+        before: how many rows the run's files have, if it goes on (`rows_before`).
 
     Attributes:
         status: how it ended; error: why it failed or ended early.
@@ -66,15 +68,15 @@ class Session:
         coupling: how the master's iterations, step sizes, loops and events went.
     """
 
-    def __init__(self, checked: Checked, job: Job, past: NDArray[Any] | None = None) -> None:
+    def __init__(self, checked: Checked, job: Job, before: Sequence[int] = (0, 0)) -> None:
         self.checked, self.job = checked, job
         self.system = checked.system
         self.status: Status = "failed"
         self.error: RunError | None = None
         self.seconds: dict[str, float] = {"setup": 0.0, "stepping": 0.0, "steps": 0}
         self.coupling: dict[str, Any] = {}
-        self._past = past
-        self._recorder: Recorder | None = None
+        self._before = before
+        self._recording: Recording | None = None
         self._watching: Watching | None = None
         self._slaves: Mapping[str, Slave] = {}
         self._stopped = threading.Event()
@@ -139,8 +141,8 @@ class Session:
             self.seconds["setup"] = world.perf_counter() - begin
             self.status = "completed" if self._step(master) else "interrupted"
         finally:
-            if self._recorder is not None:
-                self._recorder.close()
+            if self._recording is not None:
+                self._recording.close()
             self.coupling = master.report()
             if self._restoring:
                 names = ", ".join(self._restoring)
@@ -163,31 +165,43 @@ class Session:
             system.stepping.start_time, system.stepping.stop_time, may_go_on=self.job.checkpoint_every is not None
         )
         self._watching = Watching(system, self._interfaces, self.checked.wiring, master.signals)
-        if self.job.begin is None or self._past is None:
-            self._recorder = self._new_recorder(master)
+        place, begin = self.job.place, self.job.begin
+        directory, identity = (None, "") if place is None else (place.path, place.identity)
+        self._recording = Recording(
+            master.signals, master.kinds, self._judged, directory, identity=identity, before=self._before
+        )
+        if begin is None or directory is None:
             first = [[system.stepping.start_time, *master.values]]
-            self._recorder.extend(first)
+            self._recording.see(first, first)
             self._watching.see(first)
         else:
-            self.job.begin.restore(master)
-            self._watching.restore(self.job.begin.seen)
-            past, there = self._past[: self.job.begin.rows], len(self._past)
-            self._recorder = self._new_recorder(master, past, there)
+            begin.restore(master)
+            self._watching.restore(begin.seen)
+            self._recording.go_on(directory, record_file.read(directory), begin.marks)
 
-    def _new_recorder(self, master: Master, past: NDArray[Any] | None = None, there: int = 0) -> Recorder:
-        place = self.job.place
-        directory, identity = (None, "") if place is None else (place.path, place.identity)
-        return Recorder(master.signals, master.kinds, directory, past, there, identity=identity)
+    @property
+    def _row_every(self) -> float:
+        """After how many steps a point is a result; 0 after each of varying length."""
+        stepping = self.system.stepping
+        varies = ALGORITHMS[stepping.algorithm].varies_step
+        if stepping.record is None:
+            return 0.0 if varies else 1.0
+        every = stepping.record / stepping.step
+        return every if varies else float(round(every))
+
+    @property
+    def _judged(self) -> set[str] | None:
+        """The signals that metrics and requirements look at; None where every point is a result."""
+        if self._row_every == (0.0 if ALGORITHMS[self.system.stepping.algorithm].varies_step else 1.0):
+            return None
+        judged, names = self.system.judged, signal_names(self._interfaces, self.checked.wiring)
+        return needed_signals(judged.metrics, judged.requirements, names)
 
     def _step(self, master: Master) -> bool:
         """The communication steps, with checkpoints between them; True unless they were interrupted."""
         system, every = self.system, self.job.checkpoint_every
         count = round((system.stepping.stop_time - system.stepping.start_time) / system.stepping.step)
-        varies = ALGORITHMS[system.stepping.algorithm].varies_step
-        row_every: float = 0 if varies else 1
-        if system.stepping.record is not None:
-            row_every = system.stepping.record / system.stepping.step
-            row_every = row_every if varies else round(row_every)
+        varies, row_every = ALGORITHMS[system.stepping.algorithm].varies_step, self._row_every
         stride = count if every is None else max(1, round(every / system.stepping.step))
         # Every point is watched; of steps of one length those that are recorded are picked out of all.
         told_every, kept_every = (row_every, 1) if varies else (1, int(row_every))
@@ -210,10 +224,10 @@ class Session:
             self.seconds.update(stepping=world.perf_counter() - begin, steps=master.steps - before)
 
     def _observer(self, master: Master, due: Due) -> Callable[[int, Rows], bool]:
-        assert self._recorder is not None
+        assert self._recording is not None
         assert self._watching is not None
         system, stopped, progress = self.system, self._stopped, self.job.progress
-        recorder, watching = self._recorder, self._watching
+        recording, watching = self._recording, self._watching
         last = system.stepping.stop_time - 0.5 * system.stepping.step
         percent = 0.01 * (system.stepping.stop_time - system.stepping.start_time)
         shown, told = world.monotonic(), 0
@@ -221,38 +235,36 @@ class Session:
         def observe(steps: int, rows: Rows) -> bool:
             nonlocal shown, told
             time = master.time
-            watching.see(rows if len(rows) else [[time, *master.values]])
+            points = rows if len(rows) else [[time, *master.values]]
             kept = due.of(steps, rows)
-            recorder.extend(kept)
+            watching.see(points)
+            if stopped.is_set() and time < last and not (len(kept) and kept[-1][0] == time):
+                kept = [*kept, [time, *master.values]]  # the point at which the run is stopped
+            recording.see(points, kept)
             reached = int((time - system.stepping.start_time) / percent + 1e-9)
             if progress is not None and (reached > told or world.monotonic() - shown > 0.1 or time >= last):
                 shown, told = world.monotonic(), reached
                 progress(time, system.stepping.stop_time)
-            if not stopped.is_set():
-                return True
-            if time < last and not (len(kept) and kept[-1][0] == time):
-                recorder.extend([[time, *master.values]])  # the point at which the run was stopped
-            return False
+            return not stopped.is_set()
 
         return observe
 
     def _keep(self, master: Master) -> None:
         """Write a checkpoint of the present point, and first the rows up to it."""
-        job, recorder = self.job, self._recorder
+        job, recording = self.job, self._recording
         assert job.place is not None
-        assert recorder is not None
+        assert recording is not None
         assert self._watching is not None
-        recorder.flush(sync=True)
+        recording.flush(sync=True)
         point = Checkpoint.take(
             self.system,
             self.checked.models,
             master,
             kind=job.kind,
-            rows=recorder.count,
+            marks=recording.marks,
             every=job.checkpoint_every,
             seen=self._watching.save(),
             run=job.place.identity,
-            checksum=recorder.checksum,
         )
         point.write(job.place.path)
 
@@ -265,14 +277,18 @@ class Session:
         return [] if self._watching is None else self._watching.findings(results, self.error)
 
     @property
-    def checksum(self) -> int:
-        """Of the rows that are on the disk."""
-        return 0 if self._recorder is None else self._recorder.checksum
+    def rows(self) -> list[int]:
+        """How many results are on the disk, and their checksum."""
+        return [0, 0] if self._recording is None else self._recording.marks[0]
+
+    def judged(self, results: Results) -> Signals:
+        """What metrics and requirements look at: every communication point."""
+        return results if self._recording is None else self._recording.judged(results)
 
     def results(self) -> Results:
         """What was recorded."""
-        recorder = self._recorder
-        time, columns = (np.empty(0), {}) if recorder is None else recorder.columns()
+        recording = self._recording
+        columns: Mapping[str, Any] = {"time": np.empty(0)} if recording is None else recording.columns()
         units: dict[str, str] = {}
         parameters: dict[str, Any] = dict(self.checked.wiring.left)
         for instance, model in self.checked.models.items():
@@ -285,7 +301,7 @@ class Session:
                     parameters[name] = starts.get(variable.name, variable.start)
         return Results(
             columns,
-            time,
+            None,
             units=units,
             parameters=parameters,
             step=self.system.stepping.step,
@@ -295,25 +311,15 @@ class Session:
         )
 
 
-def rows_before(job: Job) -> NDArray[Any] | None:
-    """What a run that goes on has recorded, beyond its checkpoint too.
+def rows_before(job: Job) -> list[int]:
+    """How many rows the files of a run that goes on have, beyond its checkpoint too.
 
     Raises:
         ScenarioError: the results are not those of the checkpoint.
     """
     if job.begin is None or job.place is None:
-        return None
-    directory = job.place.path
-    before, rows = Results.load(directory), job.begin.rows
-    if len(before.time) < rows:
-        raise ScenarioError(
-            f"{directory} cannot be resumed: its results have {len(before.time)} rows, fewer than the {rows} of its "
-            "checkpoint"
-        )
-    columns = [before.time, *(before[name] for name in before.names())]
-    if len(columns) != job.begin.width + 1 or checksum_of(columns, rows) != job.begin.checksum:
-        raise ScenarioError(f"{directory} cannot be resumed: its results and its checkpoint are of different runs")
-    return np.array(columns, dtype=np.result_type(*columns)).T
+        return [0, 0]
+    return check_stored(job.place.path, record_file.read(job.place.path), job.begin.marks)
 
 
 @contextmanager

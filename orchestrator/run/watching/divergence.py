@@ -9,15 +9,15 @@ it shows in `swings` that become larger and larger up to the end, which no coupl
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from typing import Any, Protocol
 
 import networkx as nx
 import numpy as np
 from numpy.typing import NDArray
 
 from ...errors import FmuError
-from ...evaluation import Signals
 from ...fmi import Interface
 from ...master import ALGORITHMS, find_loops
 from ...names import SignalName
@@ -46,6 +46,17 @@ _STEADY = 1e3
 _SHOWN = 4
 
 
+class Points(Protocol):
+    """Signals by name over points of time, in s, some of which are a communication step apart."""
+
+    @property
+    def time(self) -> Array: ...
+    @property
+    def step(self) -> float: ...
+    def names(self) -> Collection[str]: ...
+    def __getitem__(self, name: str, /) -> NDArray[Any]: ...
+
+
 @dataclass(frozen=True)
 class Growth:
     """How a signal grows: by which factor in each communication step or swing, and since when in s."""
@@ -58,7 +69,7 @@ def explain_divergence(
     system: System,
     interfaces: Mapping[str, Interface],
     links: Sequence[Link],
-    seen: Sequence[Signals],
+    seen: Sequence[Points],
     error: object = None,
 ) -> Finding | None:
     """What coupling diverges and what to do about it, if one does.
@@ -103,7 +114,7 @@ def sources_in_cycles(
                 yield link.source
 
 
-def _finding(found: Mapping[str, Growth], signals: Signals, how: str, advice: str) -> Finding:
+def _finding(found: Mapping[str, Growth], signals: Points, how: str, advice: str) -> Finding:
     since = min(growth.since for growth in found.values())
     first = next(iter(found))
     values = np.where(np.isfinite(signals[first]), np.abs(signals[first]), 0.0)
@@ -132,7 +143,7 @@ def _cycles(links: Sequence[Link]) -> list[list[Link]]:
 
 
 def _sized(
-    sources: Iterable[SignalName], interfaces: Mapping[str, Interface], signals: Signals
+    sources: Iterable[SignalName], interfaces: Mapping[str, Interface], signals: Points
 ) -> Iterator[tuple[str, float]]:
     """The real numbers among the sources, and what a usual size of each is."""
     for source in sources:
@@ -142,7 +153,7 @@ def _sized(
 
 
 def _growing(
-    sources: Iterable[SignalName], interfaces: Mapping[str, Interface], signals: Signals, *, failed: bool
+    sources: Iterable[SignalName], interfaces: Mapping[str, Interface], signals: Points, *, failed: bool
 ) -> Iterator[tuple[str, Growth]]:
     for name, size in _sized(sources, interfaces, signals):
         growth = find_growth(signals.time, signals[name], signals.step, size=size, failed=failed)
@@ -151,7 +162,7 @@ def _growing(
 
 
 def _swinging(
-    sources: Iterable[SignalName], interfaces: Mapping[str, Interface], signals: Signals
+    sources: Iterable[SignalName], interfaces: Mapping[str, Interface], signals: Points
 ) -> Iterator[tuple[str, Growth]]:
     for name, size in _sized(sources, interfaces, signals):
         swings = find_swings(signals[name], size)

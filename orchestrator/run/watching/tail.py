@@ -17,14 +17,12 @@ class Tail:
 
     Args:
         names: of the columns.
-        step: communication step in s. stop_time: planned end in s.
+        step: communication step in s.
     """
 
-    def __init__(self, names: Sequence[str], step: float, stop_time: float) -> None:
+    def __init__(self, names: Sequence[str], step: float) -> None:
         self._places = {name: k for k, name in enumerate(names)}
-        self.step, self.stop_time, self.completed = step, stop_time, True
-        self.units: dict[str, str] = {}
-        self.parameters: dict[str, float | int | bool | str] = {}
+        self.step = step
         self._blocks: deque[tuple[NDArray[np.float64], NDArray[np.float64]]] = deque()
         self._count = 0
 

@@ -9,19 +9,21 @@ from typing import Any
 import numpy as np
 
 from ...errors import ScenarioError
-from ...evaluation import Signals
+from ...evaluation import Part, Signals
 from ...fmi import Interface
 from ...master import Rows
 from ...system import System
 from ...wiring import Wiring
 from .crossings import Crossings
-from .divergence import explain_divergence, sources_in_cycles
+from .divergence import Points, explain_divergence, sources_in_cycles
 from .finding import Finding
 from .rules import rules_of
 from .tail import POINTS, Tail
 
 _BLOCK = 512
 """Single points that are looked at together."""
+_LAST = 1 << 18
+"""Results in which a slow divergence is seen."""
 
 
 class Watching:
@@ -42,7 +44,7 @@ class Watching:
         places = {name: k for k, name in enumerate(signals, 1)}
         self._ruled, self._coupled = (np.array([places[x] for x in names], np.intp) for names in (ruled, coupled))
         self._crossings = Crossings(rules, {name: k for k, name in enumerate(ruled)})
-        self._tail = Tail(list(coupled), system.stepping.step, system.stepping.stop_time)
+        self._tail = Tail(list(coupled), system.stepping.step)
         self._pick = itemgetter(0, *self._ruled.tolist(), *self._coupled.tolist())
         self._single: list[Sequence[Any]] = []
 
@@ -79,7 +81,9 @@ class Watching:
         self._look()
         found = list(self._crossings.findings())
         everything = self._system.stepping.record in (None, self._system.stepping.step)
-        seen = (recorded,) if everything else (recorded, self._tail)
+        count = recorded.points
+        last = Part(recorded, recorded.part(max(0, count - _LAST), count), 0, 0)
+        seen: tuple[Points, ...] = (last,) if everything else (last, self._tail)
         diverging = explain_divergence(self._system, self._interfaces, self._links, seen, error)
         found += [] if diverging is None else [diverging]
         return sorted(found, key=lambda finding: (finding.rank, finding.since))

@@ -29,6 +29,13 @@ class Run:
     def names(self):
         return self.columns.keys()
 
+    @property
+    def points(self):
+        return len(self.time)
+
+    def part(self, first, last):
+        return {name: values[first:last] for name, values in {"time": self.time, **self.columns}.items()}
+
     def __getitem__(self, name):
         return self.columns[name]
 

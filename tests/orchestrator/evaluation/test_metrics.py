@@ -22,6 +22,8 @@ from railcosim.orchestrator.evaluation.metrics import (
     unit_of,
 )
 
+pytestmark = pytest.mark.usefixtures("parts")
+
 
 class Run:
     """A recorded run made of plain arrays."""
@@ -39,6 +41,13 @@ class Run:
 
     def names(self):
         return self.columns.keys()
+
+    @property
+    def points(self):
+        return len(self.time)
+
+    def part(self, first, last):
+        return {name: values[first:last] for name, values in {"time": self.time, **self.columns}.items()}
 
     def __getitem__(self, name):
         return self.columns[name]
@@ -188,7 +197,7 @@ def test_at_sample_moves_an_output_back_to_the_state_it_was_computed_from():
     np.testing.assert_array_equal(value("at_sample(c[:].z)", run), [[0, 1, 2, 3, 3], [5, 6, 7, 8, 8]])
     assert value("at_sample(3)", run) == 3.0
     coarse = Run(2.0, step=0.1).put("c.y", 0)
-    with pytest.raises(ExpressionError, match="every communication step recorded; set record = step"):
+    with pytest.raises(ExpressionError, match="steps of one length; take an algorithm that keeps the step"):
         value("at_sample(c.y)", coarse)
 
 
@@ -366,7 +375,7 @@ def test_check_tells_every_problem_of_the_table():
             "pair": "max(s.x, outside = [5, 4])",
         },
         names,
-        every_step=False,
+        steady=False,
     )
     assert len(problems) == 7
     for problem, (name, message) in zip(
@@ -377,7 +386,7 @@ def test_check_tells_every_problem_of_the_table():
             ("band", "missing a required argument: 'band'"),
             ("word", "max has no argument 'utnil'; did you mean 'until'?"),
             ("two", "min(x, after, until, outside): too many positional arguments"),
-            ("shift", "set record = step, or leave record out"),
+            ("shift", "take an algorithm that keeps the step"),
             ("pair", "ends before it starts"),
         ],
         strict=True,

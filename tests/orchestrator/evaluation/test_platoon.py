@@ -7,7 +7,9 @@ import pytest
 from railcosim.orchestrator.errors import ExpressionError
 from railcosim.orchestrator.evaluation.metrics import FUNCTIONS, evaluate_metrics
 from railcosim.orchestrator.evaluation.platoon import PLATOON
-from railcosim.orchestrator.run.results import Results
+from railcosim.orchestrator.run.recording import Results
+
+pytestmark = pytest.mark.usefixtures("parts")
 
 T = np.arange(0.0, 11.0)
 

@@ -9,6 +9,8 @@ from hypothesis import strategies as st
 from railcosim.orchestrator.errors import ExpressionError
 from railcosim.orchestrator.evaluation.requirements import check_requirements, judge_requirements, parse_requirement
 
+pytestmark = pytest.mark.usefixtures("parts")
+
 
 class Run:
     """A recorded run made of plain arrays."""
@@ -26,6 +28,13 @@ class Run:
 
     def names(self):
         return self.columns.keys()
+
+    @property
+    def points(self):
+        return len(self.time)
+
+    def part(self, first, last):
+        return {name: values[first:last] for name, values in {"time": self.time, **self.columns}.items()}
 
     def __getitem__(self, name):
         return self.columns[name]
@@ -286,12 +295,12 @@ def test_all_problems_of_one_text_are_told():
         ("always b.ok and 3", "is a number, not a condition"),
         ("always not (a[1].x - 1)", "is a number, not a condition"),
         ("always pi", "is a number, not a condition"),
-        ("always at_sample(a[1].x) < 3", "set record = step, or leave record out"),
+        ("always at_sample(a[1].x) < 3", "take an algorithm that keeps the step"),
         ("always", "an expression is empty"),
     ],
 )
 def test_check_finds_it_before_the_run(text, message):
-    problems = check_requirements({"comfort": text}, list(run().names()), every_step=False)
+    problems = check_requirements({"comfort": text}, list(run().names()), steady=False)
     assert len(problems) == 1
     assert message in str(problems[0])
     assert problems[0].place.startswith("requirement 'comfort'")

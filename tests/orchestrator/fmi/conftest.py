@@ -9,7 +9,7 @@ import pytest
 from railcosim.orchestrator.cli import app as cli
 from railcosim.orchestrator.errors import FmuFileError
 from railcosim.orchestrator.master import compiled
-from railcosim.orchestrator.run.results import Results
+from railcosim.orchestrator.run.recording import Results
 
 LIBRARY = f"Foreign{fmpy.sharedLibraryExtension}"
 ITEMS = '<Item name="low" value="1"/><Item name="high" value="3"/>'

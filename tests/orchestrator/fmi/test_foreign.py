@@ -11,7 +11,7 @@ import time
 
 import pytest
 from railcosim.orchestrator.cli import app as cli
-from railcosim.orchestrator.run.results import Results
+from railcosim.orchestrator.run.recording import Results
 
 GCC = shutil.which("gcc")
 

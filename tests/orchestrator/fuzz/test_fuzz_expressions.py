@@ -20,7 +20,7 @@ from railcosim.orchestrator.evaluation.metrics import (
 )
 from railcosim.orchestrator.evaluation.requirements import check_requirements, judge_requirements
 from railcosim.orchestrator.figures import check_figures, draw
-from railcosim.orchestrator.run.results import Results
+from railcosim.orchestrator.run.recording import Results
 
 SIGNALS = (
     *(f"train[{i}].{name}" for i in (1, 2, 3) for name in ("speed", "position")),

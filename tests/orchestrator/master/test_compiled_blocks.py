@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 from railcosim.orchestrator.master import compiled
 from railcosim.orchestrator.run.execution import run
-from railcosim.orchestrator.run.results import Results
+from railcosim.orchestrator.run.recording import Results
 from railcosim.orchestrator.system import Event
 
 GCC = shutil.which("gcc")

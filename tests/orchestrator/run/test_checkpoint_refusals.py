@@ -10,7 +10,7 @@ import pytest
 from railcosim.orchestrator.errors import FmuError, RailcosimError, ScenarioError
 from railcosim.orchestrator.run import checkpoint
 from railcosim.orchestrator.run.execution import execute, resume, run
-from railcosim.orchestrator.run.results import Results
+from railcosim.orchestrator.run.recording import Results
 from railcosim.orchestrator.system import Event, System
 
 

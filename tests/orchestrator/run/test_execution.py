@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 from railcosim.orchestrator.errors import FmuError, RailcosimError, ScenarioError
 from railcosim.orchestrator.run.execution import execute, run
-from railcosim.orchestrator.run.results import Results
+from railcosim.orchestrator.run.recording import Results
 from railcosim.orchestrator.system import System
 
 BOTH = pytest.mark.parametrize("kind", ["python", "plain"])

@@ -15,7 +15,7 @@ from railcosim.orchestrator.cli import app as cli
 from railcosim.orchestrator.cli import runs
 from railcosim.orchestrator.run import checkpoint, results
 from railcosim.orchestrator.run.execution import execute, resume, run
-from railcosim.orchestrator.run.results import Results
+from railcosim.orchestrator.run.recording import Results
 from railcosim.orchestrator.system import System
 
 POSIX = pytest.mark.skipif(sys.platform == "win32", reason="signals")

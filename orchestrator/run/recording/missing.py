@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Collection, Iterable
 
-from ..names import SignalName
-from ..problems import suggestion
+from ...names import SignalName
+from ...problems import suggestion
 
 _SHOWN = 6
 

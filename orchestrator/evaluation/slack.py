@@ -1,0 +1,79 @@
+"""The slack of a condition: whether it holds, and by how much.
+
+Numbers that differ by rounding are equal: their slack is 0.
+"""
+
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .calculation import Scope, evaluate
+from .syntax import Call, Node, Operation
+
+COMPARISONS = ("<", "<=", ">", ">=", "==", "!=")
+ROUNDING = 4 * float(np.finfo(np.float64).eps)
+"""Numbers that differ by less than this share of what they are made of are equal: a start on a bound is on it."""
+
+
+class Slack(NamedTuple):
+    """Whether a condition holds, and by how much (negative: missed by; infinite: no measure), of one shape."""
+
+    holds: NDArray[np.bool_]
+    slack: NDArray[np.float64]
+
+
+def slack_of(node: Node, scope: Scope) -> Slack:
+    """The slack of a condition: b - a for a < b, the least for `and`, the most for `or`, negated for `not`.
+
+    A bare signal is a boolean: it holds where it is not zero and has no measure. NaN never holds.
+    """
+    match node:
+        case Operation(operator="not", operands=(operand,)):
+            holds, slack = slack_of(operand, scope)
+            return Slack(~holds & ~np.isnan(slack), -slack)
+        case Operation(operator="and" | "or" as operator, operands=operands):
+            parts = [slack_of(operand, scope) for operand in operands]
+            smaller = operator == "and"
+            slack = (np.minimum if smaller else np.maximum).reduce(np.broadcast_arrays(*(part.slack for part in parts)))
+            every = np.broadcast_arrays(*(part.holds for part in parts))
+            holds = (np.logical_and if smaller else np.logical_or).reduce(every)
+            return Slack(np.asarray(holds & ~np.isnan(slack)), np.asarray(slack))
+        case Operation(operator="if", operands=(condition, then, otherwise)):
+            choice = np.asarray(evaluate(condition, scope), dtype=np.float64)
+            yes, no = slack_of(then, scope), slack_of(otherwise, scope)
+            slack = np.where(np.isnan(choice), np.nan, np.where(choice, yes.slack, no.slack))
+            return Slack(np.where(choice, yes.holds, no.holds) & ~np.isnan(slack), slack)
+        case Operation(operator=operator, operands=(left, right)) if operator in COMPARISONS:
+            rounding = ROUNDING * np.maximum(_size(left, scope), _size(right, scope))
+            return _compare(operator, evaluate(left, scope), evaluate(right, scope), rounding)
+    value = np.asarray(evaluate(node, scope), dtype=np.float64)
+    slack = np.where(np.isnan(value), np.nan, np.where(value, np.inf, -np.inf))
+    return Slack(slack > 0, slack)
+
+
+def _size(node: Node, scope: Scope) -> NDArray[np.float64]:
+    """How large the numbers are that a value is made of: the rounding of a gap is that of the two positions."""
+    match node:
+        case Operation(operator="+" | "-" | "negative" | "positive", operands=operands):
+            parts = [_size(operand, scope) for operand in operands]
+        case Call(name="abs" | "minimum" | "maximum", arguments=arguments):
+            parts = [_size(argument, scope) for argument in arguments]
+        case _:
+            return np.abs(np.asarray(evaluate(node, scope), dtype=np.float64))
+    return np.asarray(np.maximum.reduce(np.broadcast_arrays(*parts)))
+
+
+def _compare(operator: str, left: NDArray[Any], right: NDArray[Any], rounding: NDArray[np.float64]) -> Slack:
+    a, b = np.asarray(left, dtype=np.float64), np.asarray(right, dtype=np.float64)
+    equal = (a == b) | (np.abs(b - a) <= np.where(np.isfinite(rounding), rounding, 0.0))
+    difference = np.where(equal, 0.0, b - a)  # inf - inf would be NaN
+    slack, holds = {
+        "<": (difference, (a < b) & ~equal),
+        "<=": (difference, (a <= b) | equal),
+        ">": (-difference, (a > b) & ~equal),
+        ">=": (-difference, (a >= b) | equal),
+        "==": (-np.abs(difference), equal),
+        "!=": (np.abs(difference), ~equal & ~np.isnan(difference)),
+    }[operator]
+    return Slack(np.asarray(holds), np.asarray(slack))

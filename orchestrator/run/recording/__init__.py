@@ -1,0 +1,23 @@
+"""The rows of a run: taken while it goes, kept in memory or in files, read back."""
+
+from .binary import remove_rows
+from .recorder import ROWS_FILE, SEEN_FILE, Due, Recorder
+from .recording import Recording, check_stored
+from .results import Results
+from .stored import Telling, finish_rows, recover_rows
+from .text import CSV_FILE
+
+__all__ = [
+    "CSV_FILE",
+    "ROWS_FILE",
+    "SEEN_FILE",
+    "Due",
+    "Recorder",
+    "Recording",
+    "Results",
+    "Telling",
+    "check_stored",
+    "finish_rows",
+    "recover_rows",
+    "remove_rows",
+]

@@ -1,0 +1,172 @@
+"""``results.bin``: recorded rows while a run goes, and while somebody reads them.
+
+Finding the shortest digits of a number takes longer than many a step. While a run goes its rows are therefore appended
+to a file of one line of JSON (the ``run``, the ``columns``, and by place those of ``whole`` numbers and of ``texts``)
+and then each row as 64-bit little-endian floats. The texts themselves stand in a file beside it.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+from collections.abc import Collection, Iterator, Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ... import world
+from .words import Words
+
+NEW = ".new"
+"""Ends the name of a file that is to take the place of the one without."""
+_FLOAT = np.dtype("<f8")
+_PART = 1 << 22
+"""Bytes that are read at a time."""
+
+
+class RowsWriter:
+    """Appends rows to a file.
+
+    Args:
+        path: of the file; what is there goes.
+        columns: the names, time first.
+        whole: columns of whole numbers, by place.
+        words: the texts, which are added to from row to row.
+        there: how many rows of the same run the file has, if it is resumed. They stay until there are as many new ones.
+        identity: of the run.
+
+    Raises:
+        OSError: here and in all methods: the file cannot be written.
+    """
+
+    def __init__(
+        self,
+        path: Path,
+        columns: Sequence[str],
+        whole: Collection[int],
+        words: Words,
+        *,
+        there: int = 0,
+        identity: str = "",
+    ) -> None:
+        self.path = path
+        self._words, self._told, self._left = words, 0, there
+        world.unlink(path.with_name(path.name + NEW), missing_ok=True)
+        if not there:
+            world.unlink(path, missing_ok=True)
+            world.unlink(_words_beside(path), missing_ok=True)
+        self._part = path.with_name(path.name + NEW) if there else path
+        self._file = world.open(self._part, "wb")
+        head = {"run": identity, "columns": list(columns), "whole": list(whole), "texts": words.columns}
+        self._file.write(json.dumps(head).encode() + b"\n")
+        self._file.flush()
+
+    def append(self, block: NDArray[np.float64]) -> None:
+        """Add rows, shape (n, columns)."""
+        if len(self._words) > self._told:  # first: a row means nothing without its texts
+            self._told = len(self._words)
+            beside = _words_beside(self.path)
+            part = beside.with_name(beside.name + NEW)
+            world.write_text(part, json.dumps(self._words.known), encoding="utf-8")
+            world.replace(part, beside)
+        self._file.write(np.ascontiguousarray(block, _FLOAT).data)
+        self._left -= len(block)
+
+    def flush(self, *, sync: bool = False) -> bool:
+        """Bring rows to the file, and wait until they outlive the machine's power where ``sync`` asks for that.
+
+        Returns:
+            Whether the file is now what stands under its name, and was not before.
+        """
+        self._file.flush()
+        if sync:
+            world.fsync(self._file.fileno())
+        if self._left > 0 or self._part == self.path:
+            return False
+        self._file.close()
+        self.take_place()
+        self._file = world.open(self._part, "ab")
+        return True
+
+    def close(self) -> None:
+        """Give the file back; what was written stays."""
+        self._file.close()
+
+    def take_place(self) -> None:
+        """Let the closed file be what stands under its name, although it has fewer rows."""
+        world.replace(self._part, self.path)
+        self._part = self.path
+
+
+class RowsFile:
+    """Reads rows from a file, of as many as there were when it was opened. A row that is half written is none.
+
+    Raises:
+        OSError, ValueError, LookupError, TypeError: it cannot be read.
+    """
+
+    def __init__(self, path: Path) -> None:
+        self._file = world.open(path, "rb")
+        try:
+            header = json.loads(self._file.readline())
+            self.identity: str = header.get("run", "")
+            self.columns: list[str] = header["columns"]
+            self.whole: list[int] = header["whole"]
+            if not self.columns:
+                raise ValueError(f"{path.name} has no columns")
+            texts = header.get("texts") or ()
+            known = json.loads(world.read_text(_words_beside(path), encoding="utf-8")) if texts else {}
+            self.words = Words(texts, {int(k): words for k, words in known.items()})
+            self._begin = self._file.tell()
+            self._row = len(self.columns) * _FLOAT.itemsize
+            self.count = (os.fstat(self._file.fileno()).st_size - self._begin) // self._row
+        except BaseException:
+            self._file.close()
+            raise
+
+    def part(self, first: int, last: int) -> NDArray[np.float64]:
+        """Rows from a number up to another, which is not among them; shape (n, columns)."""
+        count = max(0, min(last, self.count) - first)
+        self._file.seek(self._begin + first * self._row)
+        numbers = np.fromfile(self._file, _FLOAT, count * len(self.columns))
+        return numbers.reshape(-1, len(self.columns))
+
+    def blocks(self) -> Iterator[NDArray[np.float64]]:
+        """All rows, some megabytes at a time."""
+        every = max(1, _PART // self._row)
+        for first in range(0, self.count, every):
+            yield self.part(first, first + every)
+
+    def column(self, place: int) -> NDArray[Any]:
+        """One column, shape (rows,)."""
+        values = np.empty(self.count)
+        done = 0
+        for block in self.blocks():
+            values[done : done + len(block)] = block[:, place]
+            done += len(block)
+        return self.words.decode(place, values)
+
+    def table(self) -> list[NDArray[Any]]:
+        """All columns."""
+        values = np.empty((len(self.columns), self.count))
+        done = 0
+        for block in self.blocks():
+            values[:, done : done + len(block)] = block.T
+            done += len(block)
+        return self.words.table(values.T)
+
+    def close(self) -> None:
+        """Give the file back."""
+        self._file.close()
+
+
+def _words_beside(path: Path) -> Path:
+    return path.with_suffix(".words")
+
+
+def remove_rows(path: Path) -> None:
+    """Remove such a file and what stands beside it."""
+    for each in (path, path.with_name(path.name + NEW), _words_beside(path)):
+        world.unlink(each, missing_ok=True)

@@ -1,0 +1,210 @@
+"""`Recorder`: takes the rows of a run, and keeps them in memory or in a file."""
+
+from __future__ import annotations
+
+import zlib
+from collections.abc import Iterable, Iterator, Sequence
+from contextlib import contextmanager, suppress
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ... import world
+from ...errors import RecordError
+from ...master import Rows
+from .binary import RowsFile, RowsWriter
+from .columns import Columns, InFile, InMemory
+from .words import Words
+
+ROWS_FILE, SEEN_FILE = "results.bin", "seen.bin"
+"""Of what is recorded, and of what is judged at points that are not."""
+_FLUSH_SECONDS, _FLUSH_BYTES = 1.0, 1 << 22
+"""How long, and how many, rows are held back."""
+_SMALL = 1 << 24
+"""Bytes of results that are read from their file into memory when it is complete."""
+_FLOAT = np.dtype("<f8")
+
+
+@dataclass(frozen=True)
+class Due:
+    """Which communication points are recorded: every so many, and the last.
+
+    Attributes:
+        every: how many. last: the number of the last.
+    """
+
+    every: int
+    last: int
+
+    def of(self, steps: int, rows: Rows) -> Rows:
+        """Those of the rows up to a number of steps; the very same rows where that is all of them."""
+        if self.every == 1 or not len(rows):
+            return rows
+        first = steps - len(rows) + 1
+        if not isinstance(rows, np.ndarray):
+            return [row for k, row in enumerate(rows, first) if k % self.every == 0 or k == self.last]
+        numbers = np.arange(-first % self.every, len(rows), self.every)
+        if steps == self.last and steps % self.every:
+            numbers = np.append(numbers, len(rows) - 1)
+        return rows[numbers]  # a copy: the block may go
+
+
+class Recorder:
+    """Takes rows of time and values while a run goes.
+
+    With a file they go there, about every second, so that a run that is killed leaves all but its last second and
+    memory does not grow with the number of steps. Without one they stay in memory.
+
+    Args:
+        names: of the signals.
+        kinds: their FMI types.
+        path: of the file, if there is one.
+        there: how many rows of this run the file has, if the run goes on; they stay until there are as many new ones.
+        identity: of the run.
+
+    Attributes:
+        count: how many rows there are. checksum: of those that were brought to the file.
+
+    Raises:
+        RecordError: here and in all methods: the file cannot be written.
+    """
+
+    def __init__(
+        self, names: Sequence[str], kinds: Sequence[str], path: Path | None, *, there: int = 0, identity: str = ""
+    ) -> None:
+        self._columns = ["time", *names]
+        self._whole = [k for k, kind in enumerate(kinds, 1) if kind not in ("Real", "String")]
+        self._words = Words(k for k, kind in enumerate(kinds, 1) if kind == "String")
+        self._blocks: list[NDArray[np.float64]] = []
+        self._rows: list[Sequence[object]] = []
+        self._flushed, self._held = world.monotonic(), 0
+        self._path = path
+        self._writer = self._open(there, identity)
+        self.count = self.checksum = 0
+
+    def _open(self, there: int, identity: str) -> RowsWriter | None:
+        if self._path is None:
+            return None
+        with self._telling():
+            return RowsWriter(self._path, self._columns, self._whole, self._words, there=there, identity=identity)
+
+    def extend(self, rows: Rows) -> None:
+        """Append rows of time and values; an array is kept, not copied."""
+        self.count += len(rows)
+        if isinstance(rows, np.ndarray):
+            self._seal()
+            if len(rows):
+                self._blocks.append(rows)
+        else:
+            self._rows.extend(rows)
+        if self._writer is not None:
+            self._held += len(rows) * len(self._columns) * _FLOAT.itemsize
+            if self._held > _FLUSH_BYTES or world.monotonic() - self._flushed > _FLUSH_SECONDS:
+                self.flush()
+
+    def go_on(self, blocks: Iterable[NDArray[np.float64]], words: Words, rows: int) -> None:
+        """Begin with rows of the same run that were recorded before.
+
+        Args:
+            blocks: of them.
+            words: their texts.
+            rows: how many of them to take.
+        """
+        for block in blocks:
+            taken = block[: rows - self.count]
+            if words.columns:
+                self.extend(
+                    [list(row) for row in zip(*(words.decode(k, c) for k, c in enumerate(taken.T)), strict=True)]
+                )
+            else:
+                self.extend(taken)
+            if self.count == rows:
+                break
+        self.flush()
+
+    def flush(self, *, sync: bool = False) -> bool:
+        """Bring everything to the file, if there is one, and wait until it is there where ``sync`` asks for that.
+
+        Returns:
+            Whether the file has taken the place of one that was there.
+        """
+        self._seal()
+        if self._writer is None:
+            return False
+        with self._telling():
+            for block in self._blocks:
+                self._writer.append(block)
+                self.checksum = add_to_checksum(self.checksum, block)
+            self._blocks, self._held = [], 0
+            self._flushed = world.monotonic()
+            return self._writer.flush(sync=sync)
+
+    def close(self) -> None:
+        """End the file. What was recorded can be read from then on."""
+        if self._writer is None:
+            return
+        try:
+            if not self.flush():
+                with self._telling():
+                    self._writer.close()
+                    self._writer.take_place()
+        finally:
+            with suppress(OSError):
+                self._writer.close()
+            self._writer = None
+
+    def columns(self) -> Columns:
+        """What was recorded, the time among it: out of memory, or of the closed file."""
+        if self._path is None:
+            self._seal()
+            table = np.empty((len(self._columns), self.count))
+            begin = 0
+            for block in self._blocks:
+                table[:, begin : begin + len(block)] = block.T
+                begin += len(block)
+            return InMemory(zip(self._columns, self._words.table(table.T), strict=True))
+        return columns_of(RowsFile(self._path))
+
+    def _seal(self) -> None:
+        """Make one block of the single rows."""
+        if self._rows:
+            self._blocks.append(self._words.encode(self._rows))
+            self._rows = []
+
+    @contextmanager
+    def _telling(self) -> Iterator[None]:
+        try:
+            yield
+        except OSError as error:
+            assert self._path is not None
+            size = world.stat(self._path).st_size if self._path.exists() else 0
+            raise RecordError(
+                f"{self._path.name} in {self._path.parent} cannot be written beyond {size / 1e6:.3g} MB: "
+                f"{error.strerror or error}; make room there or name another directory, or record less"
+            ) from error
+
+
+def columns_of(rows: RowsFile) -> Columns:
+    """What such a file holds: in memory if it is small, else read when it is asked for."""
+    if rows.count * len(rows.columns) * _FLOAT.itemsize > _SMALL:
+        return InFile(rows)
+    try:
+        return InMemory(zip(rows.columns, rows.table(), strict=True))
+    finally:
+        rows.close()
+
+
+def add_to_checksum(checksum: int, rows: NDArray[np.float64]) -> int:
+    """A checksum that goes on with some rows, as they stand in a file; texts count by their numbers."""
+    return zlib.crc32(np.ascontiguousarray(rows, _FLOAT).data, checksum)
+
+
+def checksum_of(blocks: Iterable[NDArray[np.float64]], rows: int) -> tuple[int, int]:
+    """The checksum of the first rows, and how many rows there are in all."""
+    checksum = count = 0
+    for block in blocks:
+        checksum = add_to_checksum(checksum, block[: max(0, rows - count)]) if count < rows else checksum
+        count += len(block)
+    return checksum, count

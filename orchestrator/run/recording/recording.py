@@ -1,0 +1,144 @@
+"""`Recording`: what is kept of a run: its results, and what is judged of points that are no results."""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ...errors import ScenarioError
+from ...evaluation import Signals
+from ...master import Rows
+from .columns import Columns
+from .recorder import ROWS_FILE, SEEN_FILE, Recorder, checksum_of
+from .results import Results
+from .stored import open_stored
+
+_FILES = (ROWS_FILE, SEEN_FILE)
+
+
+class Recording:
+    """Takes the points of a run in.
+
+    Args:
+        names: of the signals, as they stand behind the time in a row.
+        kinds: their FMI types.
+        judged: those that metrics and requirements look at, if they see points that are no results.
+        directory: where the files are; None keeps everything in memory.
+        identity: of the run.
+        before: how many rows the run's files have, if it goes on, in the order of the files.
+    """
+
+    def __init__(
+        self,
+        names: Sequence[str],
+        kinds: Sequence[str],
+        judged: Collection[str] | None,
+        directory: Path | None,
+        *,
+        identity: str = "",
+        before: Sequence[int] = (0, 0),
+    ) -> None:
+        paths = (None, None) if directory is None else tuple(directory / name for name in _FILES)
+        self._recorders = [Recorder(names, kinds, paths[0], there=before[0], identity=identity)]
+        self._pick: list[int] = []
+        if judged is not None:
+            self._pick = [k for k, name in enumerate(names) if name in judged]
+            chosen, of = [names[k] for k in self._pick], [kinds[k] for k in self._pick]
+            self._recorders.append(Recorder(chosen, of, paths[1], there=before[1], identity=identity))
+
+    def see(self, points: Rows, results: Rows) -> None:
+        """Take in points, and those of them that are results."""
+        self._recorders[0].extend(results)
+        if len(self._recorders) > 1:
+            places = [0, *(k + 1 for k in self._pick)]
+            if isinstance(points, np.ndarray):
+                self._recorders[1].extend(points.take(places, axis=1))
+            else:
+                self._recorders[1].extend([[row[k] for k in places] for row in points])
+
+    def go_on(self, directory: Path, record: Mapping[str, Any], marks: Sequence[Sequence[int]]) -> None:
+        """Begin with the rows up to a checkpoint.
+
+        Args:
+            directory: of the run.
+            record: its run.json.
+            marks: of the checkpoint.
+        """
+        for recorder, name, (rows, _) in zip(self._recorders, _FILES, marks, strict=False):
+            stored = open_stored(directory, record, name)
+            recorder.go_on(stored.blocks, stored.words, rows)
+
+    @property
+    def marks(self) -> list[list[int]]:
+        """Of each file how many rows it has, and their checksum."""
+        return [[recorder.count, recorder.checksum] for recorder in self._recorders]
+
+    def flush(self, *, sync: bool = False) -> None:
+        """Bring everything to the files, and wait until it is there where ``sync`` asks for that."""
+        for recorder in self._recorders:
+            recorder.flush(sync=sync)
+
+    def close(self) -> None:
+        """End the files: what was recorded can be read from then on."""
+        for recorder in self._recorders:
+            recorder.close()
+
+    def columns(self) -> Columns:
+        """The results, the time among them."""
+        return self._recorders[0].columns()
+
+    def judged(self, results: Results) -> Signals:
+        """What metrics and requirements look at: every point."""
+        return results if len(self._recorders) == 1 else _Judged(results, self._recorders[1].columns())
+
+
+class _Judged:
+    """Signals at every point, although fewer are results."""
+
+    def __init__(self, results: Results, columns: Columns) -> None:
+        self._results, self._columns = results, columns
+        self.step, self.completed, self.stop_time = results.step, results.completed, results.stop_time
+        self.units, self.parameters = results.units, results.parameters
+
+    @property
+    def time(self) -> NDArray[np.float64]:
+        return self._columns["time"]
+
+    @property
+    def points(self) -> int:
+        return self._columns.points
+
+    def part(self, first: int, last: int) -> Mapping[str, NDArray[Any]]:
+        return self._columns.part(first, last)
+
+    def names(self) -> Collection[str]:
+        return self._results.names()
+
+    def __getitem__(self, name: str) -> NDArray[Any]:
+        return self._columns[name]
+
+
+def check_stored(directory: Path, record: Mapping[str, Any], marks: Sequence[Sequence[int]]) -> list[int]:
+    """How many rows each file has of a run that is to go on, which may be more than its checkpoint tells of.
+
+    Raises:
+        ScenarioError: they are not those of the checkpoint.
+    """
+    counts = [0] * len(_FILES)
+    for k, (name, (rows, checksum)) in enumerate(zip(_FILES, marks, strict=False)):
+        try:
+            found, counts[k] = checksum_of(open_stored(directory, record, name).blocks, rows)
+        except (OSError, ValueError, LookupError, TypeError) as error:
+            raise ScenarioError(f"{directory} cannot be resumed: {name} cannot be read: {error}") from error
+        if counts[k] < rows:
+            raise ScenarioError(
+                f"{directory} cannot be resumed: its results have {counts[k]} rows, fewer than the {rows} of its "
+                "checkpoint"
+            )
+        if found != checksum:
+            raise ScenarioError(f"{directory} cannot be resumed: its results and its checkpoint are of different runs")
+    return counts

@@ -1,0 +1,159 @@
+"""What a run leaves behind: recorded signals by name, in memory and on disk."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Collection, Iterator, Mapping, Sequence
+from functools import cached_property
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ... import world
+from ...errors import ScenarioError, SignalError
+from ...times import digits
+from .columns import Columns, InMemory
+from .missing import missing_signal, shortened
+from .stored import read_stored
+
+_TIME = "time"
+
+
+class Results(Mapping[str, NDArray[Any]]):
+    """Recorded points of a run: a mapping from signals, such as ``"train[1].speed"``, to arrays over ``results.time``.
+
+    Its length is that of a mapping, the number of signals; ``points`` is the number of points. Where there are many,
+    they stay in their file, and an array is read from there when it is asked for.
+
+    Args:
+        columns: the signals, or all columns of a file. time: shape (T,), s; None where it is among them.
+
+    Attributes:
+        units: unit by signal name, where there is one.
+        parameters: parameters and start values by full name, as the run used them.
+        step: communication step in s. stop_time: planned end in s.
+        completed: whether the run reached its end. figures: the figures the scenario asks for.
+    """
+
+    def __init__(
+        self,
+        columns: Mapping[str, NDArray[Any]],
+        time: NDArray[np.float64] | None,
+        *,
+        units: Mapping[str, str],
+        parameters: Mapping[str, float | int | bool | str],
+        step: float,
+        stop_time: float,
+        completed: bool,
+        figures: Sequence[Mapping[str, Any]] = (),
+    ) -> None:
+        if isinstance(columns, Columns):
+            self._columns = columns
+        else:
+            self._columns = InMemory(columns if time is None else {_TIME: time, **columns})
+        self.units = units
+        self.parameters = parameters
+        self.step = step
+        self.stop_time = stop_time
+        self.completed = completed
+        self.figures = figures
+
+    @cached_property
+    def time(self) -> NDArray[np.float64]:
+        """Recorded points in s, shape (T,)."""
+        return self._columns[_TIME]
+
+    @property
+    def points(self) -> int:
+        """How many points were recorded."""
+        return self._columns.points
+
+    def part(self, first: int, last: int) -> Mapping[str, NDArray[Any]]:
+        """All columns, and ``time``, at the points from a number up to another, which is not among them."""
+        return self._columns.part(first, last)
+
+    @cached_property
+    def _names(self) -> dict[str, None]:
+        return dict.fromkeys(name for name in self._columns if name != _TIME)
+
+    def names(self) -> Collection[str]:
+        """All recorded signals."""
+        return self._names.keys()
+
+    def __getitem__(self, name: str) -> NDArray[Any]:
+        if name not in self:
+            raise SignalError(missing_signal(name, self._names, self.parameters))
+        return self._columns[name]
+
+    def __contains__(self, name: object) -> bool:
+        try:
+            return name in self._names
+        except TypeError:  # no name at all
+            return False
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(self._names)
+
+    def __len__(self) -> int:
+        return len(self._names)
+
+    def __eq__(self, other: object) -> bool:
+        return self is other  # arrays are not equal or unequal as a whole
+
+    __hash__ = object.__hash__
+
+    def __repr__(self) -> str:
+        span = ""
+        if self.points:
+            first, last = (self.part(k, k + 1)[_TIME][0] for k in (0, self.points - 1))
+            span = f" from {digits(float(first))} to {digits(float(last))} s"
+        return f"<Results of {len(self)} signals at {self.points} points{span}: {shortened(self)}>"
+
+    @classmethod
+    def load(cls, directory: str | Path) -> Results:
+        """Read a results directory back, complete or cut short.
+
+        Raises:
+            ScenarioError: the directory holds no readable run.
+        """
+        directory = Path(directory)
+        try:
+            record = json.loads(world.read_text(directory / "run.json", encoding="utf-8"))
+            columns = read_stored(directory, record)
+            _check_record(record)
+            return cls(
+                columns,
+                None,
+                units=record["units"],
+                parameters=record["parameters"],
+                step=record["step"],
+                stop_time=record["stop_time"],
+                completed=record["status"] == "completed",
+                figures=record["figures_wanted"],
+            )
+        except KeyError as error:
+            raise ScenarioError(f"{directory} holds no run that can be read: it has no {error}") from error
+        except (OSError, ValueError, TypeError, RecursionError) as error:
+            raise ScenarioError(f"{directory} holds no run that can be read: {error}") from error
+
+
+def _check_record(record: Mapping[str, Any]) -> None:
+    """Refuse a run.json in which somebody has written something else than we do.
+
+    Raises:
+        ValueError: with the key.
+        KeyError: one is missing.
+    """
+    tables, figures = {"units": str, "parameters": str | int | float | None}, record["figures_wanted"]
+    wrong = [
+        key
+        for key, kind in tables.items()
+        if not isinstance(record[key], dict) or not all(isinstance(value, kind) for value in record[key].values())
+    ]
+    wrong += [key for key in ("step", "stop_time") if not isinstance(record[key], int | float)]
+    if not isinstance(figures, list) or not all(isinstance(figure, dict) for figure in figures):
+        wrong.append("figures_wanted")
+    if wrong:
+        raise ValueError(f"its {wrong[0]} in run.json is not what a run writes there")
