@@ -26,7 +26,7 @@ from railcosim.orchestrator.isolation.proxy import IsolatedSlave
 from railcosim.orchestrator.master import compiled
 from railcosim.orchestrator.master.loop import Master, Rows
 from railcosim.orchestrator.run.checking import check
-from railcosim.orchestrator.run.results import Recorder
+from railcosim.orchestrator.run.recording import Recorder
 from railcosim.orchestrator.system import Algorithm, System
 from ring import HERE, light
 

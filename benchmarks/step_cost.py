@@ -27,7 +27,7 @@ from railcosim.orchestrator.fmi.archive import Workspace
 from railcosim.orchestrator.fmi.binding.libraries import forget_paths
 from railcosim.orchestrator.master.loop import Master, Rows
 from railcosim.orchestrator.run.checking import Checked, check
-from railcosim.orchestrator.run.results import Recorder
+from railcosim.orchestrator.run.recording import Recorder
 from railcosim.orchestrator.system import System
 
 SCENARIO = "comfort_cruise"

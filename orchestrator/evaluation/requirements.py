@@ -220,7 +220,7 @@ class _Look:
         if self._worst is None or key < self._worst[0]:
             self._worst = key, self._at(time, slack, bool(holds[row, column]), row, column)
         if self._quantifier == "eventually":
-            every = holds.all(axis=0)  # the rows of a slice count together, at the best moment
+            every = np.asarray(holds.all(axis=0))  # the rows of a slice count together, at the best moment
             column = int(np.lexsort((-slack.min(axis=0), ~every))[0])
             best = (not every[column], -float(slack[:, column].min()))
             if self._best is None or best < self._best[0]:

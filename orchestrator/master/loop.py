@@ -311,6 +311,8 @@ class Master:
     def restore(self, saved: Mapping[str, Any]) -> None:
         """Go on where `save` was called; the FMUs' states have been restored."""
         self.coupling.steps, self.coupling.time = int(saved["steps"]), float(saved["time"])
+        if len(saved["values"]) != len(self.values):
+            raise ValueError(f"{len(saved['values'])} values of {len(self.values)}")
         self.values[:] = saved["values"]
         self.exchange.history.clear()
         self.exchange.history.extend(saved["history"])

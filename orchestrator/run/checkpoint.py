@@ -57,6 +57,11 @@ class Checkpoint:
         """How far the run had got, in s."""
         return float(self.progress["time"])
 
+    @property
+    def rows(self) -> int:
+        """How many results there were."""
+        return self.marks[0][0]
+
     @classmethod
     def take(
         cls,
@@ -201,7 +206,7 @@ def read_checkpoint(directory: Path) -> Checkpoint:
             seen=content["seen"],
             run=content["run"],
         )
-        if not all(rows >= 1 for rows, _ in point.marks) or not point.marks or not math.isfinite(point.time):
+        if not point.marks or not all(rows >= 1 for rows, _ in point.marks) or not math.isfinite(point.time):
             raise ValueError(f"{point.marks} rows up to {point.time} s")
     except ScenarioError:
         raise

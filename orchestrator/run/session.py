@@ -167,17 +167,19 @@ class Session:
         self._watching = Watching(system, self._interfaces, self.checked.wiring, master.signals)
         place, begin = self.job.place, self.job.begin
         directory, identity = (None, "") if place is None else (place.path, place.identity)
-        self._recording = Recording(
+        if begin is not None:
+            begin.restore(master)
+            self._watching.restore(begin.seen)
+        recording = Recording(
             master.signals, master.kinds, self._judged, directory, identity=identity, before=self._before
         )
         if begin is None or directory is None:
             first = [[system.stepping.start_time, *master.values]]
-            self._recording.see(first, first)
+            recording.see(first, first)
             self._watching.see(first)
         else:
-            begin.restore(master)
-            self._watching.restore(begin.seen)
-            self._recording.go_on(directory, record_file.read(directory), begin.marks)
+            recording.go_on(directory, record_file.read(directory), begin.marks)
+        self._recording = recording
 
     @property
     def _row_every(self) -> float:
@@ -238,14 +240,16 @@ class Session:
             points = rows if len(rows) else [[time, *master.values]]
             kept = due.of(steps, rows)
             watching.see(points)
-            if stopped.is_set() and time < last and not (len(kept) and kept[-1][0] == time):
-                kept = [*kept, [time, *master.values]]  # the point at which the run is stopped
             recording.see(points, kept)
             reached = int((time - system.stepping.start_time) / percent + 1e-9)
             if progress is not None and (reached > told or world.monotonic() - shown > 0.1 or time >= last):
                 shown, told = world.monotonic(), reached
                 progress(time, system.stepping.stop_time)
-            return not stopped.is_set()
+            if not stopped.is_set():
+                return True
+            if time < last and not (len(kept) and kept[-1][0] == time):
+                recording.see((), [[time, *master.values]])  # the point at which the run was stopped
+            return False
 
         return observe
 

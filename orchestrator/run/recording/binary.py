@@ -62,15 +62,20 @@ class RowsWriter:
         head = {"run": identity, "columns": list(columns), "whole": list(whole), "texts": words.columns}
         self._file.write(json.dumps(head).encode() + b"\n")
         self._file.flush()
+        if words.columns and not there:
+            self._tell_words()
+
+    def _tell_words(self) -> None:
+        self._told = len(self._words)
+        beside = _words_beside(self.path)
+        part = beside.with_name(beside.name + NEW)
+        world.write_text(part, json.dumps(self._words.known), encoding="utf-8")
+        world.replace(part, beside)
 
     def append(self, block: NDArray[np.float64]) -> None:
         """Add rows, shape (n, columns)."""
         if len(self._words) > self._told:  # first: a row means nothing without its texts
-            self._told = len(self._words)
-            beside = _words_beside(self.path)
-            part = beside.with_name(beside.name + NEW)
-            world.write_text(part, json.dumps(self._words.known), encoding="utf-8")
-            world.replace(part, beside)
+            self._tell_words()
         self._file.write(np.ascontiguousarray(block, _FLOAT).data)
         self._left -= len(block)
 
@@ -96,6 +101,8 @@ class RowsWriter:
 
     def take_place(self) -> None:
         """Let the closed file be what stands under its name, although it has fewer rows."""
+        if self._part == self.path:
+            return
         world.replace(self._part, self.path)
         self._part = self.path
 
@@ -111,8 +118,8 @@ class RowsFile:
         self._file = world.open(path, "rb")
         try:
             header = json.loads(self._file.readline())
-            self.identity: str = header.get("run", "")
             self.columns: list[str] = header["columns"]
+            self.identity: str = header.get("run", "")
             self.whole: list[int] = header["whole"]
             if not self.columns:
                 raise ValueError(f"{path.name} has no columns")

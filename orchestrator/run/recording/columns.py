@@ -75,6 +75,9 @@ class InFile(Columns):
         self._rows = rows
         self._places = {name: k for k, name in enumerate(rows.columns)}
 
+    def __del__(self) -> None:
+        self._rows.close()
+
     @property
     def points(self) -> int:
         """How many there are."""

@@ -133,7 +133,7 @@ def check_stored(directory: Path, record: Mapping[str, Any], marks: Sequence[Seq
         try:
             found, counts[k] = checksum_of(open_stored(directory, record, name).blocks, rows)
         except (OSError, ValueError, LookupError, TypeError) as error:
-            raise ScenarioError(f"{directory} cannot be resumed: {name} cannot be read: {error}") from error
+            raise ScenarioError(f"{directory} cannot be resumed: its results cannot be read: {error}") from error
         if counts[k] < rows:
             raise ScenarioError(
                 f"{directory} cannot be resumed: its results have {counts[k]} rows, fewer than the {rows} of its "

@@ -122,6 +122,8 @@ class Results(Mapping[str, NDArray[Any]]):
         try:
             record = json.loads(world.read_text(directory / "run.json", encoding="utf-8"))
             columns = read_stored(directory, record)
+            if _TIME not in columns:
+                raise KeyError(_TIME)
             _check_record(record)
             return cls(
                 columns,

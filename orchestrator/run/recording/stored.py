@@ -49,7 +49,7 @@ def open_stored(directory: Path, record: Mapping[str, Any], name: str = ROWS_FIL
     """
     if name != ROWS_FILE or (directory / name).exists():
         rows = _rows_of(directory / name, record)
-        return Stored(rows.columns, rows.words, rows.blocks())
+        return Stored(rows.columns, rows.words, _all_of(rows))
     return Stored(*read_csv(directory / CSV_FILE, record["texts"]))
 
 
@@ -68,6 +68,13 @@ def read_stored(directory: Path, record: Mapping[str, Any]) -> Columns:
         raise ValueError(f"{CSV_FILE} is not that of the run in run.json: it is of another run, or was changed")
     table = np.concatenate([np.empty((0, len(stored.columns))), *blocks])
     return InMemory(zip(stored.columns, stored.words.table(table), strict=True))
+
+
+def _all_of(rows: RowsFile) -> Iterator[NDArray[np.float64]]:
+    try:
+        yield from rows.blocks()
+    finally:
+        rows.close()
 
 
 def _rows_of(path: Path, record: Mapping[str, Any]) -> RowsFile:

@@ -9,15 +9,16 @@ it shows in `swings` that become larger and larger up to the end, which no coupl
 from __future__ import annotations
 
 import math
-from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any, Protocol
+from typing import TypeAlias
 
 import networkx as nx
 import numpy as np
 from numpy.typing import NDArray
 
 from ...errors import FmuError
+from ...evaluation import Part
 from ...fmi import Interface
 from ...master import ALGORITHMS, find_loops
 from ...names import SignalName
@@ -26,8 +27,10 @@ from ...times import digits
 from ...wiring import Link
 from .finding import Finding
 from .swings import find_swings
+from .tail import Tail
 
 Array = NDArray[np.float64]
+Points: TypeAlias = Part | Tail
 
 _FACTOR = 1.2
 """Growth in each communication step above which it is not taken for physical; less where the sign alternates."""
@@ -44,17 +47,6 @@ _ASTRONOMIC = 1e30
 _STEADY = 1e3
 """A factor that is no property of a linear coupling: it changes from step to step."""
 _SHOWN = 4
-
-
-class Points(Protocol):
-    """Signals by name over points of time, in s, some of which are a communication step apart."""
-
-    @property
-    def time(self) -> Array: ...
-    @property
-    def step(self) -> float: ...
-    def names(self) -> Collection[str]: ...
-    def __getitem__(self, name: str, /) -> NDArray[Any]: ...
 
 
 @dataclass(frozen=True)

@@ -173,8 +173,8 @@ def test_failures_elsewhere(fmu, go, mode, message, reached):
 
 CRASH = """
 from railcosim.orchestrator.cli import app as cli
-from railcosim.orchestrator.run import results
-results._FLUSH_SECONDS = 0.0
+from railcosim.orchestrator.run.recording import recorder
+recorder._FLUSH_SECONDS = 0.0
 cli.main()
 """
 

@@ -84,9 +84,9 @@ def test_another_fmu_of_the_same_name(tmp_path, foreign, xml):
     system.add("gust", "Gust")
     point = run(system, kind="python", output=tmp_path / "out")
     assert point.status == "completed"
-    models = point.checked.models
-    taken = checkpoint.Checkpoint(system, "python", 1, {n: m.digest for n, m in models.items()}, {}, {}, 1.0, [], "", 0)
-    taken.check(models, tmp_path)
+    digests = {name: model.digest for name, model in point.checked.models.items()}
+    taken = checkpoint.Checkpoint(system, "python", [[1, 0]], digests, {}, {}, 1.0, [], "")
+    taken.check(point.checked.models, tmp_path)
     foreign([v("u", "input", start=1.0), v("y", "output")], **how)
     other = run(system, kind="python").checked.models
     with pytest.raises(ScenarioError, match=r"cannot be resumed: it is not the model the run began with"):
@@ -120,7 +120,7 @@ def test_results_of_another_run(made, tmp_path):
     (made / "results.csv").write_text("\n".join(other) + "\n")
     assert refusal(made) == wanted
     (made / "results.csv").unlink()
-    assert "holds no run that can be read" in refusal(made)
+    assert refusal(made).startswith(f"{made} cannot be resumed: its results cannot be read: [Errno 2] No such file")
 
 
 @pytest.mark.parametrize("every", [0.0, -1.0, float("inf"), float("nan")])
@@ -197,8 +197,8 @@ WRONG = {
     "no system": lambda d: change(d, system={}),
     "a system with more": lambda d: change(d, system=json.loads(archive(d)["checkpoint.json"])["system"] | {"x": 1}),
     "no progress": lambda d: change(d, progress={}),
-    "no rows": lambda d: change(d, rows=0),
-    "rows in words": lambda d: change(d, rows="many"),
+    "no rows": lambda d: change(d, marks=[]),
+    "rows in words": lambda d: change(d, marks=[["many", 0]]),
 }
 
 
@@ -221,7 +221,7 @@ def test_a_file_that_is_broken(made, wrong):
 def test_a_file_with_a_few_wrong_bytes(made, tmp_path):
     """Refused in words, or, where the byte says nothing, resumed as if nothing were."""
     wanted, whole = read(made), (made / "checkpoint.zip").read_bytes()
-    draw, refused, read_well = random.Random(1), 0, 0
+    draw, refused, read_well = random.Random(2), 0, 0
     for _ in range(150):
         content = bytearray(whole)
         for _ in range(draw.randrange(1, 4)):
@@ -237,7 +237,7 @@ def test_a_file_with_a_few_wrong_bytes(made, tmp_path):
             assert read(tmp_path / "copy") == wanted
             read_well += 1
     assert refused + read_well == 150
-    assert 0 < read_well < 50
+    assert 0 < read_well < 50, (refused, read_well)
 
 
 @pytest.mark.parametrize(

@@ -71,7 +71,7 @@ def test_rows_of_another_run_are_refused(tmp_path):
     (one / "results.csv").write_bytes((two / "results.csv").read_bytes())
     with pytest.raises(ScenarioError, match=r"results\.csv is not that of the run in run\.json"):
         Results.load(one)
-    with pytest.raises(ScenarioError, match=r"results\.csv is not that of the run in run\.json"):
+    with pytest.raises(ScenarioError, match="its results and its checkpoint are of different runs"):
         resume(one, stop_time=3.0)
     (one / "run.json").write_bytes((two / "run.json").read_bytes())
     assert len(Results.load(one).time) == 21  # all of the other one's, but for the checkpoint

@@ -12,8 +12,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from railcosim.orchestrator import world
 from railcosim.orchestrator.errors import ScenarioError, SignalError
-from railcosim.orchestrator.run.results import Due, Recorder, Results
-from railcosim.orchestrator.run.rows import recover_rows
+from railcosim.orchestrator.run.recording import ROWS_FILE, Due, Recorder, Results, finish_rows, recover_rows
 
 RECORD = {
     "units": {"train.speed": "m/s"},
@@ -30,7 +29,7 @@ AWKWARD = [0.1, 1 / 3, -0.0, 5e-324, 1.7976931348623157e308, math.pi, 1e16, 1234
 def recorded(directory, names, rows, kinds=None):
     """A recorder that has seen these rows, some one by one and the rest in an array, if they are all numbers."""
     kinds = kinds or ["Real"] * len(names)
-    recorder = Recorder(names, kinds, directory)
+    recorder = Recorder(names, kinds, directory and directory / ROWS_FILE)
     single = len(rows) if "String" in kinds else len(rows) // 2
     for row in rows[:single]:
         recorder.extend([row])
@@ -42,19 +41,21 @@ def recorded(directory, names, rows, kinds=None):
 def saved(directory, names, rows, kinds=None, **record):
     recorder = recorded(directory, names, rows, kinds)
     recorder.close()
+    columns = recorder.columns()
+    finish_rows(directory)
     (directory / "run.json").write_text(json.dumps(RECORD | record))
-    return recorder
+    return columns
 
 
 def test_numbers_survive_exactly(tmp_path):
     rows = [(k * 0.1, value, k, k % 2) for k, value in enumerate(AWKWARD)]
     kinds = ["Real", "Integer", "Boolean"]
-    time, columns = saved(tmp_path, ["train.speed", "train.gear", "train.on"], rows, kinds).columns()
+    columns = saved(tmp_path, ["train.speed", "train.gear", "train.on"], rows, kinds)
     loaded = Results.load(tmp_path)
-    assert np.array_equal(loaded.time, time)
+    assert np.array_equal(loaded.time, columns["time"])
     assert list(loaded.time) == [k * 0.1 for k in range(len(AWKWARD))]
     assert list(loaded.names()) == ["train.speed", "train.gear", "train.on"]
-    for name in columns:
+    for name in loaded:
         assert np.array_equal(loaded[name], columns[name])
         assert loaded[name].dtype == columns[name].dtype == np.float64
     assert list(loaded["train.speed"]) == AWKWARD
@@ -73,7 +74,7 @@ TEXTS = ["plain", "12", "", 'say "no", twice', "two\nlines", "3.5e7", "naïve", 
 
 def test_texts_survive_even_where_they_look_like_numbers(tmp_path):
     rows = [(float(k), text, 1.5 * k) for k, text in enumerate(TEXTS)]
-    _, columns = saved(tmp_path, ["a.word", "a.x"], rows, ["String", "Real"], texts=["a.word"]).columns()
+    columns = saved(tmp_path, ["a.word", "a.x"], rows, ["String", "Real"], texts=["a.word"])
     loaded = Results.load(tmp_path)
     assert list(loaded["a.word"]) == list(columns["a.word"]) == TEXTS
     assert loaded["a.word"].dtype == columns["a.word"].dtype == object
@@ -165,7 +166,7 @@ def test_what_holds_no_run(tmp_path):
     assert "Expecting property name" in refusal()
     (tmp_path / "run.json").write_text(json.dumps(RECORD))
     (tmp_path / "results.csv").write_text("time,x\n0.0,many\n")
-    assert "could not convert string to float: 'many'" in refusal()
+    assert "could not convert string 'many' to float64" in refusal()
     (tmp_path / "results.csv").write_text("")
     assert "it has no 'time'" in refusal()
     (tmp_path / "run.json").write_text("[" * 100_000)
@@ -203,9 +204,7 @@ def now(monkeypatch):
 def test_rows_reach_the_disk_while_the_run_goes(tmp_path, now):
     """The names at once, the rest about every second; as text only when the run has ended."""
     (tmp_path / "run.json").write_text(json.dumps(RECORD | {"status": "running"}))
-    (tmp_path / "results.csv").write_text("time,old\n")
-    recorder = Recorder(["x", "gear"], ["Real", "Integer"], tmp_path)
-    assert not (tmp_path / "results.csv").exists(), "of an earlier run"
+    recorder = Recorder(["x", "gear"], ["Real", "Integer"], tmp_path / ROWS_FILE)
     assert list(Results.load(tmp_path).names()) == ["x", "gear"]
     assert len(Results.load(tmp_path).time) == 0
     for k, moment in enumerate([0.2, 0.9, 1.1, 1.5, 2.0, 2.2]):
@@ -216,23 +215,25 @@ def test_rows_reach_the_disk_while_the_run_goes(tmp_path, now):
     now[0] = 2.3
     recorder.extend([[6.0, 3.0, 6]])
     assert len(Results.load(tmp_path).time) == 6
-    assert not (tmp_path / "results.csv").exists()
     recorder.close()
+    finish_rows(tmp_path)
     assert (tmp_path / "results.csv").read_text().splitlines()[-2:] == ["5.0,2.5,5", "6.0,3.0,6"]
     assert sorted(p.name for p in tmp_path.iterdir()) == ["results.csv", "run.json"]
 
 
-def test_texts_are_written_as_text_at_once(tmp_path, now):
+def test_texts_reach_the_disk_as_well(tmp_path, now):
+    (tmp_path / "run.json").write_text(json.dumps(RECORD | {"status": "running", "texts": ["word"]}))
     (tmp_path / "results.bin").write_text("of an earlier run")
-    recorder, path = Recorder(["x", "word"], ["Real", "String"], tmp_path), tmp_path / "results.csv"
-    assert path.read_text() == "time,x,word\n"
+    recorder, path = Recorder(["x", "word"], ["Real", "String"], tmp_path / ROWS_FILE), tmp_path / "results.csv"
+    assert list(Results.load(tmp_path)["word"]) == []
     now[0] = 1.1
     recorder.extend([[0.0, 0.5, "so, so"]])
-    assert path.read_text() == 'time,x,word\n0.0,0.5,"so, so"\n'
-    recorder.extend([[1.0, 1.5, "b"]])
+    assert list(Results.load(tmp_path)["word"]) == ["so, so"]
+    recorder.extend([[1.0, 1.5, "b"], [2.0, 2.5, "so, so"]])
     recorder.close()
-    assert path.read_text().endswith("\n1.0,1.5,b\n")
-    assert not (tmp_path / "results.bin").exists()
+    finish_rows(tmp_path)
+    assert path.read_text() == 'time,x,word\n0.0,0.5,"so, so"\n1.0,1.5,b\n2.0,2.5,"so, so"\n'
+    assert sorted(p.name for p in tmp_path.iterdir()) == ["results.csv", "run.json"]
 
 
 @pytest.mark.parametrize("cut", [0, 1, 8, 23, 24])
@@ -263,8 +264,9 @@ def test_text_is_complete_or_not_there(tmp_path, monkeypatch):
     recorder = recorded(tmp_path, ["x"], [(0.0, 1.5), (1.0, 2.5)])
     (tmp_path / "run.json").write_text(json.dumps(RECORD))
     monkeypatch.setattr(world, "replace", lambda *_: (_ for _ in ()).throw(KeyboardInterrupt))
+    recorder.close()
     with pytest.raises(KeyboardInterrupt):
-        recorder.close()
+        finish_rows(tmp_path)
     assert not (tmp_path / "results.csv").exists()
     assert list(Results.load(tmp_path)["x"]) == [1.5, 2.5]
 
@@ -272,8 +274,8 @@ def test_text_is_complete_or_not_there(tmp_path, monkeypatch):
 def test_in_memory_only(tmp_path):
     recorder = recorded(None, ["x", "word"], [(0.0, 1.0, "a"), (1.0, 2.0, "b")], ["Real", "String"])
     recorder.close()
-    time, columns = recorder.columns()
-    assert (list(time), list(columns["x"]), list(columns["word"])) == ([0.0, 1.0], [1.0, 2.0], ["a", "b"])
+    columns = recorder.columns()
+    assert (list(columns["time"]), list(columns["x"]), list(columns["word"])) == ([0.0, 1.0], [1.0, 2.0], ["a", "b"])
     assert not list(tmp_path.iterdir())
 
 
@@ -281,9 +283,9 @@ def test_single_rows_and_blocks_keep_their_sequence():
     recorder = Recorder(["x"], ["Real"], None)
     for part in ([[0.0, 1.0]], np.array([[1.0, 2.0], [2.0, 3.0]]), [], np.empty((0, 2)), [[3.0, 4.0]], [[4.0, 5.0]]):
         recorder.extend(part)
-    time, columns = recorder.columns()
-    assert (list(time), list(columns["x"])) == ([0, 1, 2, 3, 4], [1, 2, 3, 4, 5])
-    assert Recorder(["x"], ["Real"], None).columns()[0].shape == (0,)
+    columns = recorder.columns()
+    assert (list(columns["time"]), list(columns["x"])) == ([0, 1, 2, 3, 4], [1, 2, 3, 4, 5])
+    assert Recorder(["x"], ["Real"], None).columns()["time"].shape == (0,)
 
 
 def results(*names, **how):
