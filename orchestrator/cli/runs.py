@@ -120,7 +120,9 @@ def run(
         with show_progress(
             point.system.provenance.name, quiet, point.system.stepping.start_time, point.time
         ) as progress:
-            outcome = go_on(resume_from, stop_time=stop, progress=progress, **how)
+            outcome = go_on(
+                resume_from, stop_time=stop, progress=progress, writing=progress and progress.writing, **how
+            )
     else:
         if scenario is None:
             raise ScenarioError("name a scenario (see 'orchestrate list'), or a run to go on with by --resume DIR")
@@ -129,7 +131,8 @@ def run(
         draw_as(system, figure_format, dpi)
         directory = output or Path("results") / "-".join(filter(None, (system.provenance.name, preset)))
         with show_progress(system.provenance.name, quiet, system.stepping.start_time) as progress:
-            outcome = execute(system, kind=kind.value, output=directory, progress=progress, **how)
+            writing = progress and progress.writing
+            outcome = execute(system, kind=kind.value, output=directory, progress=progress, writing=writing, **how)
     second = _at_half_the_step(outcome, kind, quiet) if verify_step else None
     verdict = None
     if second is not None and second.status == "completed":

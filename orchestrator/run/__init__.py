@@ -6,13 +6,14 @@ from .checkpoint import CHECKPOINT_FILE, read_checkpoint
 from .execution import at_half_the_step, execute, go_on, resume, run
 from .outcome import Run
 from .record import add_step_check
-from .recording import ROWS_FILE, Results, recover_rows
+from .recording import CSV_FILE, ROWS_FILE, Results, Telling, recover_rows
 from .session import Progress
 from .step_check import StepChange, StepCheck, check_step
 from .watching import Finding
 
 __all__ = [
     "CHECKPOINT_FILE",
+    "CSV_FILE",
     "ROWS_FILE",
     "Checked",
     "Finding",
@@ -21,6 +22,7 @@ __all__ = [
     "Run",
     "StepChange",
     "StepCheck",
+    "Telling",
     "add_step_check",
     "assembled",
     "at_half_the_step",

@@ -9,13 +9,13 @@ import psutil
 from ..system import System
 
 _VALUE = 8
-"""Bytes of a number in memory and in ``results.bin``."""
+"""Bytes of a number in ``results.bin``, or in memory where no directory is given."""
 _TEXT = 14
 """Bytes of a number in ``results.csv``, as the shipped scenarios have them on average."""
 _LARGE = 1e9
 """Bytes of results that are worth a word on any machine."""
 _SHARE = 0.25
-"""Of the memory that is free: at its end a run holds its results twice."""
+"""Of the memory that is free: at its end a run without a directory holds its results twice."""
 _UNITS = ((1e15, "PB"), (1e12, "TB"), (1e9, "GB"), (1e6, "MB"))
 
 
@@ -28,7 +28,7 @@ class Size:
 
     @property
     def memory(self) -> float:
-        """Bytes while it runs."""
+        """Bytes while it runs: in its file, or in memory."""
         return self.rows * self.columns * _VALUE
 
     @property
@@ -57,9 +57,9 @@ def tell_size(system: System, signals: int) -> str:
     stepping = system.stepping
     record = 10.0 * (stepping.step if stepping.record is None else stepping.record)
     return (
-        f"results will be large: {size.rows:.3g} rows of {size.columns} columns are {_bytes(size.memory)} in memory "
-        f"({_bytes(free)} are free) and about {_bytes(size.text)} in results.csv; record less often (simulation.record "
-        f"= {record:g} is a tenth of it) or end sooner"
+        f"results will be large: {size.rows:.3g} rows of {size.columns} columns are {_bytes(size.memory)} in "
+        f"results.bin, or in memory without -o ({_bytes(free)} are free), and about {_bytes(size.text)} in "
+        f"results.csv; record less often (simulation.record = {record:g} is a tenth of it) or end sooner"
     )
 
 

@@ -10,15 +10,30 @@ from contextlib import contextmanager
 from rich.progress import BarColumn, Progress, SpinnerColumn, TextColumn, TimeElapsedColumn, TimeRemainingColumn
 
 from ....fmus import toolchain
+from ...run import CSV_FILE, Telling
 from ...run import Progress as OnProgress
 from ...times import digits
 from .console import open_console, printable, tell
 
 
+class Shown:
+    """What is told of a run: how far it has got, and then how far its results are written.
+
+    Args:
+        stepping: shows the time reached and the stop time, in s.
+        writing: shows rows written, and rows in all.
+    """
+
+    def __init__(self, stepping: OnProgress, writing: Telling) -> None:
+        self._stepping, self.writing = stepping, writing
+
+    def __call__(self, time: float, stop: float) -> None:
+        """As a run calls it."""
+        self._stepping(time, stop)
+
+
 @contextmanager
-def show_progress(
-    title: str, quiet: bool, start: float = 0.0, reached: float | None = None
-) -> Iterator[OnProgress | None]:
+def show_progress(title: str, quiet: bool, start: float = 0.0, reached: float | None = None) -> Iterator[Shown | None]:
     """A progress bar on a terminal, one line per 10 % otherwise, nothing when quiet.
 
     Args:
@@ -39,11 +54,14 @@ def show_progress(
                 at = f"{digits(time)} of {digits(stop)} s"
                 bar.update(task, description=title, completed=time - start, total=stop - start, reached=at)
 
+            def write(done: int, rows: int) -> None:
+                bar.update(task, description=CSV_FILE, completed=done, total=rows, reached=f"{done} of {rows} rows")
+
             with _compilations(lambda what: bar.update(task, description=what)):
-                yield show
+                yield Shown(show, write)
     else:
         with _compilations(tell):
-            yield _lines(title, start, start if reached is None else reached)
+            yield Shown(_lines(title, start, start if reached is None else reached), lambda *_: None)
 
 
 @contextmanager

@@ -7,8 +7,10 @@ and then each row as 64-bit little-endian floats. The texts themselves stand in 
 
 from __future__ import annotations
 
+import errno
 import json
 import os
+import weakref
 from collections.abc import Collection, Iterator, Sequence
 from pathlib import Path
 from typing import Any
@@ -37,8 +39,11 @@ class RowsWriter:
         there: how many rows of the same run the file has, if it is resumed. They stay until there are as many new ones.
         identity: of the run.
 
+    Attributes:
+        rows: how many were written.
+
     Raises:
-        OSError: here and in all methods: the file cannot be written.
+        OSError: here and in all methods: the file cannot be written. It holds whole rows all the same.
     """
 
     def __init__(
@@ -58,10 +63,11 @@ class RowsWriter:
             world.unlink(path, missing_ok=True)
             world.unlink(_words_beside(path), missing_ok=True)
         self._part = path.with_name(path.name + NEW) if there else path
-        self._file = world.open(self._part, "wb")
+        self._file = world.open(self._part, "wb", buffering=0)  # nothing is written that is not counted
         head = {"run": identity, "columns": list(columns), "whole": list(whole), "texts": words.columns}
-        self._file.write(json.dumps(head).encode() + b"\n")
-        self._file.flush()
+        line = json.dumps(head).encode() + b"\n"
+        self.rows, self._begin, self._row = 0, len(line), len(columns) * _FLOAT.itemsize
+        self._write(memoryview(line))
         if words.columns and not there:
             self._tell_words()
 
@@ -76,8 +82,19 @@ class RowsWriter:
         """Add rows, shape (n, columns)."""
         if len(self._words) > self._told:  # first: a row means nothing without its texts
             self._tell_words()
-        self._file.write(np.ascontiguousarray(block, _FLOAT).data)
+        try:
+            self._write(np.ascontiguousarray(block, _FLOAT).data.cast("B"))
+        except OSError:  # half a row would shift all that follow
+            size = os.fstat(self._file.fileno()).st_size
+            self.rows = max(0, size - self._begin) // self._row
+            world.truncate(self._file.fileno(), self._begin + self.rows * self._row)
+            raise
+        self.rows += len(block)
         self._left -= len(block)
+
+    def _write(self, data: memoryview) -> None:
+        while data:
+            data = data[self._file.write(data) :]
 
     def flush(self, *, sync: bool = False) -> bool:
         """Bring rows to the file, and wait until they outlive the machine's power where ``sync`` asks for that.
@@ -85,14 +102,13 @@ class RowsWriter:
         Returns:
             Whether the file is now what stands under its name, and was not before.
         """
-        self._file.flush()
         if sync:
             world.fsync(self._file.fileno())
         if self._left > 0 or self._part == self.path:
             return False
         self._file.close()
         self.take_place()
-        self._file = world.open(self._part, "ab")
+        self._file = world.open(self._part, "ab", buffering=0)
         return True
 
     def close(self) -> None:
@@ -110,14 +126,23 @@ class RowsWriter:
 class RowsFile:
     """Reads rows from a file, of as many as there were when it was opened. A row that is half written is none.
 
+    Attributes:
+        columns, whole, words: as `RowsWriter` has them; identity: of the run.
+        count: how many rows there are.
+        close: gives the file back, which the end of this does as well.
+
     Raises:
         OSError, ValueError, LookupError, TypeError: it cannot be read.
     """
 
     def __init__(self, path: Path) -> None:
-        self._file = world.open(path, "rb")
+        with world.open(path, "rb") as stream:
+            line = stream.readline()
+        self._file = world.open_descriptor(path, os.O_RDONLY | getattr(os, "O_BINARY", 0))
+        # A file object would complain where it is given back by nobody, as arrays are.
+        self.close = weakref.finalize(self, world.close, self._file)
         try:
-            header = json.loads(self._file.readline())
+            header = json.loads(line)
             self.columns: list[str] = header["columns"]
             self.identity: str = header.get("run", "")
             self.whole: list[int] = header["whole"]
@@ -126,18 +151,25 @@ class RowsFile:
             texts = header.get("texts") or ()
             known = json.loads(world.read_text(_words_beside(path), encoding="utf-8")) if texts else {}
             self.words = Words(texts, {int(k): words for k, words in known.items()})
-            self._begin = self._file.tell()
+            self._begin = len(line)
             self._row = len(self.columns) * _FLOAT.itemsize
-            self.count = (os.fstat(self._file.fileno()).st_size - self._begin) // self._row
+            self._path = path
+            self.count = (os.fstat(self._file).st_size - self._begin) // self._row
         except BaseException:
-            self._file.close()
+            self.close()
             raise
 
     def part(self, first: int, last: int) -> NDArray[np.float64]:
         """Rows from a number up to another, which is not among them; shape (n, columns)."""
         count = max(0, min(last, self.count) - first)
-        self._file.seek(self._begin + first * self._row)
-        numbers = np.fromfile(self._file, _FLOAT, count * len(self.columns))
+        os.lseek(self._file, self._begin + first * self._row, os.SEEK_SET)
+        wanted, pieces = count * self._row, []
+        while wanted and (piece := world.read(self._file, wanted)):
+            pieces.append(piece)
+            wanted -= len(piece)
+        if wanted:
+            raise OSError(errno.EIO, "it has become shorter", str(self._path))
+        numbers = np.frombuffer(b"".join(pieces) if len(pieces) != 1 else pieces[0], _FLOAT)
         return numbers.reshape(-1, len(self.columns))
 
     def blocks(self) -> Iterator[NDArray[np.float64]]:
@@ -163,10 +195,6 @@ class RowsFile:
             values[:, done : done + len(block)] = block.T
             done += len(block)
         return self.words.table(values.T)
-
-    def close(self) -> None:
-        """Give the file back."""
-        self._file.close()
 
 
 def _words_beside(path: Path) -> Path:

@@ -68,15 +68,12 @@ class InFile(Columns):
     """Columns of a file, each read anew when it is asked for.
 
     Args:
-        rows: the file, which is open from now on as long as this is there.
+        rows: the file, which is open as long as this is there.
     """
 
     def __init__(self, rows: RowsFile) -> None:
         self._rows = rows
         self._places = {name: k for k, name in enumerate(rows.columns)}
-
-    def __del__(self) -> None:
-        self._rows.close()
 
     @property
     def points(self) -> int:

@@ -133,27 +133,33 @@ class Recorder:
         self._seal()
         if self._writer is None:
             return False
+        blocks, self._blocks, self._held = self._blocks, [], 0
+        self._flushed = world.monotonic()
         with self._telling():
-            for block in self._blocks:
-                self._writer.append(block)
-                self.checksum = add_to_checksum(self.checksum, block)
-            self._blocks, self._held = [], 0
-            self._flushed = world.monotonic()
+            for block in blocks:
+                before = self._writer.rows
+                try:
+                    self._writer.append(block)
+                finally:
+                    self.checksum = add_to_checksum(self.checksum, block[: self._writer.rows - before])
             return self._writer.flush(sync=sync)
 
     def close(self) -> None:
         """End the file. What was recorded can be read from then on."""
         if self._writer is None:
             return
-        try:
-            if not self.flush():
-                with self._telling():
-                    self._writer.close()
-                    self._writer.take_place()
-        finally:
+        self.flush()
+        with self._telling():
+            self._writer.close()
+            self._writer.take_place()
+        self._writer = None
+
+    def _give_back(self) -> None:
+        writer, self._writer = self._writer, None
+        if writer is not None:
             with suppress(OSError):
-                self._writer.close()
-            self._writer = None
+                writer.close()
+                writer.take_place()
 
     def columns(self) -> Columns:
         """What was recorded, the time among it: out of memory, or of the closed file."""
@@ -179,6 +185,9 @@ class Recorder:
             yield
         except OSError as error:
             assert self._path is not None
+            if self._writer is not None:  # what comes now would leave a gap
+                self.count = self._writer.rows
+                self._give_back()
             size = world.stat(self._path).st_size if self._path.exists() else 0
             raise RecordError(
                 f"{self._path.name} in {self._path.parent} cannot be written beyond {size / 1e6:.3g} MB: "

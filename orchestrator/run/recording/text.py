@@ -47,7 +47,8 @@ def write_csv(
     for block in blocks:
         if len(block):
             parts = [_cells(kind, places, block, words) for kind, places in groups]
-            stream.write(b"\n".join(map(b",".join, zip(*parts, strict=True)) if len(parts) > 1 else parts[0]) + b"\n")
+            lines = [b"\n".join(parts[0])] if len(parts) == 1 else map(b",".join, zip(*parts, strict=True))
+            stream.write(b"\n".join(lines) + b"\n")
 
 
 def _cells(kind: str, places: Sequence[int], block: NDArray[Any], words: Words) -> list[bytes]:

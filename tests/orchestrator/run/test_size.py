@@ -39,8 +39,9 @@ def test_the_size_is_rows_times_columns():
 def test_what_is_large_anywhere(free):
     told = tell_size(system(), 1)
     assert told == (
-        "results will be large: 1e+10 rows of 2 columns are 160 GB in memory (1 TB are free) and about 280 GB in "
-        "results.csv; record less often (simulation.record = 1 is a tenth of it) or end sooner"
+        "results will be large: 1e+10 rows of 2 columns are 160 GB in results.bin, or in memory without -o (1 TB are "
+        "free), and about 280 GB in results.csv; record less often (simulation.record = 1 is a tenth of it) or end "
+        "sooner"
     )
     assert "simulation.record = 20 is" in tell_size(system(record=2.0), 3)
     assert tell_size(system(record=1e6), 1) == ""
@@ -50,7 +51,7 @@ def test_what_is_large_here(free):
     made = system(stop_time=1e6)
     assert tell_size(made, 1) == ""
     free(6e8)
-    assert "160 MB in memory (600 MB are free)" in tell_size(made, 1)
+    assert "160 MB in results.bin, or in memory without -o (600 MB are free)" in tell_size(made, 1)
 
 
 def test_it_is_told_before_the_run(free, tmp_path, caplog):
