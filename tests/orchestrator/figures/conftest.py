@@ -29,6 +29,11 @@ class Run:
     def names(self):
         return self.columns.keys()
 
+    points = len(time)
+
+    def part(self, first, last):
+        return {name: values[first:last] for name, values in {"time": self.time, **self.columns}.items()}
+
     def __getitem__(self, name):
         return self.columns[name]
 
