@@ -87,7 +87,7 @@ class RowsWriter:
         except OSError:  # half a row would shift all that follow
             size = os.fstat(self._file.fileno()).st_size
             self.rows = max(0, size - self._begin) // self._row
-            world.truncate(self._file.fileno(), self._begin + self.rows * self._row)
+            self._file.truncate(self._begin + self.rows * self._row)
             raise
         self.rows += len(block)
         self._left -= len(block)

@@ -81,14 +81,11 @@ class Recorder:
         self._rows: list[Sequence[object]] = []
         self._flushed, self._held = world.monotonic(), 0
         self._path = path
-        self._writer = self._open(there, identity)
+        self._writer: RowsWriter | None = None
         self.count = self.checksum = 0
-
-    def _open(self, there: int, identity: str) -> RowsWriter | None:
-        if self._path is None:
-            return None
-        with self._telling():
-            return RowsWriter(self._path, self._columns, self._whole, self._words, there=there, identity=identity)
+        if path is not None:
+            with self._telling():
+                self._writer = RowsWriter(path, self._columns, self._whole, self._words, there=there, identity=identity)
 
     def extend(self, rows: Rows) -> None:
         """Append rows of time and values; an array is kept, not copied."""
@@ -114,12 +111,7 @@ class Recorder:
         """
         for block in blocks:
             taken = block[: rows - self.count]
-            if words.columns:
-                self.extend(
-                    [list(row) for row in zip(*(words.decode(k, c) for k, c in enumerate(taken.T)), strict=True)]
-                )
-            else:
-                self.extend(taken)
+            self.extend(list(zip(*words.table(taken), strict=True)) if words.columns else taken)
             if self.count == rows:
                 break
         self.flush()
