@@ -8,7 +8,7 @@ component as Python objects (`plain`).
 
 from ...fmus.kinds import Kind
 from .archive import Workspace
-from .interface import Interface, Type, Unit, Variable
+from .interface import Interface, Sort, Type, Unit, Variable
 from .models import Model, load_fmu, load_models
 from .recognition import is_fmu_name
 from .slave import Channel, Slave
@@ -21,6 +21,7 @@ __all__ = [
     "Kind",
     "Model",
     "Slave",
+    "Sort",
     "Type",
     "Unit",
     "Variable",

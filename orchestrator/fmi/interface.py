@@ -6,7 +6,7 @@ import re
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
-from typing import Any, Literal
+from typing import Any, Literal, NamedTuple
 
 from ...fmus.annotation import Annotation
 from ...fmus.kinds import FmuKind
@@ -25,8 +25,24 @@ class Unit:
     offset: float = 0.0
 
 
-@dataclass(frozen=True, slots=True)
-class Variable:
+class Sort(NamedTuple):
+    """What many variables of an FMU have in common."""
+
+    type: Type
+    causality: str
+    variability: str
+    initial: str | None
+    unit: str | None = None
+    minimum: float | None = None
+    maximum: float | None = None
+    nominal: float | None = None
+    choices: tuple[tuple[str, int], ...] = ()
+    relative: bool = False
+    fmi_type: str = ""
+    negated: bool = False
+
+
+class Variable(NamedTuple):
     """One scalar variable of an FMU.
 
     ``dependencies`` holds, for an output, the variables it depends on directly; None where the FMU does not say.
@@ -34,27 +50,78 @@ class Variable:
     ``relative``: a difference, to which the offset of its unit does not apply. ``fmi_type`` is its type in FMI 3.0
     (``"Float32"``), empty in other versions. ``negated``: what the FMU keeps is its negative (FMI 1.0).
     ``element``: of an FMI 3.0 array, whose elements share its reference: the array's name, and the place from 0.
+
+    An FMU may have a million of them: what many have in common is kept once, as their ``sort``.
     """
 
     name: str
     reference: int
-    type: Type
-    causality: str
-    variability: str
-    initial: str | None
-    start: Any
-    unit: str | None = None
-    minimum: float | None = None
-    maximum: float | None = None
-    nominal: float | None = None
-    choices: tuple[tuple[str, int], ...] = ()
-    relative: bool = False
+    sort: Sort
+    start: Any = None
     description: str = ""
     dependencies: frozenset[str] | None = None
     derivative: str | None = None
-    fmi_type: str = ""
-    negated: bool = False
     element: tuple[str, int] | None = None
+
+    @property
+    def type(self) -> Type:
+        """Of its values, in the terms of FMI 2.0."""
+        return self.sort.type
+
+    @property
+    def causality(self) -> str:
+        """What it is for."""
+        return self.sort.causality
+
+    @property
+    def variability(self) -> str:
+        """When it may change."""
+        return self.sort.variability
+
+    @property
+    def initial(self) -> str | None:
+        """How its first value comes about."""
+        return self.sort.initial
+
+    @property
+    def unit(self) -> str | None:
+        """By name."""
+        return self.sort.unit
+
+    @property
+    def minimum(self) -> float | None:
+        """That the FMU is made for."""
+        return self.sort.minimum
+
+    @property
+    def maximum(self) -> float | None:
+        """That the FMU is made for."""
+        return self.sort.maximum
+
+    @property
+    def nominal(self) -> float | None:
+        """The size it usually has."""
+        return self.sort.nominal
+
+    @property
+    def choices(self) -> tuple[tuple[str, int], ...]:
+        """The items of an enumeration."""
+        return self.sort.choices
+
+    @property
+    def relative(self) -> bool:
+        """Whether it is a difference."""
+        return self.sort.relative
+
+    @property
+    def fmi_type(self) -> str:
+        """In FMI 3.0."""
+        return self.sort.fmi_type
+
+    @property
+    def negated(self) -> bool:
+        """Whether the FMU keeps its negative."""
+        return self.sort.negated
 
     @property
     def settable(self) -> bool:

@@ -2,29 +2,23 @@
 
 from __future__ import annotations
 
-import codecs
+import gc
 import math
-import re
-from collections.abc import Iterable, Mapping, Set
+from collections.abc import Iterator, Mapping, Set
+from contextlib import contextmanager
 from dataclasses import replace
-from io import BytesIO
 from pathlib import Path
 from typing import Any, cast
 
-from fmpy.model_description import ValidationError, read_model_description
-from lxml import etree
-
 from ...fmus.annotation import read as read_annotation
-from .. import world
 from ..errors import FmuFileError
 from ..names import arrays_of
-from .interface import Interface, Type, Unit, Variable
-from .repair import repair
-from .translation import VERSIONS, Beside, is_for_co_simulation, is_pedantry, other_kind, standard, translate
+from .entries import Description, Entry
+from .interface import Interface, Sort, Type, Unit, Variable
+from .reading import read
+from .translation import Beside, is_pedantry, translate
 
 _EXPONENTS = ("kg", "m", "s", "A", "K", "mol", "cd", "rad")
-_MOST_WARNINGS = 12
-"""Kinds of faults that are told of one file."""
 
 
 def read_interface(folder: Path, name: str) -> Interface:
@@ -37,43 +31,51 @@ def read_interface(folder: Path, name: str) -> Interface:
     Raises:
         FmuFileError: not a co-simulation FMU of a version of FMI that is known, or a description beyond repair.
     """
-    root, overlooked = _parse(folder / "modelDescription.xml", name)
-    version = standard(root)
-    if version not in VERSIONS:
-        raise FmuFileError(
-            f"{name} is FMI {version}; this version of railcosim runs co-simulation FMUs of FMI {', '.join(VERSIONS)}"
-        )
-    if not is_for_co_simulation(root, version):
-        other = other_kind(root, version)
-        raise FmuFileError(f"{name} has no co-simulation part{f' (it is {other})' if other else ''}")
     try:
-        before = etree.tostring(root)
-        faults = [*overlooked, *(repair(root) if version == "2.0" else [])]
-        # Of FMI 3.0 FMPy would read the description of the sources, too, and refuse an FMU for faults in that.
-        alone = version == "3.0" or overlooked or etree.tostring(root) != before
-        description, problems = _read(folder, root if alone else None)
-        beside = translate(description, root, version)
-        told = [problem for problem in problems if not is_pedantry(version, problem)]
-        warnings = [f"{name}: {text}" for text in _folded([*faults, *told])]
-        interface = _interface(description, root, beside)
-        return replace(interface, version=version, warnings=(*warnings, *beside.warnings(name)))
+        with _without_collection():
+            return _read(folder, name)
+    except FmuFileError:
+        raise
     except Exception as error:
         raise FmuFileError(f"{name}: its modelDescription.xml cannot be used: {error}") from error
 
 
-def _interface(description: Any, root: Any, beside: Beside) -> Interface:
-    variables = _variables(description, _relative(root), beside)
-    simulation = description.coSimulation
-    experiment = description.defaultExperiment
+@contextmanager
+def _without_collection() -> Iterator[None]:
+    """Let Python not look for circles among millions of new objects again and again: there are none."""
+    was_enabled = gc.isenabled()
+    gc.disable()
+    try:
+        yield
+    finally:
+        if was_enabled:
+            gc.enable()
+
+
+def _read(folder: Path, name: str) -> Interface:
+    reading = read(folder / "modelDescription.xml", name)
+    version, faults = reading.version, reading.faults
+    faults.add(problem for problem in reading.problems() if not is_pedantry(version, problem))
+    beside = translate(reading.description, reading.root, version)
+    warnings = [f"{name}: {text}" for text in faults.told()]
+    interface = _interface(reading.description, reading.root, beside)
+    return replace(interface, version=version, warnings=(*warnings, *beside.warnings(name)))
+
+
+def _interface(description: Description, root: Any, beside: Beside) -> Interface:
+    found = description.found
+    variables = _variables(description, _relative_types(root), beside)
+    simulation = found.coSimulation
+    experiment = found.defaultExperiment
     return Interface(
-        model=description.modelName or "",
+        model=found.modelName or "",
         identifier=simulation.modelIdentifier or "",  # of a second element without one, too
-        guid=description.guid or "",
+        guid=found.guid or "",
         variables=variables,
-        units={unit.name: unit for unit in map(_unit, description.unitDefinitions)},
+        units={unit.name: unit for unit in map(_unit, found.unitDefinitions)},
         arrays=find_arrays(variables),
-        description=description.description or "",
-        generator=description.generationTool or "",
+        description=found.description or "",
+        generator=found.generationTool or "",
         default_step=_number(experiment.stepSize) if experiment else None,
         default_stop=_number(experiment.stopTime) if experiment else None,
         default_tolerance=_number(experiment.tolerance) if experiment else None,
@@ -91,147 +93,79 @@ def _interface(description: Any, root: Any, beside: Beside) -> Interface:
     )
 
 
-def _parse(path: Path, name: str) -> tuple[Any, list[str]]:
-    """The root element, and what had to be overlooked to read it."""
-    overlooked: list[str] = []
-    try:
-        parsed = etree.parse(str(path), _parser())
-    except (etree.XMLSyntaxError, OSError) as error:  # the latter where bytes do not fit the encoding
-        parsed, overlooked = _parse_anyhow(world.read_bytes(path))
-        if parsed is None:
-            what = getattr(error, "msg", None) or "it has bytes that do not fit its encoding"
-            raise FmuFileError(f"{name}: its modelDescription.xml is not XML: {what}") from error
-    # Asked of the parser, not searched for in the bytes: they may be in any encoding.
-    if parsed.docinfo.internalDTD is not None:
-        raise FmuFileError(f"{name} is refused: its modelDescription.xml has a DOCTYPE, which may declare XML entities")
-    return parsed.getroot(), overlooked
+def _variables(description: Description, relative: Set[str], beside: Beside) -> dict[str, Variable]:
+    """The variables by name; the entries they are made of go as they are read, for there may be a million."""
+    types = {made.name: made for made in description.found.typeDefinitions}
+    sorts: dict[Any, Sort] = {}
+    variables = {}
+    entries = description.entries
+    entries.reverse()
+    while entries:
+        entry = entries.pop()
+        variables[entry.name] = _variable(entry, types.get(entry.declared), relative, beside, sorts)
+    return variables
 
 
-def _parser(encoding: str | None = None) -> etree.XMLParser:
-    return etree.XMLParser(resolve_entities=False, no_network=True, encoding=encoding)
-
-
-def _parse_anyhow(content: bytes) -> tuple[Any, list[str]]:
-    """What is XML but for blanks at its beginning or letters of Windows' in what calls itself UTF-8; None otherwise."""
-    overlooked = []
-    begun = content.removeprefix(codecs.BOM_UTF8).lstrip()
-    if begun != content.removeprefix(codecs.BOM_UTF8):
-        overlooked.append("it begins with blanks, which XML does not allow")
-    try:
-        begun.decode()
-        encoding = None
-    except UnicodeDecodeError:
-        encoding = "windows-1252"
-        overlooked.append("its letters are not those of the encoding it names; they are read as Windows-1252")
-    if b"\0" in content[:4] or not overlooked:
-        return None, []
-    try:
-        return etree.parse(BytesIO(begun), _parser(encoding)), overlooked
-    except (etree.XMLSyntaxError, OSError, LookupError):
-        return None, []
-
-
-def _read(folder: Path, repaired: Any) -> tuple[Any, list[str]]:
-    """What FMPy reads, and what it finds wrong with it.
-
-    Args:
-        folder: where the FMU was unpacked.
-        repaired: the root element to read instead of what stands there; None for that.
-    """
-    if repaired is None:
-        return _read_leniently(str(folder))
-    with world.TemporaryDirectory() as place:
-        source = f"{place}/modelDescription.xml"
-        repaired.getroottree().write(source, encoding="UTF-8", xml_declaration=True)
-        return _read_leniently(source)
-
-
-def _read_leniently(source: str) -> tuple[Any, list[str]]:
-    try:
-        return read_model_description(source, validate=True), []
-    except ValidationError as error:
-        problems = list(error.problems)
-    except Exception as error:  # FMPy's checks of a file that it can read may fail themselves
-        problems = [str(error)]
-    return read_model_description(source, validate=False), problems
-
-
-def _folded(faults: Iterable[str]) -> list[str]:
-    """Faults that differ in names in double quotes and in numbers only, told once: a tool makes them everywhere."""
-    alike: dict[str, list[str]] = {}
-    for fault in faults:
-        alike.setdefault(re.sub(r'"[^"]*"|\d+', "", fault), []).append(fault)
-    told = [
-        first + (f" (and {len(rest)} more like it)" if rest else "")
-        for first, *rest in list(alike.values())[:_MOST_WARNINGS]
-    ]
-    more = len(alike) - len(told)
-    return [*told, f"and {more} more kinds of faults"] if more > 0 else told
-
-
-def _variables(description: Any, relative: Set[str], beside: Beside) -> dict[str, Variable]:
-    outputs = {unknown.variable.name: unknown.dependencies for unknown in description.outputs}
-    return {v.name: _variable(v, outputs.get(v.name), v.name in relative, beside) for v in description.modelVariables}
-
-
-def _variable(v: Any, listed: Any, relative: bool, beside: Beside) -> Variable:
-    unit = _typed(v, "unit")
+def _variable(entry: Entry, made: Any, relative: Set[str], beside: Beside, sorts: dict[Any, Sort]) -> Variable:
+    unit, low, high, nominal = entry.unit, entry.min, entry.max, entry.nominal
+    if made is not None:  # what the variable does not say itself, its type does
+        unit, low, high, nominal = (
+            getattr(made, key) if own is None else own
+            for key, own in (("unit", unit), ("min", low), ("max", high), ("nominal", nominal))
+        )
+    key = (
+        entry.type, entry.causality, entry.variability, entry.initial, unit, low, high, nominal, entry.declared,
+        entry.relative, entry.fmi_type, entry.negated,
+    )  # fmt: skip
+    if key not in sorts:
+        sorts[key] = Sort(
+            type=cast(Type, entry.type),
+            causality=entry.causality or "local",
+            variability=entry.variability or "continuous",
+            initial=entry.initial,
+            unit=None if unit in (None, "", "-", "1") else unit,
+            minimum=_number(low),
+            maximum=_number(high),
+            nominal=_number(nominal),
+            choices=tuple((item.name or "", int(item.value)) for item in made.items) if made else (),
+            relative=entry.declared in relative if entry.relative is None else entry.relative,
+            fmi_type=entry.fmi_type,
+            negated=entry.negated,
+        )
+    rate = entry.derivative
     return Variable(
-        name=v.name,
-        reference=v.valueReference,
-        type=cast(Type, v.type),
-        causality=v.causality or "local",
-        variability=v.variability or "continuous",
-        initial=v.initial,
-        start=_start(v),
-        unit=None if unit in (None, "", "-", "1") else unit,
-        minimum=_number(_typed(v, "min")),
-        maximum=_number(_typed(v, "max")),
-        nominal=_number(_typed(v, "nominal")),
-        choices=tuple((item.name or "", int(item.value)) for item in v.declaredType.items) if v.declaredType else (),
-        description=v.description or "",
-        dependencies=None if listed is None else frozenset(d.name for d in listed),
-        derivative=None if v.derivative is None else v.derivative.name,
-        relative=relative,
-        fmi_type=beside.fmi_types.get(v.name, ""),
-        negated=v.name in beside.negated,
-        element=beside.places.get(v.name),
+        entry.name,
+        entry.reference,
+        sorts[key],
+        _start(entry),
+        entry.description or "",
+        None if entry.depends is None else frozenset(entry.depends),
+        None if rate is None else rate.name,
+        beside.places.get(entry.name),
     )
 
 
-def _typed(v: Any, key: str) -> Any:
-    """An attribute of a variable, or of its type where it has none of its own."""
-    own = getattr(v, key)
-    return getattr(v.declaredType, key) if own is None and v.declaredType is not None else own
-
-
-def _relative(root: Any) -> set[str]:
-    """Variables that are differences of quantities, whose unit has no offset: FMPy overlooks that attribute.
+def _relative_types(root: Any) -> set[str]:
+    """Types of differences of quantities, whose unit has no offset: FMPy overlooks that attribute of variables.
 
     In FMI 3.0 it stands in the variable or type itself, before in an element inside.
     """
-    types = {t.get("name") for t in root.iterfind("TypeDefinitions/*") if any(map(_is_relative, (t, *t)))}
-    return {
-        v.get("name")
-        for v in root.iterfind("ModelVariables/*")
-        for real in (v, *v.iterfind("Real"))
-        if _is_relative(real) or (real.get("relativeQuantity") is None and real.get("declaredType", 0) in types)
-    }
+    return {t.get("name") for t in root.iterfind("TypeDefinitions/*") if any(map(_is_relative, (t, *t)))}
 
 
 def _is_relative(element: Any) -> bool:
     return element.get("relativeQuantity") in ("true", "1")
 
 
-def _start(v: Any) -> Any:
-    if v.start is None:
+def _start(entry: Entry) -> Any:
+    text = entry.start
+    if text is None:
         return None
-    text = str(v.start)
-    if v.type == "Real":
-        return _number(text)
-    if v.type in ("Integer", "Enumeration"):
+    if entry.type == "Real":
+        return float(text)
+    if entry.type in ("Integer", "Enumeration"):
         return int(text)
-    if v.type == "Boolean":
+    if entry.type == "Boolean":
         return text in ("true", "1", "True")
     return text
 

@@ -8,8 +8,11 @@ what is doubtful is taken out.
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Mapping, Set
 from typing import Any
+
+from .entries import Entry
+from .faults import Faults
 
 _TYPES = ("Real", "Integer", "Boolean", "String", "Enumeration")
 _CAUSALITIES = ("parameter", "calculatedParameter", "input", "output", "local", "independent")
@@ -28,18 +31,136 @@ _TYPE_ATTRIBUTES = frozenset(
 _ITEM_ATTRIBUTES = frozenset(("name", "value", "description"))
 _EXPONENTS = ("kg", "m", "s", "A", "K", "mol", "cd", "rad")
 _LARGEST = 2**32 - 1
+_SHORT = 10
+"""Digits that a number has to have to be larger."""
+_PLAIN = frozenset(("start", "unit", "quantity"))
+"""Attributes of a value of which nothing else can be wrong."""
 
 
-def repair(root: Any) -> list[str]:
-    """Put a model description right, in place; one sentence a fault, with names in double quotes.
+class Repair:
+    """Puts a model description right, in place and part by part; one sentence a fault, with names in double quotes.
 
     Args:
-        root: its root element (lxml).
+        before: one that has been through the whole file already, where what is referred to comes after what refers.
 
-    Raises:
-        ValueError: a variable cannot be used; the message names it.
+    Attributes:
+        head, variables, structure: what was wrong.
     """
-    return [*_head(root), *_units(root), *_types(root), *_variables(root), *_structure(root)]
+
+    def __init__(self, before: Repair | None = None) -> None:
+        self.head, self.variables, self.structure = Faults(), Faults(), Faults()
+        self.names: set[str] = set()
+        self._count: int = 0 if before is None else before._count
+        self._is_known = before is not None
+        self._units: Set[str | None] = set() if before is None else before._units
+        self._types: Mapping[str | None, str | None] = {} if before is None else before._types
+        self._is_begun = False
+
+    def begin(self, root: Any) -> None:
+        """Units and types, as far as they have been read."""
+        if self._is_begun:
+            return
+        self._is_begun = True
+        self._definitions = Faults()
+        self._definitions.add(_units(root))
+        self._definitions.add(_types(root))
+        if not self._is_known:
+            self._units = {unit.get("name") for unit in root.findall("UnitDefinitions/Unit")}
+            self._types = {made.get("name"): made[0].get("unit") for made in root.findall("TypeDefinitions/SimpleType")}
+
+    def end(self, root: Any) -> None:
+        """All the rest but variables and structure."""
+        self.begin(root)
+        self.head.add(_head(root))
+        self.head.join(self._definitions)
+        if root.find("ModelVariables") is None:
+            root.append(root.makeelement("ModelVariables"))
+            self.variables.add(["it lists no variables"])
+
+    def take_variables(self, elements: Iterable[Any]) -> list[Any]:
+        """Variables; those that are some.
+
+        Raises:
+            ValueError: one cannot be used; the message names it.
+        """
+        taken = []
+        for element in elements:
+            if element.tag == "ScalarVariable":
+                taken.append(element)
+            else:
+                element.getparent().remove(element)
+                self.variables.add([f"<{element.tag}> among the variables is left out"])
+        for element in taken:
+            if not self._is_plain(element):
+                self.variables.add(self._variable(element, len(self.names) + 1))
+        self._count = self._count if self._is_known else len(self.names)
+        return taken
+
+    def _is_plain(self, variable: Any) -> bool:
+        """Whether a variable has nothing that could be wrong, as most of a million have; its name is noted then."""
+        own = dict(variable.items())
+        name, reference = own.get("name"), own.get("valueReference", "")
+        if not name or name in self.names or not (reference.isdecimal() and len(reference) < _SHORT):
+            return False
+        if len(variable) != 1 or variable[0].tag != "Real":
+            return False
+        if (own.get("causality", "local"), own.get("variability", "continuous")) not in _LEGAL:
+            return False
+        value = dict(variable[0].items())
+        if not _PLAIN.issuperset(value) or ("start" in value and _number(value["start"]) is None):
+            return False
+        self.names.add(name)
+        return True
+
+    def _variable(self, variable: Any, place: int) -> Iterator[str]:
+        yield from _name(variable, place, self.names)
+        name = variable.get("name")
+        value = next((child for child in variable if child.tag in _TYPES), None)
+        if value is None:
+            raise ValueError(f'the variable "{name}" has no type')
+        reference = variable.get("valueReference", "")
+        if not (reference.strip().isdecimal() and int(reference) <= _LARGEST):
+            raise ValueError(f'the variable "{name}" has the value reference "{reference}"')
+        yield from _causality(variable, name)
+        yield from _value(value, name)
+        made = value.get("declaredType")
+        if made is not None and made not in self._types:
+            yield f'the type "{made}" of "{name}" is not defined'
+            del value.attrib["declaredType"]
+        unit = value.get("unit") or self._types.get(made)
+        if value.get("displayUnit") is not None and unit not in self._units:
+            yield f'the display unit of "{name}" is left out: its unit "{unit or ""}" is not defined'
+            del value.attrib["displayUnit"]
+
+    def take_unknowns(self, section: str, elements: Iterable[Any]) -> list[Any]:
+        """What a section of the model structure lists; those of them that are variables."""
+        taken = []
+        for unknown in elements:
+            index = unknown.get("index")
+            if unknown.get("dependencies", "") == "" and _place(index, self._count) is not None:
+                taken.append(unknown)
+            elif _place(index, self._count) is None:
+                unknown.getparent().remove(unknown)
+                self.structure.add([f'{section} lists variable number "{index}": there is none'])
+            else:
+                self.structure.add(_dependencies(unknown, section, index, self._count))
+                taken.append(unknown)
+        return taken
+
+    def take_derivative(self, entry: Entry) -> None:
+        """What a variable is the rate of, once all are known."""
+        if entry.derivative is not None and _place(entry.derivative, self._count) is None:
+            told = f'"{entry.name}" is to be the derivative of variable number "{entry.derivative}": there is none'
+            self.variables.add([told])
+            entry.derivative = None
+
+    @property
+    def faults(self) -> Faults:
+        """All of them, in the order of a file."""
+        every = Faults()
+        for part in (self.head, self.variables, self.structure):
+            every.join(part)
+        return every
 
 
 def _head(root: Any) -> Iterator[str]:
@@ -139,45 +260,6 @@ def _types(root: Any) -> Iterator[str]:
 # -------------------------------------------------------------------- variables
 
 
-def _variables(root: Any) -> Iterator[str]:
-    if root.find("ModelVariables") is None:
-        root.append(root.makeelement("ModelVariables"))
-        yield "it lists no variables"
-    for element in root.find("ModelVariables").xpath("*[not(self::ScalarVariable)]"):
-        element.getparent().remove(element)
-        yield f"<{element.tag}> among the variables is left out"
-    units = {unit.get("name") for unit in root.findall("UnitDefinitions/Unit")}
-    types = {made.get("name"): made[0].get("unit") for made in root.findall("TypeDefinitions/SimpleType")}
-    variables = _listed(root)
-    names: set[str] = set()
-    for place, variable in enumerate(variables, 1):
-        yield from _name(variable, place, names)
-        name = variable.get("name")
-        value = next((child for child in variable if child.tag in _TYPES), None)
-        if value is None:
-            raise ValueError(f'the variable "{name}" has no type')
-        reference = variable.get("valueReference", "")
-        if not (reference.strip().isdecimal() and int(reference) <= _LARGEST):
-            raise ValueError(f'the variable "{name}" has the value reference "{reference}"')
-        yield from _causality(variable, name)
-        yield from _value(value, name)
-        if value.get("declaredType") is not None and value.get("declaredType") not in types:
-            yield f'the type "{value.get("declaredType")}" of "{name}" is not defined'
-            del value.attrib["declaredType"]
-        unit = value.get("unit") or types.get(value.get("declaredType"))
-        if value.get("displayUnit") is not None and unit not in units:
-            yield f'the display unit of "{name}" is left out: its unit "{unit or ""}" is not defined'
-            del value.attrib["displayUnit"]
-        if value.get("derivative") is not None and _place(value.get("derivative"), len(variables)) is None:
-            yield f'"{name}" is to be the derivative of variable number "{value.get("derivative")}": there is none'
-            del value.attrib["derivative"]
-
-
-def _listed(root: Any) -> list[Any]:
-    """The variables, as they are counted in the model structure."""
-    return root.find("ModelVariables").findall("ScalarVariable")  # type: ignore[no-any-return]
-
-
 def _name(variable: Any, place: int, names: set[str]) -> Iterator[str]:
     """Nothing is taken away: others are counted from here on."""
     given = variable.get("name")
@@ -191,7 +273,8 @@ def _name(variable: Any, place: int, names: set[str]) -> Iterator[str]:
     if name != base:
         yield f'there are several variables "{base}"; this one is called "{name}"'
     names.add(name)
-    variable.set("name", name)
+    if name != given:
+        variable.set("name", name)
 
 
 def _causality(variable: Any, name: str) -> Iterator[str]:
@@ -243,18 +326,6 @@ def _is_whole(text: str) -> bool:
 # -------------------------------------------------------------------- model structure
 
 
-def _structure(root: Any) -> Iterator[str]:
-    count = len(_listed(root))
-    for section in ("Outputs", "Derivatives", "InitialUnknowns"):
-        for unknown in root.findall(f"ModelStructure/{section}/Unknown"):
-            index = unknown.get("index")
-            if _place(index, count) is None:
-                unknown.getparent().remove(unknown)
-                yield f'{section} lists variable number "{index}": there is none'
-            else:
-                yield from _dependencies(unknown, section, index, count)
-
-
 def _dependencies(unknown: Any, section: str, index: str, count: int) -> Iterator[str]:
     """Whitespace as FMPy expects it; what is no variable goes, and with the last of them what is known of others."""
     words = unknown.get("dependencies", "").split()
@@ -272,4 +343,5 @@ def _place(text: str | None, count: int) -> int | None:
     """A number from 1 to the number of variables."""
     if text is None or not text.strip().isdecimal():
         return None
-    return int(text) if 1 <= int(text) <= count else None
+    number = int(text)
+    return number if 1 <= number <= count else None

@@ -1,7 +1,7 @@
 """Model descriptions of FMI 1.0 and 3.0 in the terms of 2.0, in which everything behind `reader` thinks.
 
-What 2.0 has no words for is kept beside: of which type a variable is in 3.0, which variable of 1.0 is the negative of
-another, and which variables of 3.0 are left out because nothing here can hold their values.
+What 2.0 has no words for is kept beside: which variables of 3.0 are left out because nothing here can hold their
+values, and what are elements of arrays.
 """
 
 from __future__ import annotations
@@ -13,8 +13,7 @@ from collections.abc import Iterator, Mapping, Set
 from dataclasses import dataclass, field
 from typing import Any
 
-from attr import evolve
-from fmpy.model_description import Unknown
+from .entries import Description, Entry
 
 VERSIONS = {"1.0": re.compile(r"1\.0"), "2.0": re.compile(r"2\.0(\..*)?"), "3.0": re.compile(r"3\.\d+(\.\d+)?")}
 """The versions of FMI that are read, each with how files spell it."""
@@ -39,14 +38,11 @@ class Beside:
     """What the terms of FMI 2.0 do not say.
 
     Attributes:
-        fmi_types: types of FMI 3.0 by variable. negated: variables of FMI 1.0 that are another's negative.
         left_out: what variables are that are not taken, by name.
         places: of elements of FMI 3.0 arrays, by name: the array's name, and the place in it from 0.
     """
 
-    fmi_types: Mapping[str, str] = field(default_factory=dict)
     places: Mapping[str, tuple[str, int]] = field(default_factory=dict)
-    negated: frozenset[str] = frozenset()
     left_out: Mapping[str, str] = field(default_factory=dict)
 
     def warnings(self, name: str) -> Iterator[str]:
@@ -81,12 +77,12 @@ def is_pedantry(version: str, problem: str) -> bool:
     return version == "1.0" and problem.rstrip().endswith('and must have variability != "continuous".')
 
 
-def translate(description: Any, root: Any, version: str) -> Beside:
-    """Put what FMPy has read into the terms of FMI 2.0, in place.
+def translate(description: Description, root: Any, version: str) -> Beside:
+    """Put what was read into the terms of FMI 2.0, in place.
 
     Args:
-        description: FMPy's.
-        root: the root element of the file.
+        description: FMPy's, with the variables as they are written.
+        root: the root element of the file, without the variables.
         version: from `standard`.
 
     Raises:
@@ -102,90 +98,74 @@ def translate(description: Any, root: Any, version: str) -> Beside:
 # -------------------------------------------------------------------- FMI 1.0
 
 
-def _from_1(description: Any, root: Any) -> Beside:
-    simulation = description.coSimulation
+def _from_1(description: Description, root: Any) -> Beside:
+    simulation = description.found.coSimulation
     capabilities = root.find("Implementation/*/Capabilities")
     for name in _CAPABILITIES_1:
         setattr(simulation, name, capabilities is not None and capabilities.get(name) in _TRUE)
     simulation.needsExecutionTool = root.find("Implementation/CoSimulation_Tool") is not None
-    variables = {v.name: v for v in description.modelVariables}
-    negated = set()
-    for element in root.iterfind("ModelVariables/ScalarVariable[@name]"):
-        v = variables[element.get("name")]
-        _roles_1(v, element)
-        if element.get("alias") == "negatedAlias" and v.type != "String":
-            negated.add(v.name)
-        if v.causality == "output":
-            description.outputs.append(Unknown(variable=v, dependencies=_dependencies_1(element, variables)))
-    return Beside(negated=frozenset(negated))
+    names = {v.name for v in description.entries} if any(v.depends for v in description.entries) else set()
+    for v in description.entries:
+        _roles_1(v)
+        if v.causality != "output":
+            v.depends = None
+        elif v.depends is not None:
+            v.depends = [name for name in v.depends if name in names]
+    return Beside()
 
 
-def _roles_1(v: Any, element: Any) -> None:
+def _roles_1(v: Entry) -> None:
     """Causality, variability and initial.
 
     A parameter without a start value depends on others; any other variable with one may be set before initialization.
     """
-    causality = element.get("causality", "internal")
-    has_start = v.start is not None
-    if element.get("variability") == "parameter":
+    causality, has_start = v.causality, v.start is not None
+    if v.variability == "parameter":
         v.causality = "parameter" if has_start else "output" if causality == "output" else "calculatedParameter"
         v.variability = "fixed"
     else:
         v.causality = causality if causality in ("input", "output") else "local"
         if v.variability == "continuous" and v.type != "Real":
             v.variability = "discrete"
-    is_guess = any(child.get("fixed") in ("false", "0") for child in element)
-    v.initial = ("approx" if is_guess else "exact") if has_start else "calculated"
+    v.initial = ("approx" if v.guessed else "exact") if has_start else "calculated"
     if v.causality == "input":
         v.initial = None
-
-
-def _dependencies_1(element: Any, variables: Mapping[str, Any]) -> list[Any] | None:
-    direct = element.find("DirectDependency")
-    if direct is None:
-        return None
-    names = [(name.text or "").strip() for name in direct.iterfind("Name")]
-    return [variables[name] for name in names if name in variables]
 
 
 # -------------------------------------------------------------------- FMI 3.0
 
 
-def _from_3(description: Any, root: Any) -> Beside:
-    element = root.find("CoSimulation")
-    description.coSimulation.providesDirectionalDerivative = element.get("providesDirectionalDerivatives") in _TRUE
-    description.coSimulation.canInterpolateInputs = False  # the standard has no call for that
-    written = {each.get("name"): each for each in root.find("ModelVariables") if isinstance(each.tag, str)}
-    fmi_types, left_out = {}, {}
-    names = {v.name for v in description.modelVariables}
-    for v in description.modelVariables:
+def _from_3(description: Description, root: Any) -> Beside:
+    element, simulation = root.find("CoSimulation"), description.found.coSimulation
+    simulation.providesDirectionalDerivative = element.get("providesDirectionalDerivatives") in _TRUE
+    simulation.canInterpolateInputs = False  # the standard has no call for that
+    left_out = {}
+    arrays = any(v.sizes for v in description.entries)
+    names = {v.name for v in description.entries} if arrays else set()
+    for v in description.entries:
         reason = _not_taken(v, names)
         if reason:
             left_out[v.name] = reason
             continue
-        fmi_types[v.name] = v.type
-        own = written.get(v.name)
-        if own is not None:
-            v.min, v.max = own.get("min"), own.get("max")  # FMPy forgets those of unsigned numbers
         v.type = _TYPES_3.get(v.type, v.type)
         if v.causality == "structuralParameter":
             v.initial = None  # can be set in configuration mode only, which is for arrays
         if v.alias is not None:
             _show_as_alias(v)
-    description.modelVariables = [v for v in description.modelVariables if v.name not in left_out]
-    places = _expand(description, written) if any(v.dimensions for v in description.modelVariables) else {}
-    fmi_types |= {name: fmi_types[array] for name, (array, _) in places.items()}
-    return Beside(fmi_types=fmi_types, left_out=left_out, places=places)
+    if left_out:
+        description.entries = [v for v in description.entries if v.name not in left_out]
+    places = _expand(description) if arrays else {}
+    return Beside(left_out=left_out, places=places)
 
 
-def _not_taken(v: Any, names: Set[str]) -> str:
+def _not_taken(v: Entry, names: Set[str]) -> str:
     if v.type == "Clock":
         return "a clock"
     if v.type == "Binary":
         return "binary"
     if v.clocks:
         return "clocked"
-    if not v.dimensions:
+    if not v.sizes:
         return ""
     count = math.prod(v.shape)
     if not 0 < count <= _LARGEST_ARRAY:
@@ -193,52 +173,45 @@ def _not_taken(v: Any, names: Set[str]) -> str:
     return "" if names.isdisjoint(_element_names(v)) else "an array, and its elements' names are those of others"
 
 
-def _expand(description: Any, written: Mapping[str, Any]) -> dict[str, tuple[str, int]]:
+def _expand(description: Description) -> dict[str, tuple[str, int]]:
     """Put elements in the place of arrays, in place: ``a[1]``, ``m[1,2]``, the last index the fastest.
 
     An element depends on all that its array depends on; of derivatives the array is the derivative element by element.
     """
-    elements = {v.name: _elements(v, written) if v.dimensions else [v] for v in description.modelVariables}
-    for v in description.modelVariables:
+    elements = {v.name: _elements(v) if v.sizes else [v] for v in description.entries}
+    for v in description.entries:
         rates = [] if v.derivative is None else elements.get(v.derivative.name, [])
         for k, element in enumerate(elements[v.name]):
             element.derivative = rates[k] if k < len(rates) else None
-    description.outputs = [
-        Unknown(
-            variable=e, dependencies=u.dependencies and [x for d in u.dependencies for x in elements.get(d.name, ())]
-        )
-        for u in description.outputs
-        for e in elements.get(u.variable.name, ())
-    ]
-    arrays = [v for v in description.modelVariables if v.dimensions]
-    description.modelVariables = [e for own in elements.values() for e in own]
+        if v.depends:
+            depends = frozenset(x.name for name in v.depends for x in elements.get(name, ()))
+            for element in elements[v.name]:
+                element.depends = depends
+    arrays = [v for v in description.entries if v.sizes]
+    description.entries = [e for own in elements.values() for e in own]
     return {e.name: (v.name, k) for v in arrays for k, e in enumerate(elements[v.name])}
 
 
-def _elements(v: Any, written: Mapping[str, Any]) -> list[Any]:
+def _elements(v: Entry) -> list[Entry]:
     names = _element_names(v)
-    return [
-        evolve(v, name=name, start=start, dimensions=[])
-        for name, start in zip(names, _starts(v, written, len(names)), strict=True)
-    ]
+    return [v.named(name, start) for name, start in zip(names, _starts(v, len(names)), strict=True)]
 
 
-def _element_names(v: Any) -> list[str]:
+def _element_names(v: Entry) -> list[str]:
     places = itertools.product(*(range(1, size + 1) for size in v.shape))
     return [f"{v.name}[{','.join(map(str, place))}]" for place in places]
 
 
-def _starts(v: Any, written: Mapping[str, Any], count: int) -> list[Any]:
+def _starts(v: Entry, count: int) -> list[Any]:
     """The start values of an array's elements; one that stands alone is that of all."""
-    own = written.get(v.name if v.alias is None else v.alias.name)
-    texts = [] if own is None else [start.get("value") for start in own.iterfind("Start")]
-    starts = texts if v.type == "String" else (v.start or "").split()
+    starts = list(v.starts) if v.type == "String" else (v.start or "").split()
     if len(starts) not in (0, 1, count):
         raise ValueError(f'the array "{v.name}" has {len(starts)} start values for {count} elements')
-    return starts if len(starts) == count else (starts or [None]) * count
+    return starts if len(starts) == count else [*(starts or [None])] * count
 
 
-def _show_as_alias(v: Any) -> None:
+def _show_as_alias(v: Entry) -> None:
     """Another name can be read and set as the first can, but is no input or output once more."""
     v.causality = "local"
+    assert v.alias is not None
     v.description = f"{v.description or ''} (another name of {v.alias.name})".strip()

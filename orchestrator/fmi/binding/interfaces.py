@@ -7,14 +7,16 @@ from dataclasses import fields
 from typing import Any
 
 from ....fmus.annotation import Annotation
-from ..interface import Interface, Unit, Variable
+from ..interface import Interface, Sort, Unit, Variable
 
 
 def plain_interface(interface: Interface) -> dict[str, Any]:
     """Numbers, texts, and lists and mappings of them, for `read_interface`."""
     own = interface.annotation
+    sorts = {sort: k for k, sort in enumerate(dict.fromkeys(v.sort for v in interface.variables.values()))}
     return _fields(interface) | {
-        "variables": [_fields(variable) for variable in interface.variables.values()],
+        "sorts": [sort._asdict() for sort in sorts],
+        "variables": [[_plain(sorts.get(x, x) if x is v.sort else x) for x in v] for v in interface.variables.values()],
         "units": [_fields(unit) for unit in interface.units.values()],
         "annotation": own and _fields(own),
     }
@@ -35,18 +37,21 @@ def read_interface(told: Mapping[str, Any]) -> Interface:
         exponents = entry["exponents"]
         return Unit(**entry | {"exponents": None if exponents is None else tuple(exponents)})
 
-    def variable(entry: dict[str, Any]) -> Variable:
-        dependencies = entry["dependencies"]
+    sorts = [Sort(**sort | {"choices": tuple(map(tuple, sort["choices"]))}) for sort in told["sorts"]]
+
+    def variable(entry: list[Any]) -> Variable:
+        name, reference, sort, start, description, dependencies, derivative, element = entry
         known = None if dependencies is None else frozenset(dependencies)
-        return Variable(**entry | {"choices": tuple(map(tuple, entry["choices"])), "dependencies": known})
+        of_array = None if element is None else (element[0], element[1])
+        return Variable(name, reference, sorts[sort], start, description, known, derivative, of_array)
 
     own = told["annotation"]
     tuples = {name: tuple(value) for name, value in (own or {}).items() if isinstance(value, list)}
     parts = {
-        "variables": {entry["name"]: variable(entry) for entry in told["variables"]},
+        "variables": {entry[0]: variable(entry) for entry in told["variables"]},
         "units": {entry["name"]: unit(entry) for entry in told["units"]},
         "arrays": {name: tuple(scalars) for name, scalars in told["arrays"].items()},
         "annotation": own and Annotation(**own | tuples),
         "warnings": tuple(told["warnings"]),
     }
-    return Interface(**{**told, **parts})
+    return Interface(**{name: parts.get(name, value) for name, value in told.items() if name != "sorts"})

@@ -1,7 +1,7 @@
 """What stands behind the names of an interface."""
 
 import pytest
-from railcosim.orchestrator.fmi import Interface, Variable
+from railcosim.orchestrator.fmi import Interface, Sort, Variable
 from railcosim.orchestrator.fmi.reader import find_arrays
 
 NAMES = (
@@ -24,7 +24,9 @@ NAMES = (
 
 @pytest.fixture(scope="module")
 def interface():
-    variables = {name: Variable(name, k, "Real", "input", "continuous", None, 0.0) for k, name in enumerate(NAMES)}
+    variables = {
+        name: Variable(name, k, Sort("Real", "input", "continuous", None), 0.0) for k, name in enumerate(NAMES)
+    }
     return Interface("M", "M", "", variables, {}, find_arrays(variables))
 
 

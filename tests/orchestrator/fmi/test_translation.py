@@ -4,6 +4,7 @@ from types import SimpleNamespace
 
 import pytest
 from lxml import etree
+from railcosim.orchestrator.fmi import entries as entries_module
 from railcosim.orchestrator.fmi import translation
 
 
@@ -52,65 +53,74 @@ def test_what_a_file_is_for(content, version, runs, kind):
     assert translation.other_kind(it, version) == kind
 
 
-def variable(name, kind="Real", start=None, **own):
-    """What FMPy makes of a variable."""
-    named = {"causality": None, "variability": "continuous", "initial": None, "alias": None, "description": None}
-    more = {"dimensions": [], "clocks": None, "min": None, "max": None}
-    return SimpleNamespace(name=name, type=kind, start=start, **{**named, **more, **own})
+def translated(variables, version, implementation=""):
+    """Variables, as XML, in the terms of FMI 2.0, what is kept beside, and the capabilities."""
+    it = root(f"<x>{implementation}<ModelVariables>{variables}</ModelVariables></x>")
+    entries = [
+        entries_module.read_entry(element, version, entries_module.Texts())
+        for element in it.find("ModelVariables")
+        if isinstance(element.tag, str)
+    ]
+    entries_module.resolve(entries, version)
+    description = entries_module.Description(SimpleNamespace(coSimulation=SimpleNamespace()), entries)
+    beside = translation.translate(description, it, version)
+    return {v.name: v for v in description.entries}, beside, description.found.coSimulation
 
 
-def from_1(*pairs, implementation=""):
-    """Translate variables of FMI 1.0, each with its element."""
-    listed = "".join(element for _, element in pairs)
-    it = root(f"<x><Implementation>{implementation}</Implementation><ModelVariables>{listed}</ModelVariables></x>")
-    description = SimpleNamespace(coSimulation=SimpleNamespace(), modelVariables=[v for v, _ in pairs], outputs=[])
-    return description, translation.translate(description, it, "1.0")
+def scalar(name, attributes="", kind="Real", value="", more=""):
+    """A variable of FMI 1.0."""
+    return f'<ScalarVariable name="{name}" valueReference="0" {attributes}><{kind} {value}/>{more}</ScalarVariable>'
 
 
 @pytest.mark.parametrize(
-    ("start", "kind", "attributes", "child", "expected"),
+    ("start", "kind", "attributes", "value", "expected"),
     [
-        (1.0, "Real", 'variability="parameter"', "", ("parameter", "fixed", "exact")),
+        ("1", "Real", 'variability="parameter"', "", ("parameter", "fixed", "exact")),
         (None, "Real", 'variability="parameter"', "", ("calculatedParameter", "fixed", "calculated")),
         (None, "Real", 'variability="parameter" causality="output"', "", ("output", "fixed", "calculated")),
         (None, "Real", "", "", ("local", "continuous", "calculated")),
-        (1.0, "Real", "", '<Real fixed="false"/>', ("local", "continuous", "approx")),
-        (1.0, "Real", "", '<Real fixed="true"/>', ("local", "continuous", "exact")),
-        (1.0, "Real", 'causality="input"', "", ("input", "continuous", None)),
+        ("1", "Real", "", 'fixed="false"', ("local", "continuous", "approx")),
+        ("1", "Real", "", 'fixed="true"', ("local", "continuous", "exact")),
+        ("1", "Real", 'causality="input"', "", ("input", "continuous", None)),
         (None, "Integer", 'causality="output"', "", ("output", "discrete", "calculated")),
         (None, "Real", 'causality="none"', "", ("local", "continuous", "calculated")),
     ],
 )
-def test_roles_of_fmi_1(start, kind, attributes, child, expected):
-    v = variable("v", kind, start)
-    from_1((v, f'<ScalarVariable name="v" {attributes}>{child}</ScalarVariable>'))
+def test_roles_of_fmi_1(start, kind, attributes, value, expected):
+    value += "" if start is None else f' start="{start}"'
+    variables, _, _ = translated(scalar("v", attributes, kind, value), "1.0")
+    v = variables["v"]
     assert (v.causality, v.variability, v.initial) == expected
 
 
 def test_outputs_and_what_they_depend_on_directly():
-    """Nothing said is no list; a name that is not there is passed over."""
-    u, y, z = variable("u", start=0.0), variable("y"), variable("z")
+    """Nothing said is no list; a name that is not there is passed over; only of an output is it of any use."""
     depends = "<DirectDependency><Name> u </Name><Name>gone</Name><Name/></DirectDependency>"
-    description, _ = from_1(
-        (u, '<ScalarVariable name="u" causality="input"/>'),
-        (y, f'<ScalarVariable name="y" causality="output">{depends}</ScalarVariable>'),
-        (z, '<ScalarVariable name="z" causality="output"/>'),
+    variables, _, _ = translated(
+        scalar("u", 'causality="input"', more=depends)
+        + scalar("y", 'causality="output"', more=depends)
+        + scalar("z", 'causality="output"'),
+        "1.0",
     )
-    assert [(known.variable.name, known.dependencies) for known in description.outputs] == [("y", [u]), ("z", None)]
+    assert [variables[name].depends for name in "uyz"] == [None, ["u"], None]
 
 
 def test_negatives_of_other_variables():
-    element = '<ScalarVariable name="{}" alias="negatedAlias"/>'
-    pairs = [(variable(n, kind), element.format(n)) for n, kind in (("a", "Real"), ("b", "Boolean"), ("c", "String"))]
-    _, beside = from_1(*pairs)
-    assert beside.negated == {"a", "b"}, "no text has a negative"
+    kinds = (("a", "Real"), ("b", "Boolean"), ("c", "String"))
+    variables, _, _ = translated("".join(scalar(n, 'alias="negatedAlias"', kind) for n, kind in kinds), "1.0")
+    assert [name for name, v in variables.items() if v.negated] == ["a", "b"], "no text has a negative"
+
+
+def test_a_variable_without_a_type_is_named():
+    with pytest.raises(ValueError, match='the variable "v" has no type'):
+        translated('<ScalarVariable name="v" valueReference="0"/>', "1.0")
 
 
 def test_capabilities_of_fmi_1():
     told = '<Capabilities canInterpolateInputs="1" canHandleVariableCommunicationStepSize="true"/>'
     able = f"<CoSimulation_Tool>{told}</CoSimulation_Tool>"
     for implementation, expected in ((able, (True, True, False, True)), ("", (False, False, False, False))):
-        simulation = from_1(implementation=implementation)[0].coSimulation
+        simulation = translated("", "1.0", f"<Implementation>{implementation}</Implementation>")[2]
         assert (
             simulation.canHandleVariableCommunicationStepSize,
             simulation.canInterpolateInputs,
@@ -120,31 +130,29 @@ def test_capabilities_of_fmi_1():
 
 
 def test_types_of_fmi_3_and_what_is_left_out():
-    variables = [
-        variable("x", "Float32"),
-        variable("n", "UInt64"),
-        variable("on", "Boolean"),
-        variable("k", "Int8", initial="exact", causality="structuralParameter"),
-        variable("vast", "Float64", dimensions=[SimpleNamespace()], shape=(10**6, 10**6)),
-        variable("none", "Float64", dimensions=[SimpleNamespace()], shape=(0,)),
-        variable("row", "Float64", dimensions=[SimpleNamespace()], shape=(2,)),
-        variable("row[2]", "Boolean"),
-        variable("blob", "Binary"),
-        variable("tick", "Clock"),
-        variable("sampled", "Float64", clocks=["tick"]),
-        variable("twin", "Float64", causality="output", alias=SimpleNamespace(name="x"), description="again"),
-    ]
-    written = '<UInt64 name="n" min="1" max="18446744073709551615"/><!-- a comment --><Float32 name="x"/>'
-    it = root(f'<x><CoSimulation providesDirectionalDerivatives="true"/><ModelVariables>{written}</ModelVariables></x>')
-    description = SimpleNamespace(coSimulation=SimpleNamespace(), modelVariables=variables)
-    beside = translation.translate(description, it, "3.0")
-    by_name = {v.name: v for v in description.modelVariables}
-    assert {name: v.type for name, v in by_name.items()} == {
-        "x": "Real", "n": "Integer", "on": "Boolean", "k": "Integer", "twin": "Real", "row[2]": "Boolean",
-    }  # fmt: skip
-    assert beside.fmi_types == {
-        "x": "Float32", "n": "UInt64", "on": "Boolean", "k": "Int8", "twin": "Float64", "row[2]": "Boolean",
-    }  # fmt: skip
+    written = (
+        '<Float32 name="x" valueReference="1" causality="output"><Alias name="twin" description="again"/></Float32>'
+        '<UInt64 name="n" valueReference="2" min="1" max="18446744073709551615"/><!-- a comment -->'
+        '<Boolean name="on" valueReference="3"/>'
+        '<Int8 name="k" valueReference="4" causality="structuralParameter" start="2"/>'
+        '<Float64 name="vast" valueReference="5"><Dimension start="1000000"/><Dimension start="1000000"/></Float64>'
+        '<Float64 name="none" valueReference="6"><Dimension start="0"/></Float64>'
+        '<Float64 name="row" valueReference="7"><Dimension valueReference="4"/></Float64>'
+        '<Boolean name="row[2]" valueReference="8"/>'
+        '<Binary name="blob" valueReference="9"><Start value="00"/></Binary>'
+        '<Clock name="tick" valueReference="10" intervalVariability="triggered"/>'
+        '<Float64 name="sampled" valueReference="11" clocks="10"/>'
+    )
+    simulation = '<CoSimulation providesDirectionalDerivatives="true"/>'
+    by_name, beside, able = translated(written, "3.0", simulation)
+    assert {name: (v.type, v.fmi_type) for name, v in by_name.items()} == {
+        "x": ("Real", "Float32"),
+        "n": ("Integer", "UInt64"),
+        "on": ("Boolean", "Boolean"),
+        "k": ("Integer", "Int8"),
+        "row[2]": ("Boolean", "Boolean"),
+        "twin": ("Real", "Float32"),
+    }
     assert beside.left_out == {
         "vast": "an array of 1000000000000 elements",
         "none": "an array of 0 elements",
@@ -156,8 +164,8 @@ def test_types_of_fmi_3_and_what_is_left_out():
     assert (by_name["n"].min, by_name["n"].max) == ("1", "18446744073709551615")
     assert by_name["k"].initial is None
     assert (by_name["twin"].causality, by_name["twin"].description) == ("local", "again (another name of x)")
-    assert description.coSimulation.providesDirectionalDerivative is True
-    assert description.coSimulation.canInterpolateInputs is False
+    assert able.providesDirectionalDerivative is True
+    assert able.canInterpolateInputs is False
 
 
 def test_fmi_2_is_left_as_it_is():

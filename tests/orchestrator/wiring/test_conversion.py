@@ -3,7 +3,7 @@
 from dataclasses import replace
 
 import pytest
-from railcosim.orchestrator.fmi.interface import Interface, Unit, Variable
+from railcosim.orchestrator.fmi.interface import Interface, Sort, Unit, Variable
 from railcosim.orchestrator.system import Connection
 from railcosim.orchestrator.wiring.conversion import Conversion, fit
 
@@ -13,7 +13,7 @@ K, DEGC = Unit("K", KELVIN), Unit("degC", KELVIN, 1.0, 273.15)
 
 def end(model, unit=None, definition=None, kind="Real", **of):
     """A variable, and the interface it stands in."""
-    variable = Variable("v", 0, kind, "output", "continuous", None, None, unit, **of)
+    variable = Variable("v", 0, Sort(kind, "output", "continuous", None, unit, **of))
     units = {} if definition is None else {unit: definition}
     return variable, Interface(model, "m", "", {"v": variable}, units, {})
 

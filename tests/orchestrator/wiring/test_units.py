@@ -4,7 +4,7 @@ import math
 from dataclasses import replace
 
 import pytest
-from railcosim.orchestrator.fmi.interface import Interface, Unit, Variable
+from railcosim.orchestrator.fmi.interface import Interface, Sort, Unit, Variable
 from railcosim.orchestrator.wiring.units import Relation, convert, relate
 
 ANGLE, RATE, PLAIN_RATE, NONE = (0,) * 7 + (1,), (0, 0, -1, 0, 0, 0, 0, 1), (0, 0, -1, 0, 0, 0, 0, 0), (0,) * 8
@@ -14,7 +14,7 @@ DEG = math.pi / 180.0
 
 def end(model, unit, exponents, factor=1.0, offset=0.0, *, relative=False):
     """A variable in a unit, and the interface it stands in; a unit without exponents is not defined."""
-    v = Variable("v", 0, "Real", "output", "continuous", None, None, unit, relative=relative)
+    v = Variable("v", 0, Sort("Real", "output", "continuous", None, unit, relative=relative))
     units = {} if exponents is None else {unit: Unit(unit, exponents, factor, offset)}
     return v, Interface(model, "m", "", {"v": v}, units, {})
 

@@ -2,17 +2,17 @@
 
 from railcosim.fmus.annotation import Annotation
 from railcosim.orchestrator.cli.printing import show_interface
-from railcosim.orchestrator.fmi import Interface, Variable
+from railcosim.orchestrator.fmi import Interface, Sort, Variable
 
 
 def test_an_interface_stands_by_causality_with_what_each_output_depends_on(shown):
     variables = [
-        Variable("gain", 0, "Real", "parameter", "tunable", "exact", 0.5, "1/s", description="of the loop"),
-        Variable("on", 1, "Boolean", "input", "discrete", None, True),
-        Variable("u", 2, "Real", "input", "continuous", None, 0.0, "m", description="what comes in"),
-        Variable("y", 3, "Real", "output", "continuous", None, None, "m", dependencies=frozenset({"u", "on"})),
-        Variable("z", 4, "Real", "output", "continuous", None, None, None, dependencies=frozenset()),
-        Variable("w", 5, "Real", "output", "continuous", None, None),
+        Variable("gain", 0, Sort("Real", "parameter", "tunable", "exact", "1/s"), 0.5, "of the loop"),
+        Variable("on", 1, Sort("Boolean", "input", "discrete", None), True),
+        Variable("u", 2, Sort("Real", "input", "continuous", None, "m"), 0.0, "what comes in"),
+        Variable("y", 3, Sort("Real", "output", "continuous", None, "m"), dependencies=frozenset({"u", "on"})),
+        Variable("z", 4, Sort("Real", "output", "continuous", None), dependencies=frozenset()),
+        Variable("w", 5, Sort("Real", "output", "continuous", None)),
     ]
     interface = Interface(
         "M",

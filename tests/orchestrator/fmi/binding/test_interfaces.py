@@ -5,7 +5,7 @@ import json
 
 import pytest
 from railcosim.fmus.annotation import Annotation
-from railcosim.orchestrator.fmi import Interface, Unit, Variable
+from railcosim.orchestrator.fmi import Interface, Sort, Unit, Variable
 from railcosim.orchestrator.fmi.binding import plain_interface, read_interface
 
 
@@ -13,9 +13,10 @@ from railcosim.orchestrator.fmi.binding import plain_interface, read_interface
 def interface():
     """One with something in every field."""
     variables = [
-        Variable("x[1]", 1, "Real", "output", "continuous", None, float("inf"), "km/h", dependencies=frozenset({"u"})),
-        Variable("state", 2, "Enumeration", "input", "discrete", "exact", 1, choices=(("off", 1), ("on", 2))),
-        Variable("none", 3, "String", "parameter", "fixed", "exact", "a\udcff", fmi_type="String", negated=True),
+        Variable("x[1]", 1, Sort("Real", "output", "continuous", None, "km/h"), float("inf"), "", frozenset({"u"})),
+        Variable("state", 2, Sort("Enumeration", "input", "discrete", "exact", choices=(("off", 1), ("on", 2))), 1),
+        Variable("m[2]", 4, Sort("Real", "local", "continuous", None), derivative="x[1]", element=("m", 1)),
+        Variable("none", 3, Sort("String", "parameter", "fixed", "exact", fmi_type="String", negated=True), "a\udcff"),
     ]
     units = [Unit("km/h", (0, 1, -1, 0, 0, 0, 0, 0), 1 / 3.6), Unit("odd", None)]
     return Interface(
