@@ -13,8 +13,7 @@ from .. import world
 from ..errors import FmuFileError
 from .document import Schema, parse, sections
 from .entries import Description, Entry, Texts, problems, read_entry, resolve
-from .faults import Faults
-from .repair import Repair
+from .repair import Faults, Repair
 from .translation import VERSIONS, is_for_co_simulation, other_kind, standard
 
 _VARIABLES, _STRUCTURE = "ModelVariables", "ModelStructure"

@@ -8,11 +8,12 @@ what is doubtful is taken out.
 from __future__ import annotations
 
 import math
+import re
+from collections import Counter
 from collections.abc import Iterable, Iterator, Mapping, Set
 from typing import Any
 
 from .entries import Entry
-from .faults import Faults
 
 _TYPES = ("Real", "Integer", "Boolean", "String", "Enumeration")
 _CAUSALITIES = ("parameter", "calculatedParameter", "input", "output", "local", "independent")
@@ -35,6 +36,40 @@ _SHORT = 10
 """Digits that a number has to have to be larger."""
 _PLAIN = frozenset(("start", "unit", "quantity"))
 """Attributes of a value of which nothing else can be wrong."""
+_OWN = re.compile(r'"[^"]*"|\d+')
+"""In what faults of one kind differ: names in double quotes, and numbers."""
+_MOST_KINDS = 12
+"""Kinds of faults that are told of one file."""
+
+
+class Faults:
+    """The first of each kind, and how many there were: a million of them take no room."""
+
+    def __init__(self) -> None:
+        self._first: dict[str, str] = {}
+        self._count = Counter[str]()
+
+    def add(self, faults: Iterable[str]) -> None:
+        """Note some, a sentence each."""
+        for fault in faults:
+            kind = _OWN.sub("", fault)
+            self._first.setdefault(kind, fault)
+            self._count[kind] += 1
+
+    def join(self, others: Faults) -> None:
+        """Note those of others."""
+        for kind, first in others._first.items():
+            self._first.setdefault(kind, first)
+        self._count += others._count
+
+    def told(self) -> list[str]:
+        """A sentence for each kind."""
+        told = [
+            first + (f" (and {self._count[kind] - 1} more like it)" if self._count[kind] > 1 else "")
+            for kind, first in list(self._first.items())[:_MOST_KINDS]
+        ]
+        more = len(self._first) - len(told)
+        return [*told, f"and {more} more kinds of faults"] if more > 0 else told
 
 
 class Repair:
