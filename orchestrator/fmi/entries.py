@@ -146,7 +146,10 @@ def read_entry(element: Any, version: str, texts: Texts) -> Entry:
     """
     own = dict(element.items())
     nested = version != "3.0"
-    value = next((child for child in element if child.tag in _TYPES), None) if nested else element
+    value = element
+    if nested:  # mostly the first child
+        first = element[0] if len(element) else None
+        value = first if first is not None and first.tag in _TYPES else _value(element)
     entry = Entry()
     entry.name, entry.reference, entry.line = own["name"], int(own["valueReference"]), element.sourceline
     if value is None:
@@ -177,6 +180,10 @@ def read_entry(element: Any, version: str, texts: Texts) -> Entry:
             where = f'Variable "{entry.name}" (line {entry.line})'
             raise ValueError(f"{where} has an illegal combination of {what}.") from None
     return entry
+
+
+def _value(element: Any) -> Any:
+    return next((child for child in element if child.tag in _TYPES), None)
 
 
 def _read_1(element: Any, own: Mapping[str, str], typed: Mapping[str, str], entry: Entry) -> None:

@@ -64,6 +64,7 @@ class Reading:
         self._repair: Repair = Repair(None if before is None else before._repair)
         self._overlooked = Faults()
         self._has_parts = False
+        self._taken: set[str] = set()
         self._entries: list[Entry] = []
         self._texts = Texts()
         self._outputs = array("q")
@@ -82,13 +83,14 @@ class Reading:
             raise FmuFileError(f"{self._name} has no co-simulation part{f' (it is {other})' if other else ''}")
         if self._is_mended:
             self._repair.end(root)
-        for section, parent in sections(root):
-            self._take(root, section, [element for element in parent if isinstance(element.tag, str)])
+        self._take_rest(root, _VARIABLES)
+        for section, _ in list(sections(root)):
+            if section != _VARIABLES:
+                self._take_rest(root, section)
         self._schema.check(root.getroottree())
         self._is_late = self._has_parts and not self._is_last and _refers_ahead(root)
-        for section, parent in list(sections(root)):
-            if section in (_VARIABLES, _STRUCTURE):
-                del parent[:]
+        for parent in filter(lambda it: it is not None, map(root.find, (_VARIABLES, _STRUCTURE))):
+            del parent[:]
         self.description = Description(_read_rest(root), self._entries)
         if self._is_mended:
             for entry in self._entries:
@@ -131,7 +133,16 @@ class Reading:
     def _take_part(self, root: Any, section: str, elements: list[Any]) -> None:
         self._begin(root)
         self._has_parts = True
+        if section != _VARIABLES:  # which are all there, if they stand before it
+            self._take_rest(root, _VARIABLES)
         self._schema.check_part(section, self._take(root, section, elements))
+
+    def _take_rest(self, root: Any, section: str) -> None:
+        """Read what has been left of a section, once."""
+        parent = root.find(section)
+        if parent is not None and section not in self._taken:
+            self._taken.add(section)
+            self._take(root, section, [element for element in parent if isinstance(element.tag, str)])
 
     def _take(self, root: Any, section: str, elements: list[Any]) -> list[Any]:
         """Read elements of a section; those that are left of them."""

@@ -10,7 +10,7 @@ from __future__ import annotations
 import math
 import re
 from collections import Counter
-from collections.abc import Iterable, Iterator, Mapping, Set
+from collections.abc import Iterable, Iterator
 from typing import Any
 
 from .entries import Entry
@@ -87,30 +87,33 @@ class Repair:
         self.names: set[str] = set()
         self._count: int = 0 if before is None else before._count
         self._is_known = before is not None
-        self._units: Set[str | None] = set() if before is None else before._units
-        self._types: Mapping[str | None, str | None] = {} if before is None else before._types
+        self._definitions = Faults()
+        self._units: set[str | None] = set() if before is None else before._units
+        self._types: dict[str | None, str | None] = {} if before is None else before._types
         self._is_begun = False
 
     def begin(self, root: Any) -> None:
         """Units and types, as far as they have been read."""
-        if self._is_begun:
-            return
-        self._is_begun = True
-        self._definitions = Faults()
-        self._definitions.add(_units(root))
-        self._definitions.add(_types(root))
-        if not self._is_known:
-            self._units = {unit.get("name") for unit in root.findall("UnitDefinitions/Unit")}
-            self._types = {made.get("name"): made[0].get("unit") for made in root.findall("TypeDefinitions/SimpleType")}
+        if not self._is_begun:
+            self._is_begun = True
+            self._define(root)
 
     def end(self, root: Any) -> None:
-        """All the rest but variables and structure."""
-        self.begin(root)
+        """All but variables and structure."""
+        self._define(root)
         self.head.add(_head(root))
         self.head.join(self._definitions)
         if root.find("ModelVariables") is None:
             root.append(root.makeelement("ModelVariables"))
             self.variables.add(["it lists no variables"])
+
+    def _define(self, root: Any) -> None:
+        """Put units and types right, once each, and note them."""
+        self._definitions.add(_units(root))
+        self._definitions.add(_types(root))
+        units = root.findall("UnitDefinitions/Unit")
+        self._units |= {unit.get("name") for unit in units}
+        self._types |= {made.get("name"): made[0].get("unit") for made in root.findall("TypeDefinitions/SimpleType")}
 
     def take_variables(self, elements: Iterable[Any]) -> list[Any]:
         """Variables; those that are some.
@@ -133,16 +136,15 @@ class Repair:
 
     def _is_plain(self, variable: Any) -> bool:
         """Whether a variable has nothing that could be wrong, as most of a million have; its name is noted then."""
-        own = dict(variable.items())
-        name, reference = own.get("name"), own.get("valueReference", "")
+        name, reference = variable.get("name"), variable.get("valueReference", "")
         if not name or name in self.names or not (reference.isdecimal() and len(reference) < _SHORT):
             return False
         if len(variable) != 1 or variable[0].tag != "Real":
             return False
-        if (own.get("causality", "local"), own.get("variability", "continuous")) not in _LEGAL:
+        if (variable.get("causality", "local"), variable.get("variability", "continuous")) not in _LEGAL:
             return False
-        value = dict(variable[0].items())
-        if not _PLAIN.issuperset(value) or ("start" in value and _number(value["start"]) is None):
+        value = variable[0]
+        if not _PLAIN.issuperset(value.keys()) or _number(value.get("start", "0")) is None:
             return False
         self.names.add(name)
         return True
