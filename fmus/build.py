@@ -18,6 +18,7 @@ from pathlib import Path
 from typing import Any
 
 import platformdirs
+from filelock import FileLock
 
 from ..components import Component, Simulation
 from ..components.tracing import TracingError
@@ -90,14 +91,19 @@ def _zig_cache() -> Path:
     """Where ziglang keeps the C libraries it makes, which are the same for every folder of FMUs.
 
     In the user's cache directory, wherever ``RAILCOSIM_CACHE`` is, so that they are made once; where that cannot be
-    written, beside the FMUs.
+    written, beside the FMUs, or for this process alone.
     """
-    usual = _user_cache() / "zig"
+    places = (_user_cache() / "zig", cache_folder().with_name("zig"))
+    return next((place for place in places if _can_be_written(place)), None) or _instead() / "zig"
+
+
+def _can_be_written(folder: Path) -> bool:
     try:
-        usual.mkdir(parents=True, exist_ok=True)
+        folder.mkdir(parents=True, exist_ok=True)
+        with tempfile.TemporaryFile(dir=folder):  # flags are not all: disks are full, and mounted to be read
+            return True
     except OSError:
-        return cache_folder().with_name("zig")
-    return usual if os.access(usual, os.W_OK) else cache_folder().with_name("zig")
+        return False
 
 
 def _user_cache() -> Path:
@@ -147,9 +153,13 @@ def _digest(content: bytes, target: Path) -> bytes:
 @functools.cache
 def _instead() -> Path:
     """A folder of this process's, where the cache cannot be written."""
-    folder = tempfile.mkdtemp(prefix="railcosim_")
+    folder = Path(tempfile.mkdtemp(prefix="railcosim_"))
+    # As the orchestrator owns the folders of its runs, which removes those of processes that were killed.
+    lock = FileLock(folder / ".in-use")
+    lock.acquire()
     atexit.register(shutil.rmtree, folder, ignore_errors=True)
-    return Path(folder)
+    atexit.register(lock.release)
+    return folder
 
 
 @functools.cache

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import atexit
 import os
 import signal
 import sys
@@ -48,6 +49,7 @@ def supervised(command: Callable[[], int]) -> int:
             sys.stderr.flush()
         finally:
             world.write(saying, b".")
+            atexit._run_exitfuncs()  # temporary folders are removed by them
             world.exit_at_once(code)
     world.close(saying)
     code = os.waitstatus_to_exitcode(_outlived(child, awaited))

@@ -83,6 +83,11 @@ def test_the_cross_c_libraries_are_made_once_for_every_folder_of_fmus(tmp_path, 
     (tmp_path / "file").write_text("")
     monkeypatch.setattr(platformdirs, "user_cache_dir", lambda *_, **__: str(tmp_path / "file"))
     assert build_module._zig_cache() == tmp_path / "two" / "zig"
+    monkeypatch.setenv("RAILCOSIM_CACHE", str(tmp_path / "file" / "none"))
+    place = build_module._zig_cache()
+    assert place == build_module._instead() / "zig"
+    place.mkdir()  # it can be used
+    place.rmdir()
 
 
 @needs_zig

@@ -1,5 +1,9 @@
 """Temporary folders whose owner is gone."""
 
+import subprocess
+import sys
+from pathlib import Path
+
 from railcosim.orchestrator.leftovers import own, remove_where_abandoned
 
 
@@ -15,3 +19,14 @@ def test_a_folder_is_removed_where_its_owner_is_gone_and_no_other(tmp_path):
         remove_where_abandoned(inside)
     assert sorted(path.name for path in tmp_path.iterdir()) == ["elsewhere", "used"]
     lock.release()
+
+
+def test_so_is_one_in_which_fmus_were_built_that_no_cache_could_keep():
+    code = "import os; from railcosim.fmus.build import _instead; print(_instead(), flush=True); input(); os._exit(0)"
+    with subprocess.Popen([sys.executable, "-c", code], stdin=-1, stdout=-1, text=True) as builder:
+        folder = Path(builder.stdout.readline().strip())
+        remove_where_abandoned(folder / "some.fmu")
+        assert folder.is_dir()
+        builder.communicate("\n")
+    remove_where_abandoned(folder / "some.fmu")
+    assert not folder.exists()
