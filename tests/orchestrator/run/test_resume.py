@@ -13,6 +13,7 @@ import pytest
 from railcosim.orchestrator import load, world
 from railcosim.orchestrator.cli import app as cli
 from railcosim.orchestrator.cli import runs
+from railcosim.orchestrator.cli.printing.progress import Shown
 from railcosim.orchestrator.run import checkpoint
 from railcosim.orchestrator.run.execution import execute, resume, run
 from railcosim.orchestrator.run.recording import ROWS_FILE, Recorder, Results
@@ -270,7 +271,7 @@ def test_a_model_that_fails_ends_with_3_and_says_how_to_go_on(orchestrate, scena
 def test_an_interrupted_run_says_how_to_go_on(orchestrate, scenario, tmp_path, monkeypatch):
     @contextmanager
     def pressing(*_):
-        yield lambda now, _: os.kill(os.getpid(), signal.SIGINT) if now > 2.5 else None
+        yield Shown(lambda now, _: os.kill(os.getpid(), signal.SIGINT) if now > 2.5 else None, lambda *_: None)
 
     out = tmp_path / "out"
     with monkeypatch.context() as patch:

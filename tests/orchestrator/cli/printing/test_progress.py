@@ -29,6 +29,16 @@ def test_progress_starts_at_the_start_time(capsys):
         assert progress is None
 
 
+def test_on_a_terminal_the_writing_of_results_is_shown(monkeypatch):
+    terminal = Terminal()
+    monkeypatch.setattr(sys, "stderr", terminal)
+    with show_progress("run", False) as progress:
+        progress(1.0, 10.0)
+        progress.writing(300, 1000)
+    assert "results.csv" in terminal.getvalue()
+    assert "300 of 1000 rows" in terminal.getvalue()
+
+
 def compile_something():
     logging.getLogger(toolchain.__name__).info("%s: compiling for %s", "Gust\x1b[2J", "win64")
 
