@@ -1,5 +1,6 @@
 """What recorded signals mean: expressions, metrics, requirements, reference values."""
 
+from .calculation import Scope, evaluate
 from .expressions import Expression, evaluate_constant, parse
 from .metrics import (
     COMFORT_TITLE,
@@ -28,7 +29,7 @@ from .published import (
     split_metric,
 )
 from .requirements import Verdict, check_requirements, judge_requirements, needed_signals, parse_requirement
-from .signals import Part, Signals
+from .signals import Part, Signals, parts_of
 from .syntax import Call, Node, Number, Operation, Reference
 
 __all__ = [
@@ -50,6 +51,7 @@ __all__ = [
     "Operation",
     "Part",
     "Reference",
+    "Scope",
     "Signals",
     "Verdict",
     "check_entry",
@@ -59,6 +61,7 @@ __all__ = [
     "comfort_levels",
     "compare_metrics",
     "count_values",
+    "evaluate",
     "evaluate_constant",
     "evaluate_metrics",
     "judge_requirements",
@@ -67,6 +70,7 @@ __all__ = [
     "needed_signals",
     "parse",
     "parse_requirement",
+    "parts_of",
     "split_metric",
     "unit_of",
 ]

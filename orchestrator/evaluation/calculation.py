@@ -171,6 +171,11 @@ def evaluate(node: Node, scope: Scope) -> Value:  # noqa: PLR0911 (one a kind of
     raise scope.error("a list is only understood as an argument")
 
 
+def reach(node: Node) -> int:
+    """How many points ahead an expression looks at most."""
+    return sum(isinstance(part, Call) and part.name == "at_sample" for part in walk(node))
+
+
 def _reduce(node: Call, scope: Scope) -> Value:
     """Show a reducer the whole run, part by part."""
     function = scope.functions[node.name]
@@ -186,9 +191,8 @@ def _reduce(node: Call, scope: Scope) -> Value:
     bounds = {name: _argument(given[name], scope) if name in given else None for name in WINDOWS["span"]}
     span = span_of(scope.signals, **bounds, half_open=function.window == "phase")
     varying = {name: given[name] for name in given if name not in fixed and name not in bounds}
-    beyond = sum(isinstance(part, Call) and part.name == "at_sample" for part in walk(node))
     fold: Fold | None = None
-    for part in parts_of(scope.signals, beyond):
+    for part in parts_of(scope.signals, reach(node)):
         inside = scope.of(part)
         rows, new = function.call(span, **fixed, **{name: _argument(x, inside) for name, x in varying.items()})
         fold = new if fold is None else fold

@@ -14,7 +14,7 @@ import numpy as np
 from ..errors import ExpressionError, WindowError
 from ..names import INDEX, SignalName
 from ..problems import Problem, suggestion
-from .calculation import Scope, evaluate, unknown_signal
+from .calculation import Scope, evaluate, reach, unknown_signal
 from .functions import CONSTANTS, ELEMENTWISE, Function, Value, call_problem
 from .signals import Rehearsal, Signals
 from .syntax import Call, Group, Name, Node, Number, Operation, Reference, read, walk
@@ -51,6 +51,11 @@ class Expression:
         """Whether the free index `i` occurs."""
         bare = any(isinstance(node, Name) and node.name == "i" for node in walk(self.tree))
         return bare or any(reference.uses_index for reference in self.references)
+
+    @property
+    def reaches(self) -> int:
+        """How many points ahead it looks at most."""
+        return reach(self.tree)
 
     def calls(self, name: str) -> bool:
         """Whether the function of this name is called somewhere."""

@@ -18,7 +18,7 @@ from ..errors import ExpressionError, WindowError
 from ..names import SignalName
 from ..problems import Problem, suggestion
 from ..times import digits, slack
-from .calculation import Scope
+from .calculation import Scope, reach
 from .expressions import Expression, evaluate_constant, parse
 from .functions import CONSTANTS
 from .metrics import EVERY_STEP, FUNCTIONS
@@ -177,8 +177,7 @@ class Requirement:
         look = _Look(
             self.quantifier, lambda row, rows: index if index is not None else self._row_number(scope, row, rows)
         )
-        beyond = sum(isinstance(part, Call) and part.name == "at_sample" for part in walk(node))
-        for part in parts_of(scope.signals, beyond):
+        for part in parts_of(scope.signals, reach(node)):
             met, slack = (window_of(part, x, span) for x in np.broadcast_arrays(*slack_of(node, scope.of(part))))
             look.see(slack.times, met.kept != 0.0, slack.kept)
         return look

@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from ..errors import ExpressionError
 from ..evaluation import FUNCTIONS, Expression, Reference, Signals, parse, unit_of
 from ..problems import Problem
+from .outline import MOST_POINTS, outlined
 from .panels import texts_of
 
 Array = NDArray[np.float64]
@@ -65,10 +66,13 @@ def _entry(x: Any, text: str, label: str, entry: int, signals: Signals) -> list[
         constants[x["name"]] = np.linspace(x["from"], x["to"], x.get("points", 400))
     drawn: list[tuple[Array, Array, str, str]] = []
     for index in expression.instances(names):
-        y = np.atleast_2d(np.asarray(expression.evaluate(signals, index, **constants), dtype=np.float64))
-        across = _across(x, signals, index, constants)
-        y = np.broadcast_to(y, (y.shape[0], across.shape[-1]))
-        across = np.broadcast_to(across, y.shape)
+        if x is None and signals.points > MOST_POINTS:
+            across, y = outlined(expression, signals, index)
+        else:
+            y = np.atleast_2d(np.asarray(expression.evaluate(signals, index, **constants), dtype=np.float64))
+            across = _across(x, signals, index, constants)
+            y = np.broadcast_to(y, (y.shape[0], across.shape[-1]))
+            across = np.broadcast_to(across, y.shape)
         resolved = expression.resolve(names, index)
         unit = unit_of(expression, signals, index)
         drawn += [
