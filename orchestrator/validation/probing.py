@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import contextlib
 import os
 import subprocess
+import threading
 from collections.abc import Sequence
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
@@ -37,6 +39,8 @@ _SAID = "output.txt"
 _RESUMED = ("dependencies", "order")
 """Probes that do what importers must not: what takes their process down is left out by the next one."""
 _MOST_LIVES = 10
+_MOMENT = 0.25
+"""How often a probe that takes long is asked whether it is still wanted, in s."""
 _HANGS = "not finished after"
 
 
@@ -69,13 +73,19 @@ def try_out(
         problems.append(f"{found.name} stands in binaries/{found.parent.name}, not in binaries/{here[0]}")
     problems = [f"{problem}: most importers need that" for problem in problems]
     findings = [listed("binary", problems, f"for {', '.join(platforms)}")]
+    stopped = threading.Event()
     with ThreadPoolExecutor(os.cpu_count() or 1) as pool:
-        answers = pool.map(lambda probe: _probe(probe, interface, folder, timeout), probes)
-        findings += [_judged(PROBES[probe], answer, interface) for probe, answer in zip(probes, answers, strict=True)]
-    return findings
+        try:
+            answers = list(pool.map(lambda probe: _probe(probe, interface, folder, timeout, stopped), probes))
+        except BaseException:  # Ctrl-C, above all: no probe is waited for
+            stopped.set()
+            raise
+    return findings + [_judged(PROBES[probe], answer, interface) for probe, answer in zip(probes, answers, strict=True)]
 
 
-def _probe(probe: str, interface: Interface, folder: Path, timeout: float) -> tuple[Verdict, str]:
+def _probe(
+    probe: str, interface: Interface, folder: Path, timeout: float, stopped: threading.Event
+) -> tuple[Verdict, str]:
     if probe in probes_fmi2.PROBES and interface.version != "2.0":
         return "skipped", "tried with FMI 2.0 only"
     place = Path(world.mkdtemp(prefix=f"{probe}_", dir=folder.parent))
@@ -83,7 +93,7 @@ def _probe(probe: str, interface: Interface, folder: Path, timeout: float) -> tu
     task = Task(probe, interface, folder, step, answer=place / "answer.jsonl")
     task.write(place / "task.json")
     for _ in range(_MOST_LIVES if probe in _RESUMED else 1):
-        death = _live(place, timeout)
+        death = _live(place, timeout, stopped)
         if task.record.last("verdict") is not None:
             return task.record.last("verdict"), str(task.record.last("detail"))
         task.record.add(died=death)
@@ -94,16 +104,25 @@ def _probe(probe: str, interface: Interface, folder: Path, timeout: float) -> tu
     return "fail", f"{what}{_last_words(place / _SAID)}"
 
 
-def _live(place: Path, timeout: float) -> str:
-    """Let a process try, until it ends; how it did."""
+def _live(place: Path, timeout: float, stopped: threading.Event) -> str:
+    """Let a process try, until it ends; how it did.
+
+    Raises:
+        InterruptedError: nobody wants to know any more.
+    """
     command = [*starting("validation.probe_process"), str(place / "task.json")]
     with world.open(place / _SAID, "wb") as output:
         process = world.start(
             command, cwd=place, stdin=subprocess.DEVNULL, stdout=output, stderr=output, start_new_session=True
         )
+        left = timeout
         try:
-            return _cause(world.wait(process, timeout))
-        except subprocess.TimeoutExpired:
+            while left > 0.0:
+                if stopped.is_set():
+                    raise InterruptedError
+                with contextlib.suppress(subprocess.TimeoutExpired):
+                    return _cause(world.wait(process, min(left, _MOMENT)))
+                left -= _MOMENT
             return f"{_HANGS} {timeout:g} s"
         finally:
             if process.returncode is None:

@@ -1,14 +1,17 @@
 """`orchestrate validate` on good, broken, crashing and hanging FMUs: what it finds, and that nothing takes it down."""
 
+import os
 import shutil
+import signal
 import sys
+import threading
 import time
 import zipfile
 
 import pytest
 from railcosim.fmus.build import build, native_problem
 from railcosim.fmus.references import resolve
-from railcosim.orchestrator import FmuFileError
+from railcosim.orchestrator import FmuFileError, world
 from railcosim.orchestrator.cli.app import call
 from railcosim.orchestrator.validation import validate
 from railcosim.orchestrator.validation.probing import PROBES
@@ -114,6 +117,31 @@ def test_an_fmu_that_hangs_is_ended(lag):
 
 
 @needs_compiler
+@pytest.mark.skipif(sys.platform.startswith("win"), reason="POSIX signals")
+@needs_compiler
+def test_an_interruption_does_not_wait_for_a_probe_that_hangs(lag, monkeypatch):
+    def interrupt(*_):
+        raise KeyboardInterrupt
+
+    started, start = [], world.start
+
+    def note(*arguments, **how):
+        started.append(start(*arguments, **how))
+        threading.Timer(0.1, os.kill, (os.getpid(), signal.SIGUSR1)).start()
+        return started[-1]
+
+    monkeypatch.setattr(world, "start", note)
+    monkeypatch.setattr(os, "cpu_count", lambda: 1)
+    before = signal.signal(signal.SIGUSR1, interrupt)
+    try:
+        with pytest.raises(KeyboardInterrupt):
+            validate(lag(on_instantiate="for (;;) {}"), timeout=1000.0)
+    finally:
+        signal.signal(signal.SIGUSR1, before)
+    assert started
+    assert all(process.returncode is not None for process in started)
+
+
 def test_the_schema_and_the_validator_are_asked(lag, lag_description):
     elsewhere = {"platform": "elsewhere64"}  # where nothing is tried
     report = validate(lag(lag_description.replace('<Real start="0"/>', '<Real begin="0" start="0"/>'), **elsewhere))
