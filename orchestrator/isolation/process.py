@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import contextlib
-import os
 import subprocess
 import sys
 import threading
@@ -81,15 +80,21 @@ class HostProcess:
             "folder": str(folder),
             "interface": plain_interface(interface),
         }
-        world.write_bytes(self._folder / "start", messages.encoded(start))
-        with world.open(self._folder / "memory", "w+b") as stream:
-            stream.truncate(messages.HEAD + 8 * cells)
-            self.memory = world.map_memory(stream.fileno(), 0)
-        self._notes: memoryview | None = memoryview(self.memory)[: messages.HEAD].cast("q")
-        with world.open(self._folder / "output", "ab") as output:
-            command = [*starting("isolation.host"), str(self._folder)]
-            self._process, self._end, self._password = start_process(command, output)
         self._door: Door | None = None
+        try:
+            world.write_bytes(self._folder / "start", messages.encoded(start))
+            # Zeros, not a hole: where the disk is full, whoever fills one is killed, and that may be the master.
+            world.write_bytes(self._folder / "memory", bytes(messages.HEAD + 8 * cells))
+            with world.open(self._folder / "memory", "r+b") as stream:
+                self.memory = world.map_memory(stream.fileno(), 0)
+            self._notes: memoryview | None = memoryview(self.memory)[: messages.HEAD].cast("q")
+            with world.open(self._folder / "output", "ab") as output:
+                command = [*starting("isolation.host"), str(self._folder)]
+                self._process, self._end, self._password = start_process(command, output)
+        except OSError as error:
+            error.filename = error.filename or str(self._folder)
+            world.rmtree(self._folder, ignore_errors=True)
+            raise
         self.pid = self._process.pid
         """The number by which the system knows it; until it is ready, that of its guard."""
 
@@ -250,10 +255,11 @@ class HostProcess:
 
     def _last_lines(self) -> list[str]:
         """The end of what it wrote: messages of the FMU, and what it printed."""
-        with world.open(self._folder / "output", "rb") as stream:
-            size = stream.seek(0, os.SEEK_END)
-            stream.seek(max(0, size - _LINES * _LINE))
-            lines = stream.read().decode(errors="replace").splitlines()
+        try:
+            said = world.read_bytes(self._folder / "output")
+        except OSError:  # an FMU may remove whatever it likes
+            return []
+        lines = said[-_LINES * _LINE :].decode(errors="replace").splitlines()
         return [cut(line, _LINE) for line in lines[-_LINES:]]
 
 

@@ -127,7 +127,7 @@ NO_LINE = "its process lost its line to the master in fmi2DoStep or before: the 
                 "raise_1": r"its process was ended in fmi2DoStep by a signal \(SIGHUP\)",
                 "raise_19": r"did not return from fmi2DoStep within 1 s; its process was ended",
                 "kill_group": r"its process was killed in fmi2DoStep \(SIGKILL\), most likely by the system",
-                "seccomp": r"its process was killed in fmi2GetReal \(SIGKILL\), most likely by the system",
+                "seccomp": r"its process was killed in fmi2DoStep \(SIGKILL\), most likely by the system",
                 "exec": r"its process left in fmi2DoStep and was ended",
             }.items()
         ),

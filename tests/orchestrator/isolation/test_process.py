@@ -1,7 +1,9 @@
 """Whatever an FMU does in a process of its own is an error, not our end; and no process is left behind."""
 
+import errno
 import os
 import re
+import shutil
 import signal
 import subprocess
 import sys
@@ -10,6 +12,7 @@ import time
 from pathlib import Path
 
 import pytest
+from railcosim.orchestrator import world
 from railcosim.orchestrator.errors import FmuError, StoppedError
 from railcosim.orchestrator.fmi.interface import Interface
 from railcosim.orchestrator.fmi.models import load_fmu
@@ -176,9 +179,26 @@ def test_no_process_at_all(apart, monkeypatch):
         apart()
 
 
+def test_a_full_disk_is_an_error_before_anything_is_started(apart, workspace, monkeypatch):
+    """It must not be found out by writing into shared memory: that ends a process."""
+    write = world.write_bytes
+
+    def fill(path, content):
+        if path.name == "memory":
+            raise OSError(errno.ENOSPC, "No space left on device")
+        return write(path, content)
+
+    monkeypatch.setattr(world, "write_bytes", fill)
+    monkeypatch.setattr(world, "start", None)
+    with pytest.raises(FmuError, match=r"^it: its process cannot be started: .*No space left on device: '.*host_\w+'$"):
+        apart()
+    assert not list(workspace.folder.glob("host_*"))
+
+
 def test_a_process_that_is_lost_between_two_calls(apart):
-    """And whose memory cannot be trusted."""
+    """And whose memory and files cannot be trusted."""
     it = apart(begun=True)
+    shutil.rmtree(it._process._folder)
     it._process.memory[:16] = b"\xff" * 16
     os.kill(it.pid, signal.SIGSEGV)
     with pytest.raises(FmuError, match=r"^it, t = 0 s: its process crashed between two calls \(SIGSEGV\)$"):
