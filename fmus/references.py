@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import ast
 import contextlib
 import functools
 import hashlib
@@ -11,6 +12,7 @@ import importlib.util
 import json
 import sys
 from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, field
 from pathlib import Path
 from types import CodeType, ModuleType
 from typing import Any
@@ -18,6 +20,9 @@ from typing import Any
 from ..components import CATALOGUE, Component, ComponentError
 from ..components.component import BuildArgumentError
 from ..components.spelling import did_you_mean
+
+_PRESENT = sys.stdlib_module_names | {"numpy", __package__.partition(".")[0]}
+"""What every component file may import."""
 
 
 def resolve(reference: str, folder: Path | None = None) -> type[Component]:
@@ -30,8 +35,8 @@ def resolve(reference: str, folder: Path | None = None) -> type[Component]:
     Raises:
         ComponentError: no such name, file or class; the message suggests the nearest one.
     """
-    path, colon, name = reference.rpartition(":")
-    if not colon or not path.endswith(".py"):
+    path, name = file_and_class(reference)
+    if not path:
         if reference in CATALOGUE:
             return CATALOGUE[reference]
         raise ComponentError(f"there is no component {_nearest(reference, CATALOGUE)}")
@@ -41,6 +46,60 @@ def resolve(reference: str, folder: Path | None = None) -> type[Component]:
     if name not in own:
         raise ComponentError(f"{path} has no component {_nearest(name, own)}")
     return own[name]
+
+
+def file_and_class(reference: str) -> tuple[str, str]:
+    """``"file.py:Class"`` in two; the file is empty where the reference names none."""
+    path, _, name = reference.rpartition(":")
+    return (path, name) if path.endswith(".py") else ("", reference)
+
+
+@dataclass(frozen=True)
+class Imports:
+    """What is executed where a component file is imported, as far as its text tells.
+
+    Attributes:
+        files: it and the modules beside it that it imports, and so on; links are followed.
+        others: what else is imported, a package or a folder, and the file that does it; neither the standard library
+            nor NumPy nor this project.
+    """
+
+    files: list[Path] = field(default_factory=list)
+    others: dict[str, Path] = field(default_factory=dict)
+
+
+def imports_of(path: Path) -> Imports:
+    """What importing a component file would execute; nothing of it is. A file that is not Python imports nothing."""
+    found, waiting = Imports(), [path.resolve()]
+    importlib.invalidate_caches()
+    while waiting:
+        file = waiting.pop()
+        if file in found.files:
+            continue
+        found.files.append(file)
+        for module in _imported_modules(file):
+            spec = importlib.machinery.PathFinder.find_spec(module, [str(file.parent)])
+            if spec is None or spec.origin is None:  # not there, or a folder, which is looked at last
+                if module not in _PRESENT:
+                    found.others.setdefault(module, file)
+            elif spec.origin.endswith(".py") and not spec.submodule_search_locations:
+                waiting.append(Path(spec.origin).resolve())
+            else:
+                found.others.setdefault(str(file.parent / module), file)
+    return found
+
+
+def _imported_modules(file: Path) -> Iterator[str]:
+    """The first parts of what a file imports, wherever in it."""
+    try:
+        nodes = list(ast.walk(ast.parse(file.read_bytes())))
+    except (OSError, SyntaxError, ValueError, RecursionError, MemoryError):  # it cannot be imported either
+        return
+    for node in nodes:
+        if isinstance(node, ast.Import):
+            yield from (alias.name.partition(".")[0] for alias in node.names)
+        elif isinstance(node, ast.ImportFrom) and node.module and not node.level:
+            yield node.module.partition(".")[0]
 
 
 def read_arguments(arguments: Mapping[str, Any] | None) -> dict[str, Any]:
@@ -115,9 +174,7 @@ def _neighbours(folder: Path) -> Iterator[None]:
     Otherwise the first ``helper.py`` of a process would serve every component that has a module of that name, and a
     compiled file left behind could outlive an edit within the same second.
     """
-    names = (
-        {file.stem for file in folder.glob("*.py")} - sys.stdlib_module_names - {"numpy", __package__.partition(".")[0]}
-    )
+    names = {file.stem for file in folder.glob("*.py")} - _PRESENT
     before = {name: sys.modules.pop(name) for name in names if name in sys.modules}
     writes_bytecode, sys.dont_write_bytecode = sys.dont_write_bytecode, True
     sys.path.insert(0, str(folder))

@@ -157,6 +157,7 @@ class Provenance:
 
     Attributes:
         name, path: of the scenario file. text: the scenario as read, for the record of the run.
+        named: the models that options put in place of the scenario's.
         title, source: what it says of itself. description: the same, of the preset in force.
         preset: the preset in force (``default_preset`` for the file as it stands); None where that has no name.
         presets: every name a preset may be asked for by. preset_descriptions: what they say of themselves, by name.
@@ -181,6 +182,7 @@ class Provenance:
     name: str = field(default="system", compare=False)
     path: str = field(default="", compare=False)
     text: str = field(default="", compare=False, repr=False)
+    named: tuple[str, ...] = field(default=(), compare=False)
     origins: dict[str, str] = field(default_factory=dict, compare=False, repr=False)
 
 

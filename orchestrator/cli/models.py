@@ -32,6 +32,7 @@ from .options import (
     Step,
     Stop,
     Swap,
+    Trust,
     With,
     build_arguments,
     load_system,
@@ -62,7 +63,7 @@ def describe(
 
     Of a model its variables by causality, with units, start values and direct dependencies; its build arguments, where
     it comes from, and the kind that a run takes. Of a scenario its source, presets, instances, connections, and what is
-    judged and drawn.
+    judged and drawn; nothing that it names is imported. A component's file is.
     """
     arguments = build_arguments(builds)
     is_scenario = name.endswith(".toml") or name in dict(shipped())
@@ -160,11 +161,12 @@ def pack(
     platforms: Annotated[
         str | None, typer.Option(help="all, or some of linux64,win64,darwin64; this machine's by default.")
     ] = None,
+    trust: Trust = False,
 ) -> None:
     """Write one FMU that holds a whole scenario, for another tool to run as a block."""
     system = load_system(scenario, preset, settings, builds, swaps, stop=stop, step=step, algorithm=algorithm)
     with show_compilations(quiet=False):
-        packed = pack_system(system, output, expose=expose or (), platforms=(platforms or "").split(","))
+        packed = pack_system(system, output, expose=expose or (), platforms=(platforms or "").split(","), trusted=trust)
     out = open_console()
     show_notes(out, packed.notes)
     shown = f"{len(packed.exposed)} variables, for {', '.join(packed.platforms)}"
@@ -176,6 +178,8 @@ def validate(
     timeout: Annotated[float, typer.Option(min=0.1, help="Longest time for one probe, in s.")] = TIMEOUT,
 ) -> None:
     """Check any FMU: archive, description, and probes that cannot take this program down.
+
+    Probes execute the code of the FMU, with your rights.
 
     Exit codes: 0 nothing failed; 1 something did; 2 the file is no FMU that could be used.
     """

@@ -83,6 +83,13 @@ Dpi = Annotated[
     float | None,
     typer.Option(min=20, max=1200, help="Dots per inch of figures; as the scenario says, or 100, by default."),
 ]
+Trust = Annotated[
+    bool,
+    typer.Option(
+        "--trust",
+        help="Import Python code wherever a file names it; else only what is in the scenario's folder or named here.",
+    ),
+]
 Quiet = Annotated[bool, typer.Option("--quiet", "-q", help="Print nothing but errors.")]
 
 

@@ -28,6 +28,7 @@ from ..run import (
     read_checkpoint,
     recover_rows,
 )
+from ..scenario import load
 from .options import (
     FAILED,
     INTERRUPTED,
@@ -89,8 +90,16 @@ def run(
     ] = None,
     resume_from: Annotated[
         Path | None,
-        typer.Option("--resume", metavar="DIR", help="Go on with the run in DIR from its last checkpoint."),
+        typer.Option(
+            "--resume",
+            metavar="DIR",
+            help="Go on with the run in DIR from its last checkpoint; with Python components of your own, name the "
+            "SCENARIO and its --swap as well.",
+        ),
     ] = None,
+    trust: Annotated[
+        bool, typer.Option("--trust", help="With --resume: import Python code that the checkpoint alone names.")
+    ] = False,
     verify_step: Annotated[
         bool, typer.Option("--verify-step", help="Run again at half the step, and judge the step by what changes.")
     ] = False,
@@ -104,25 +113,29 @@ def run(
 ) -> None:
     """Run a scenario: results, metrics, verdicts, figures.
 
+    A run executes the code of all FMUs and Python components that the scenario names, with your rights.
+
     Exit codes: 0 fine; 1 a requirement failed, a known value was missed, or --verify-step found the step too coarse;
     2 the input is wrong; 3 an FMU failed, or what the FMUs exchange does not settle (what was computed is on disk);
     130 interrupted by Ctrl-C (what was computed is on disk).
     """
     how: Any = {"figures": not no_figures, "threads": threads, "checkpoint_every": checkpoint_every}
     if resume_from is not None:
-        given = (scenario, preset, settings or None, builds or None, swaps or None, step, algorithm, isolated or None)
-        if any(x is not None for x in (*given, output, figure_format, dpi)) or kind is not KindName.auto or verify_step:
+        given = (preset, settings or None, builds or None, step, algorithm, isolated or None, output)
+        changed = any(x is not None for x in (*given, figure_format, dpi)) or kind is not KindName.auto or verify_step
+        if changed or (swaps and scenario is None):
             raise ScenarioError(
-                "--resume takes the run as its directory has it: give no scenario and no change but --stop; --threads, "
-                "--checkpoint-every, --no-figures and --quiet may stand with it"
+                "--resume takes the run as its directory has it: give no change but --stop; --threads, "
+                "--checkpoint-every, --no-figures, --quiet and --trust may stand with it, and the scenario of the run "
+                "with the --swap it had"
             )
         point = read_checkpoint(resume_from)
+        same = None if scenario is None else load(scenario, preset=point.system.provenance.preset, swaps=swaps or ())
         with show_progress(
             point.system.provenance.name, quiet, point.system.stepping.start_time, point.time
         ) as progress:
-            outcome = go_on(
-                resume_from, stop_time=stop, progress=progress, writing=progress and progress.writing, **how
-            )
+            how |= {"progress": progress, "writing": progress and progress.writing}
+            outcome = go_on(resume_from, stop_time=stop, scenario=same, trust=trust, **how)
     else:
         if scenario is None:
             raise ScenarioError("name a scenario (see 'orchestrate list'), or a run to go on with by --resume DIR")

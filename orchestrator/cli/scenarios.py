@@ -11,7 +11,7 @@ from ..run import describe_stepping
 from ..scenario import load, shipped
 from ..times import digits
 from ..wiring import describe_topology
-from .options import Algorithm, Preset, Scenario, Set, Step, Stop, Swap, With, load_system
+from .options import Algorithm, Preset, Scenario, Set, Step, Stop, Swap, Trust, With, load_system
 from .printing import counted, open_console, say, show_compilations, show_notes
 
 
@@ -43,12 +43,16 @@ def check(
     stop: Stop = None,
     step: Step = None,
     algorithm: Algorithm = None,
+    trust: Trust = False,
 ) -> None:
-    """Find what is wrong before a run, and show how the run would step."""
+    """Find what is wrong before a run, and show how the run would step.
+
+    Of an FMU nothing is executed. The file of a Python component is, because it is imported.
+    """
     system = load_system(scenario, preset, settings, builds, swaps, stop=stop, step=step, algorithm=algorithm)
     out = open_console()
     with Workspace() as workspace, show_compilations(quiet=False):
-        checked = check_system(system, workspace)
+        checked = check_system(system, workspace, trusted=trust)
     say(out, system.provenance.title or system.provenance.name, "bold")
     connections = len(checked.wiring.links)
     facts = (

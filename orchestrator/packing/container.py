@@ -53,7 +53,14 @@ class Packed:
     notes: tuple[str, ...]
 
 
-def pack(system: System, path: Path, *, expose: Sequence[str] = (), platforms: Sequence[str] = ()) -> Packed:
+def pack(
+    system: System,
+    path: Path,
+    *,
+    expose: Sequence[str] = (),
+    platforms: Sequence[str] = (),
+    trusted: bool = True,
+) -> Packed:
     """Write one FMU that holds a whole scenario: its native FMUs, connections and start values.
 
     The same values come out as from `run` with the system's algorithm and step. The step is fixed inside; the tool
@@ -67,6 +74,7 @@ def pack(system: System, path: Path, *, expose: Sequence[str] = (), platforms: S
             of the instances named ``train``, or of all instances where there is none.
         platforms: for which to build the components, some of ``linux64``, ``win64`` and ``darwin64`` or ``all``; this
             machine's by default.
+        trusted: whether Python code that the scenario names is imported wherever it stands.
 
     Raises:
         ScenarioError: the system cannot run, or has what a container cannot do; all of it is listed.
@@ -76,7 +84,7 @@ def pack(system: System, path: Path, *, expose: Sequence[str] = (), platforms: S
         raise ScenarioError(Problem(str(path), "an FMU is a file that ends in .fmu"))
     platforms = _chosen(platforms)
     with Workspace() as workspace:
-        checked = check(system, workspace, "native")
+        checked = check(system, workspace, "native", trusted=trusted)
         exposed, problems = select(expose, system, checked)
         problems += _refused(system, checked, platforms)
         if problems:

@@ -10,7 +10,7 @@ from dataclasses import dataclass
 from ..errors import ScenarioError
 from ..evaluation import check_metrics, check_requirements, check_values, metric_indices, split_metric
 from ..figures import check_figures, remarked
-from ..fmi import Interface, Kind, Model, Workspace, load_models
+from ..fmi import Interface, Kind, Model, Workspace, import_notes, load_models, untrusted_code
 from ..isolation import check_isolation, check_once_per_process, isolation_notes
 from ..master import ALGORITHMS, check_coupling, check_events, describe_coupling
 from ..names import SignalName
@@ -44,12 +44,21 @@ class Checked:
     large: str = ""
 
 
-def check(system: System, workspace: Workspace, kind: Kind = "auto") -> Checked:
+def check(system: System, workspace: Workspace, kind: Kind = "auto", *, trusted: bool = True) -> Checked:
     """Check a system as a whole.
 
+    Args:
+        system: what is to run.
+        workspace: where FMUs are unpacked.
+        kind: how components become models.
+        trusted: whether Python code that the scenario names is imported wherever it stands.
+
     Raises:
-        ScenarioError: with every problem found, each naming its place and the remedy.
+        ScenarioError: with every problem found, each naming its place and the remedy; with code that is not trusted
+            alone, before any is imported.
     """
+    if not trusted and (strange := untrusted_code(system)):
+        raise ScenarioError(strange)
     problems = _check_simulation(system)
     if system.stepping.algorithm not in ALGORITHMS:  # nothing more can be said of it
         raise ScenarioError(problems)
@@ -221,6 +230,7 @@ def describe_stepping(checked: Checked) -> list[str]:
 
 def _notes(system: System, models: Mapping[str, Model], wiring: Wiring, order: Order) -> list[str]:
     notes: dict[str, None] = dict.fromkeys([model.note for model in models.values() if model.note] + wiring.notes)
+    notes.update(dict.fromkeys(import_notes(system)))
     interfaces = {name: model.interface for name, model in models.items()}
     for interface in {id(interface): interface for interface in interfaces.values()}.values():
         model = interface.model

@@ -7,6 +7,7 @@ state. It is replaced as a whole, so that there is always a complete one.
 from __future__ import annotations
 
 import dataclasses
+import hashlib
 import json
 import math
 import zipfile
@@ -17,6 +18,7 @@ from typing import Any
 
 import numpy as np
 
+from ...fmus.references import file_and_class
 from .. import world
 from ..errors import RailcosimError, ScenarioError
 from ..fmi import Kind, Model
@@ -139,6 +141,39 @@ class Checkpoint:
                 f"{CHECKPOINT_FILE} does not fit its system ({what}); run the scenario from the start"
             ) from error
 
+    def check_code(self, directory: Path, scenario: System | None, *, trust: bool) -> None:
+        """Refuse to import Python code that nobody names but the checkpoint.
+
+        Args:
+            directory: of the run.
+            scenario: the scenario of the run, read anew, as options change it; None where none is given.
+            trust: whether such code may be imported all the same.
+
+        Raises:
+            ScenarioError: it is another scenario, or there is other code than it names.
+        """
+        named = {} if scenario is None else {instance.model: None for instance in scenario.instances.values()}
+        if scenario is not None:
+            texts = (self.system.provenance.text, scenario.provenance.text)
+            was, given = (hashlib.sha256(text.encode(errors="surrogatepass")).hexdigest() for text in texts)
+            if was != given:
+                raise ScenarioError(
+                    f"{directory} cannot be resumed: it is no run of {scenario.provenance.path} as that is now "
+                    f"(SHA-256 {given[:12]}..., not {was[:12]}...)"
+                )
+        strange = {
+            instance.model: f"{instance.model} ({name})"
+            for name, instance in reversed(self.system.instances.items())
+            if file_and_class(instance.model)[0] and instance.model not in named
+        }
+        if strange and not trust:
+            code = ", ".join(reversed(strange.values()))
+            raise ScenarioError(
+                f"{directory} is not resumed: its checkpoint alone names Python code that would be imported: {code}; "
+                f"name the scenario of the run ({self.system.provenance.path or 'none'}) with the --swap it had, or "
+                "read that code and --trust it"
+            )
+
     def check(self, models: Mapping[str, Model], directory: Path) -> None:
         """Refuse to go on with other models than the run began with.
 
@@ -221,6 +256,7 @@ def _system(data: dict[str, Any]) -> System:
     connections = [Connection(**entry) for entry in data.pop("connections")]
     events = [Event(**entry) for entry in data.pop("events")]
     data["provenance"]["presets"] = tuple(data["provenance"]["presets"])
+    data["provenance"]["named"] = ()  # by a file: nobody else knows
     parts = {"stepping": Stepping, "judged": Judged, "provenance": Provenance}
     made = {name: part(**data.pop(name)) for name, part in parts.items()}
     return System(**data, **made, instances=instances, connections=connections, events=events)

@@ -115,6 +115,8 @@ def resume(
     threads: int = 1,
     checkpoint_every: float | None = None,
     progress: Progress | None = None,
+    scenario: System | None = None,
+    trust: bool = True,
 ) -> Run:
     """Go on with a run from its last checkpoint, bit-identically with one that was never interrupted.
 
@@ -125,6 +127,8 @@ def resume(
         threads: how many threads step the instances in parallel.
         checkpoint_every: distance of further checkpoints in s; as before by default.
         progress: as `run` has it.
+        scenario: the scenario of the run, from `load`, to be sure that it is a run of that.
+        trust: whether Python code that only the checkpoint names is imported; else that which `scenario` names.
 
     Raises:
         ScenarioError: there is no checkpoint that fits.
@@ -137,6 +141,8 @@ def resume(
         threads=threads,
         checkpoint_every=checkpoint_every,
         progress=progress,
+        scenario=scenario,
+        trust=trust,
     )
     return _raised(outcome)
 
@@ -150,6 +156,8 @@ def go_on(
     checkpoint_every: float | None = None,
     progress: Progress | None = None,
     writing: Telling | None = None,
+    scenario: System | None = None,
+    trust: bool = True,
 ) -> Run:
     """As `resume`, but a model that fails ends the run with ``status = "failed"`` instead of raising.
 
@@ -160,6 +168,8 @@ def go_on(
     checkpoint.read_checkpoint(directory)  # a folder without one is left as it is
     with RunDirectory(directory) as place:
         point = checkpoint.read_checkpoint(directory)
+        if scenario is not None or not trust:
+            point.check_code(directory, scenario, trust=trust)
         place.identity = point.run
         system = _override(point.system, stop_time, None, None)
         if not system.stepping.stop_time > point.time:

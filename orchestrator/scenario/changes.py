@@ -47,7 +47,7 @@ def read_target(text: str, draft: Draft) -> Target:
     return Target(draft.groups[name], None, rest)
 
 
-def change(draft: Draft, key: str, entry: Entry, folder: str, problems: list[Problem]) -> None:
+def change(draft: Draft, key: str, entry: Entry, folder: str, problems: list[Problem]) -> str:
     """Apply one line of a preset or one `--set`; what is wrong with it is added to `problems`.
 
     Args:
@@ -57,14 +57,17 @@ def change(draft: Draft, key: str, entry: Entry, folder: str, problems: list[Pro
         entry: the new value.
         folder: what relative paths are relative to.
         problems: where problems go.
+
+    Returns:
+        the model that it puts in; empty where it changes something else.
     """
     try:
-        if key.startswith("simulation."):
-            _change_simulation(draft, key.removeprefix("simulation."), entry)
-        else:
-            _change_instance(read_target(key, draft), entry, folder, problems)
+        if not key.startswith("simulation."):
+            return _change_instance(read_target(key, draft), entry, folder, problems)
+        _change_simulation(draft, key.removeprefix("simulation."), entry)
     except ScenarioError as error:
         problems += error.at(entry.where)
+    return ""
 
 
 def _change_simulation(draft: Draft, key: str, entry: Entry) -> None:
@@ -89,14 +92,16 @@ def _change_tolerances(draft: Draft, signal: str, entry: Entry) -> None:
         raise ScenarioError(Problem("", f"is a table, not {shown(entry.value)}", remedy))
 
 
-def _change_instance(target: Target, entry: Entry, folder: str, problems: list[Problem]) -> None:
+def _change_instance(target: Target, entry: Entry, folder: str, problems: list[Problem]) -> str:
     group, (word, _, rest) = target.group, target.rest.partition(".")
     if not word:
         remedy = f"write {group.name}.VARIABLE or {group.name}.component"
         raise ScenarioError(Problem("", "names an instance but not what to change", remedy))
     if word in ("component", "fmu") and not rest:
-        group.swap(resolve_model(entry.value, folder, word), target.index)
-    elif word == "count" and not rest:
+        model = resolve_model(entry.value, folder, word)
+        group.swap(model, target.index)
+        return model
+    if word == "count" and not rest:
         if target.index is not None:
             raise ScenarioError(Problem("", "a count belongs to all", f"write {group.name}.count"))
         if group.count is None:
@@ -116,6 +121,7 @@ def _change_instance(target: Target, entry: Entry, folder: str, problems: list[P
             raise ScenarioError(f"takes numbers, texts, true or false, or lists of these, not {shown(entry.value)}")
         name = rest if word == "start" and rest else target.rest
         group.set_start(name, entry, target.index)
+    return ""
 
 
 def preset_descriptions(source: Source, problems: list[Problem]) -> dict[str, str]:
@@ -167,7 +173,8 @@ def apply_settings(draft: Draft, settings: Sequence[str], problems: list[Problem
             continue
         if not is_plain(entry.value, tables=option == "--with" or key.strip() == "simulation.tolerances"):
             entry = Entry(value.strip(), entry.origin)
-        change(draft, key.strip() if option == "--set" else _build_key(key.strip()), entry, os.getcwd(), problems)
+        name = key.strip() if option == "--set" else _build_key(key.strip())
+        draft.named.append(change(draft, name, entry, os.getcwd(), problems))
 
 
 def _assignment(text: str) -> tuple[str, str, str]:
@@ -197,7 +204,9 @@ def apply_swaps(draft: Draft, swaps: Sequence[str], problems: list[Problem]) -> 
             if target.rest:
                 remedy = f"write --swap {target.group.name}=..."
                 raise ScenarioError(Problem("", "a swap replaces a whole instance", remedy))
-            target.group.swap(resolve_model(os.path.expanduser(model.strip()), os.getcwd(), ""), target.index)
+            named = resolve_model(os.path.expanduser(model.strip()), os.getcwd(), "")
+            target.group.swap(named, target.index)
+            draft.named.append(named)
         except ScenarioError as error:
             problems += error.at(where)
 

@@ -114,11 +114,12 @@ class Group:
 
 @dataclass
 class Draft:
-    """A scenario before expansion."""
+    """A scenario before expansion; `named` are the models that options put in."""
 
     simulation: dict[str, Entry] = field(default_factory=dict)
     groups: dict[str, Group] = field(default_factory=dict)
     rules: list[Rule] = field(default_factory=list)
+    named: list[str] = field(default_factory=list)
 
     @property
     def counts(self) -> dict[str, int | None]:

@@ -270,6 +270,7 @@ class _Scenario:
             name=self.path.stem.encode(errors="replace").decode(),  # the bytes of a file name need not be letters
             path=str(self.path),
             text=self.source.text,
+            named=tuple(filter(None, draft.named)),
             origins=origins | self._origins(),
         )
 

@@ -5,7 +5,7 @@ import zipfile
 import pytest
 from railcosim.components import ComponentError
 from railcosim.fmus.build import build, plain
-from railcosim.fmus.references import resolve
+from railcosim.fmus.references import imports_of, resolve
 
 USER = (
     "from railcosim.components import Component, Output\n\n\nclass C(Component):\n    y = Output('1')\n\n"
@@ -103,3 +103,19 @@ def test_what_is_wrong_in_a_data_file_is_told_with_the_file(tmp_path):
         assert str(told.value).startswith(
             f"{path}: Line: build argument 'profile' is unusable: section 2: 'gradient' is"
         )
+
+
+def test_what_an_import_executes_is_known_before(tmp_path):
+    (tmp_path / "own.py").write_text(
+        "import math, numpy.linalg, helper, dated.more\nfrom railcosim.components import Component\n\n\n"
+        "def later():\n    from scipy import linalg\n    import helper\n    import data, json\n    import folder\n"
+    )
+    (tmp_path / "helper.py").write_text("import own\nimport dated\nfrom . import nothing\nfrom .x import nothing\n")
+    for folder in ("data", "json", "folder"):  # data in it, or modules
+        (tmp_path / folder).mkdir()
+    (tmp_path / "folder" / "__init__.py").write_text("")
+    (tmp_path / "dated.py").write_text("this is not Python")
+    found = imports_of(tmp_path / "own.py")
+    assert sorted(found.files) == sorted((tmp_path / name).resolve() for name in ("own.py", "helper.py", "dated.py"))
+    own = (tmp_path / "own.py").resolve()
+    assert found.others == {"scipy": own, "data": own, str(own.parent / "folder"): own}

@@ -7,6 +7,7 @@ from typing import Any
 
 from rich.console import Console
 
+from ....fmus.references import file_and_class
 from ...evaluation import compare_metrics
 from ...run import CHECKPOINT_FILE, Finding, Run, StepChange, StepCheck
 from ...times import digits
@@ -47,7 +48,9 @@ def show_run(outcome: Run, second: Run | None, step: StepCheck | None, quiet: bo
             "bold red",
         )
         if outcome.directory is not None and (outcome.directory / CHECKPOINT_FILE).is_file():
-            say(out, f"to go on from the last checkpoint: orchestrate run --resume {outcome.directory}", whole=True)
+            own = " --trust" if any(file_and_class(one.model)[0] for one in system.instances.values()) else ""
+            command = f"orchestrate run --resume {outcome.directory}{own}"
+            say(out, f"to go on from the last checkpoint: {command}", whole=True)
     else:
         for line, bad in summary(outcome.requirements, [*outcome.published, *outcome.references]):
             if bad or not quiet:

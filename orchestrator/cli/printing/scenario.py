@@ -8,10 +8,11 @@ from collections.abc import Iterable, Sequence
 from rich.console import Console
 from rich.text import Text
 
+from ...fmi import import_notes
 from ...names import SignalName
 from ...system import Connection, Event, Instance, Provenance, System
 from ...times import digits
-from .console import counted, say
+from .console import counted, say, show_notes
 from .tables import table
 
 
@@ -30,6 +31,7 @@ def show_system(out: Console, system: System) -> None:
     for label, fact in facts.items():
         if fact:
             say(out, f"{label}: {fact}" if label else fact)
+    show_notes(out, import_notes(system))
     _show_rows(out, "Presets", ("name", "what it is"), _presets(origin))
     _show_rows(out, "Instances", ("name", "count", "model", "build arguments"), _instances(system.instances.values()))
     _show_rows(out, "Connections (input = output)", ("input", "output", "how"), _connections(system.connections))

@@ -233,7 +233,7 @@ def test_a_run_and_its_resumption(orchestrate, scenario, tmp_path, monkeypatch):
     code, _, err = orchestrate(*arguments, "-o", "parts", "--checkpoint-every", 1.5)
     assert code == 0
     assert len(err.splitlines()) == 10
-    code, out, err = orchestrate("run", "--resume", "parts", "--stop", 6, "--no-figures")
+    code, out, err = orchestrate("run", scenario, "--resume", "parts", "--stop", 6, "--no-figures")
     assert code == 0
     assert "Two things" in out
     assert "\n1 event, listed in run.json\n" in out
@@ -241,7 +241,7 @@ def test_a_run_and_its_resumption(orchestrate, scenario, tmp_path, monkeypatch):
     assert err.splitlines() == [f"things: {percent} % of 6 s" for percent in range(60, 101, 10)]
     for name in ("results.csv", "metrics.json"):
         assert (tmp_path / "parts" / name).read_bytes() == (tmp_path / "whole" / name).read_bytes()
-    assert orchestrate("run", "--resume", "parts", "--stop", 7, "--quiet") == (0, "", "")
+    assert orchestrate("run", "--trust", "--resume", "parts", "--stop", 7, "--quiet") == (0, "", "")
     assert (tmp_path / "parts/both.png").exists()
 
 
@@ -249,7 +249,7 @@ def test_a_requirement_that_fails_in_the_end_ends_with_1(orchestrate, scenario, 
     scenario.write_text(scenario.read_text().replace("< 100", "< 3"))
     out = tmp_path / "out"
     assert orchestrate("run", scenario, "--kind", "plain", "--checkpoint-every", 1, "-o", out, "-q")[0] == 1
-    assert orchestrate("run", "--resume", out, "-q")[0] == 1
+    assert orchestrate("run", "--resume", out, "-q", "--trust")[0] == 1
 
 
 def test_a_model_that_fails_ends_with_3_and_says_how_to_go_on(orchestrate, scenario, mine, tmp_path):
@@ -258,11 +258,11 @@ def test_a_model_that_fails_ends_with_3_and_says_how_to_go_on(orchestrate, scena
     out = tmp_path / "out"
     for arguments in (
         ["run", scenario, "--kind", "plain", "--checkpoint-every", 1, "-o", out],
-        ["run", "--resume", out],
+        ["run", "--resume", out, "--trust"],
     ):
         code, said, err = orchestrate(*arguments)
         assert code == 3, err
-        assert f"to go on from the last checkpoint: orchestrate run --resume {out}\n" in said
+        assert f"to go on from the last checkpoint: orchestrate run --resume {out} --trust\n" in said
         assert "failed at t = " in said
         assert "error: an FMU failed: thing[2], t = " in err
 
@@ -279,15 +279,14 @@ def test_an_interrupted_run_says_how_to_go_on(orchestrate, scenario, tmp_path, m
         code, said, _ = orchestrate("run", scenario, "--kind", "plain", "--checkpoint-every", 1, "-o", out)
     assert code == 130
     assert "interrupted at t = 2.6 s of 4 s\n" in said
-    assert f"to go on from the last checkpoint: orchestrate run --resume {out}\n" in said
-    code, said, _ = orchestrate("run", "--resume", out)
+    assert f"to go on from the last checkpoint: orchestrate run --resume {out} --trust\n" in said
+    code, said, _ = orchestrate("run", "--resume", out, "--trust")
     assert code == 0
     assert "to go on" not in said
 
 
 WITH_RESUME = [
-    ["SCENARIO"],
-    ["--preset", "x"],
+    ["SCENARIO", "--preset", "x"],
     ["--set", "thing.x=1"],
     ["--with", "thing.x=1"],
     ["--swap", "thing=Gust"],
@@ -309,7 +308,7 @@ def test_a_resumed_run_is_not_changed(orchestrate, scenario, tmp_path, other):
     other = [str(scenario) if word == "SCENARIO" else word for word in other]
     code, said, err = orchestrate("run", *other, "--resume", out)
     assert (code, said) == (2, "")
-    assert err.startswith("error: --resume takes the run as its directory has it: give no scenario and no change but")
+    assert err.startswith("error: --resume takes the run as its directory has it: give no change but --stop; ")
     assert (out / "run.json").read_bytes() == before
 
 
@@ -317,9 +316,15 @@ def test_a_resumed_run_is_not_changed(orchestrate, scenario, tmp_path, other):
     "case",
     [
         ([], "error: name a scenario (see 'orchestrate list'), or a run to go on with by --resume DIR"),
-        (["--resume", "OUT", "--stop", "0.5"], "it cannot go on to an earlier stop time, 0.5 s"),
-        (["--resume", "OUT", "--stop", "4.04"], "stop_time = 4.04 s is not a whole multiple of step = 0.1 s"),
-        (["--resume", "OUT", "--checkpoint-every", "-1"], "their distance must be a positive number of s, not -1.0"),
+        (["--trust", "--resume", "OUT", "--stop", "0.5"], "it cannot go on to an earlier stop time, 0.5 s"),
+        (
+            ["--trust", "--resume", "OUT", "--stop", "4.04"],
+            "stop_time = 4.04 s is not a whole multiple of step = 0.1 s",
+        ),
+        (
+            ["--trust", "--resume", "OUT", "--checkpoint-every", "-1"],
+            "their distance must be a positive number of s, not -1.0",
+        ),
         (["--resume", "nowhere"], "nowhere has no checkpoint.zip: only a run with --checkpoint-every can be resumed"),
         (["SCENARIO", "--checkpoint-every", "0"], "their distance must be a positive number of s, not 0.0"),
         (["SCENARIO", "--checkpoint-every", "nan"], "their distance must be a positive number of s, not nan"),
