@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
 from typing import Any, Literal, NamedTuple
@@ -183,6 +183,19 @@ class Interface:
     annotation: Annotation | None = None
     left_out: Mapping[str, str] = field(default_factory=dict)
     warnings: tuple[str, ...] = ()
+
+    @property
+    def remarks(self) -> Iterator[str]:
+        """What a user should know of it before numbers are made with it, a sentence each."""
+        yield from self.warnings
+        silent = [variable.name for variable in self.of("output") if variable.dependencies is None]
+        if silent and self.of("input"):
+            names, taken = ", ".join(silent[:4]), "all" if self.annotation else "no"
+            yield f"{self.model} lists no dependencies of {names}; {taken} direct feed-through is assumed"
+        if not self.of("output"):
+            yield f"{self.model} has no outputs: nothing of it is recorded but what is connected"
+        if self.needs_tool and not self.annotation:
+            yield f"{self.model} says that it needs the tool it was made with ({self.generator or 'unnamed'})"
 
     @cached_property
     def optional_inputs(self) -> frozenset[str]:

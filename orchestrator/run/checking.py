@@ -233,18 +233,7 @@ def _notes(system: System, models: Mapping[str, Model], wiring: Wiring, order: O
     notes.update(dict.fromkeys(import_notes(system)))
     interfaces = {name: model.interface for name, model in models.items()}
     for interface in {id(interface): interface for interface in interfaces.values()}.values():
-        model = interface.model
-        notes.update(dict.fromkeys(interface.warnings))
-        silent = [v.name for v in interface.of("output") if v.dependencies is None]
-        if silent and interface.of("input"):
-            taken = "all" if interface.annotation else "no"
-            notes[
-                f"{model} lists no dependencies of {', '.join(silent[:4])}; {taken} direct feed-through is assumed"
-            ] = None
-        if not interface.of("output"):
-            notes[f"{model} has no outputs: nothing of it is recorded but what is connected"] = None
-        if interface.needs_tool and not interface.annotation:
-            notes[f"{model} says that it needs the tool it was made with ({interface.generator or 'unnamed'})"] = None
+        notes.update(dict.fromkeys(interface.remarks))
     delays = loop_delays(system, interfaces, wiring, order.sequence)
     notes.update(dict.fromkeys(str(delay) for delay in delays if delay.wanted))
     notes.update(dict.fromkeys(isolation_notes(system, models)))

@@ -33,7 +33,10 @@ def validate(path: Path, *, timeout: float = TIMEOUT) -> Report:
     with Workspace() as workspace:
         model = load_fmu(path, workspace)
         interface, folder = model.interface, model.folder
-        findings = [Finding("archive", "pass", "unpacks, and nothing in it points outside")]
+        archive = workspace.unpack(path).notes
+        findings = [listed("archive", archive, "unpacks, and nothing in it points outside", "warning")]
+        told = [remark for remark in interface.remarks if remark not in archive]
+        findings.append(listed("notes", told, "a run has nothing to remark on its description", "note"))
         findings += _described(path, folder, interface.version)
         if interface.annotation:
             broken = broken_rules(folder, interface)

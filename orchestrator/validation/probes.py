@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Any
 
 from .. import world
 from ..errors import FmuError
-from ..fmi.binding import SLAVES, LoadedSlave, call_name, plain_interface, read_interface
+from ..fmi.binding import SLAVES, LoadedSlave, Watch, call_name, plain_interface, read_interface
 from ..times import digits
 from .agreement import Rows, compare, typical_deviation
 from .record import Record
@@ -189,6 +189,21 @@ def simulate(task: Task) -> str:
     return f"{STEPS} steps of {digits(task.step)} s, {len(rows[0])} outputs finite"
 
 
+def surroundings(task: Task) -> str:
+    """What the FMU shares with its process is left as it was, and no thread outlives its instance."""
+    with instances(task) as (it,):
+        watch = Watch([it.slave])
+        it.initialize()
+        for _ in range(STEPS):
+            it.run(1)
+            watch.look(at_once=True)
+        it.trying("terminate")
+        it.slave.terminate()
+    if it.slave.disturbed:
+        raise NotedError(f"it {'; '.join(it.slave.disturbed)}; isolate it to keep that to itself")
+    return "leaves the process that it shares with others as it was"
+
+
 def starts(task: Task) -> str:
     """Parameters and inputs have the start values that the description says."""
     described = [v for v in task.interface.of("parameter", "input") if v.start is not None]
@@ -295,6 +310,7 @@ def _not_far(first: Rows, restored: Rows, where: str) -> str:
 PROBES: dict[str, Probe] = {
     "instantiate": instantiate,
     "simulate": simulate,
+    "surroundings": surroundings,
     "starts": starts,
     "instances": second_instance,
     "state": state,

@@ -22,6 +22,7 @@ from .probes import Task
 PROBES = {
     "instantiate": "loads, instantiates, frees",
     "simulate": "simulates",
+    "surroundings": "surroundings",
     "starts": "start values",
     "reset": "resets",
     "instances": "several instances",

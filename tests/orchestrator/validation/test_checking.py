@@ -50,7 +50,8 @@ def test_our_python_fmus_pass():
 @needs_compiler
 def test_a_good_fmu_of_another_maker_passes(lag):
     report = validate(lag())
-    assert set(verdicts(report).values()) == {"pass", "skipped"}
+    assert {check for check, verdict in verdicts(report).items() if verdict not in ("pass", "skipped")} == {"notes"}
+    assert detail(report, "notes") == "Lag lists no dependencies of y; no direct feed-through is assumed"
     assert "rules of railcosim" not in verdicts(report)
 
 
@@ -156,6 +157,28 @@ def test_the_schema_and_the_validator_are_asked(lag, lag_description):
     report = validate(lag(lag_description.replace('<Outputs><Unknown index="1"/></Outputs>', ""), **elsewhere))
     assert "ModelStructure/Outputs" in detail(report, "description")
     assert not report.passed
+
+
+@needs_compiler
+def test_what_a_run_remarks_is_told(lag, tmp_path):
+    """Of the archive and the description, and what the FMU does to the process it shares with others."""
+    with zipfile.ZipFile(lag(platform="elsewhere64")) as old, zipfile.ZipFile(tmp_path / "b.fmu", "w") as new:
+        for entry in old.namelist():
+            new.writestr(entry.replace("/", "\\"), old.read(entry))
+    report = validate(tmp_path / "b.fmu")
+    assert (verdicts(report)["archive"], verdicts(report)["notes"]) == ("warning", "note")
+    assert "it has paths with backslashes" in detail(report, "archive")
+    assert "backslashes" not in detail(report, "notes")
+
+
+@needs_compiler
+@pytest.mark.parametrize("place", ["on_instantiate", "on_step", "on_free"])
+def test_what_it_does_to_its_process_is_told(found, place):
+    verdict, told = found("surroundings", **{place: 'chdir("/");'}, options=["-include", "unistd.h"])
+    assert (verdict, told) == (
+        "note",
+        "it changed the working directory, put back since; isolate it to keep that to itself",
+    )
 
 
 @needs_compiler
