@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 from ..fmi import Interface, Type, Variable
 from ..system import Connection
-from .units import relate
+from .units import Relation, relate
 
 _AS_IT_IS: dict[Type, tuple[Type, ...]] = {
     "Real": ("Real", "Integer", "Enumeration", "Boolean"),
@@ -42,7 +42,23 @@ def fit(a: Variable, of_a: Interface, b: Variable, of_b: Interface, connection: 
         told = f"{found.refused.partition(';')[0]}; what is given there is applied to the values"
         found = found._replace(refused="", doubt="", note=told if found.refused else found.note)
     note = found.doubt or found.note or _told(a.type, b.type, connection.threshold)
+    note = "; ".join(filter(None, (note, _twice(found, scale, offset, a, b))))
     return Conversion(found.scale * scale, found.offset * scale + offset, found.refused, note)
+
+
+def _twice(found: Relation, scale: float, offset: float, a: Variable, b: Variable) -> str:
+    """What a user should know of a connection whose value is changed once for its units, and once more."""
+    own, given = _change(found.scale, found.offset), _change(scale, offset)
+    if not (own and given):
+        return ""
+    remedy = "; that is the same twice: leave scale and offset out" if own == given else ""
+    return f"{a.unit!r} becomes {b.unit!r} by itself ({own}), and what is given ({given}) is applied after that{remedy}"
+
+
+def _change(scale: float, offset: float) -> str:
+    """What becomes of a value, in words; empty where nothing does."""
+    parts = (f"times {scale:.6g}" if scale != 1.0 else "", f"plus {offset:.6g}" if offset else "")
+    return ", ".join(filter(None, parts))
 
 
 def _misfit(a: Type, b: Type, connection: Connection, *, is_changed: bool) -> str:

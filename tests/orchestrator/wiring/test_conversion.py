@@ -122,3 +122,31 @@ def test_types_that_do_not_go_together():
     assert between(word, real, threshold=0.5).problem == "a String output cannot feed a Real input"
     assert between(word, word, scale=2.0).problem == "scale, offset and threshold apply to numbers, not to String"
     assert between(real, real, threshold=0.5).problem == "a threshold is for inputs that are no Real"
+
+
+@pytest.mark.parametrize(
+    ("how", "told"),
+    [
+        ({}, ""),
+        ({"scale": 1.0}, ""),
+        ({"scale": 0.277778}, "what is given (times 0.277778) is applied after that; that is the same twice: leave"),
+        ({"scale": 3.6}, "what is given (times 3.6) is applied after that"),
+        ({"offset": 1.0}, "what is given (plus 1) is applied after that"),
+    ],
+)
+def test_a_value_that_is_changed_twice_is_told(how, told):
+    speed = (0, 1, -1, 0, 0, 0, 0, 0)
+    a, b = end("A", "km/h", Unit("km/h", speed, 1 / 3.6)), end("B", "m/s", Unit("m/s", speed))
+    found = between(a, b, **how)
+    assert found.scale == pytest.approx(how.get("scale", 1.0) / 3.6)
+    assert told in found.note
+    assert found.note.startswith("'km/h' becomes 'm/s' by itself (times 0.277778), and ") == bool(told)
+    assert ("twice" in found.note) == (how == {"scale": 0.277778})
+
+
+def test_an_offset_that_is_added_twice_is_told():
+    found = between(end("A", "degC", DEGC), end("B", "K", K), offset=273.15)
+    assert found.offset == 546.3
+    assert found.note.endswith(
+        "(plus 273.15) is applied after that; that is the same twice: leave scale and offset out"
+    )
