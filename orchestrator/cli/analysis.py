@@ -10,6 +10,7 @@ import typer
 from .. import world
 from ..comparison import compare as compare_systems
 from ..comparison import read_directions, variants
+from ..figures import remove_drawn
 from .options import (
     FAILED,
     FMU_FAILED,
@@ -161,9 +162,11 @@ def linearize(
     found, passings = stability(model), string_stability(model)
     directory = output or Path("results") / "-".join(filter(None, (system.provenance.name, preset, "linear")))
     world.mkdir(directory, parents=True, exist_ok=True)
+    remove_drawn(directory / "linear.json")
     write_linear(directory, model, found, passings)
     drawn: Any = {"duration": duration, "dpi": dpi} | ({"format": figure_format.value} if figure_format else {})
     figures = [] if no_figures else draw_linear(model, found, passings, directory, **drawn)
+    write_linear(directory, model, found, passings, figures)
     if not quiet:
         out = open_console()
         show_linear(out, model, found, passings)

@@ -123,7 +123,8 @@ def _draw_panel(
     labels = {line.curve.label: colours[line.curve.thing] for line in lines}
     by_variant = len(labels) == 1 or len(names) > len(DASHES)
     styled = [(line.curve, _style(line.variant, labels[line.curve.label], by_variant)) for line in lines]
-    draw_curves(ax, panel, styled, next(iter(runs.values())), x_label=x_label)
+    first, *others = runs.values()
+    draw_curves(ax, panel, styled, first, x_label=x_label, others=others)
     drawn = {line.variant for line in lines}
     said = [labels, drawn, by_variant]
     if said != above:
@@ -148,7 +149,7 @@ def _legend(ax: Axes, labels: Mapping[str, Any], names: Sequence[str], drawn: se
     for k, name in enumerate(names):
         if k in drawn:
             handles.append(Line2D([], [], label=name, **_style(k, "#444444", by_variant)))
-    legend(ax, len(handles), handles=handles, handlelength=2.6)
+    legend(ax, handles, handlelength=2.6)
 
 
 def _known_curves(panel: Mapping[str, Any], results: Results) -> list[Curve]:

@@ -14,7 +14,7 @@ from typing import Any
 
 from .. import world
 from ..errors import FmuError, RailcosimError, ScenarioError
-from ..figures import remarked
+from ..figures import remarked, remove_drawn
 from ..fmi import Kind
 from ..problems import Problem
 from ..run import Progress, Run, execute, swaps
@@ -228,6 +228,7 @@ def compare(
         raise ScenarioError(Problem("", "there is nothing to compare", "name a scenario"))
     if directory is not None:
         world.mkdir(directory, parents=True, exist_ok=True)
+        remove_drawn(directory / "compare.json")
         for variant, name in zip(comparison.variants, _folders(comparison.names), strict=True):
             variant.directory = directory / name
     for variant in comparison.variants:

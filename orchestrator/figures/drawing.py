@@ -1,14 +1,17 @@
 """The figures of a scenario (`[[figures]]`) as files."""
 
 import itertools
+import json
 import re
 import unicodedata
 from collections.abc import Iterable, Mapping, Sequence
+from contextlib import suppress
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from .. import world
 from ..errors import ExpressionError, FigureError
 from ..evaluation import Signals
 from ..problems import Problem
@@ -16,11 +19,13 @@ from .curves import Curve, curves_of, x_label_of, y_label_of
 from .marks import draw_marks, number
 from .palette import Palette, member_colour, ranks
 from .panels import FORMATS, bands_of, heading, numbers_in, panels_of, share_x
-from .style import DASHES, colour_and_dashes, legend, page, room
+from .style import DASHES, colour_and_dashes, legend, page, room, wrapped
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
+_MARGIN = 0.7
+"""What stands left of a panel, in inches."""
 _HIDDEN = 0.25
 """Which part of a line must be hidden by another before they get dashes and widths."""
 
@@ -56,6 +61,17 @@ def draw(figures: Sequence[Mapping[str, Any]], signals: Signals, directory: Path
     if problems:
         raise FigureError([problem for k in sorted(problems) for problem in problems[k]], paths)
     return paths
+
+
+def remove_drawn(record: Path) -> None:
+    """Remove the figures that the record of earlier results lists, in every format: they show something else."""
+    try:
+        names = json.loads(world.read_text(record, encoding="utf-8"))["figures"]
+        stems = [name.rpartition(".")[0] for name in names if Path(name).name == name]
+    except (OSError, ValueError, LookupError, TypeError, AttributeError):  # there is none, or it is not ours
+        return
+    for stem, ending in itertools.product(filter(None, stems), FORMATS):
+        world.unlink(record.with_name(f"{stem}.{ending}"), missing_ok=True)
 
 
 def _not_drawn(figure: Mapping[str, Any]) -> str:
@@ -94,7 +110,7 @@ def _legend(
     if said.items() <= above.items():
         return above
     if len(styles) > 1 or "label" in panel:
-        legend(ax, len(said))
+        legend(ax)
     return said
 
 
@@ -105,6 +121,7 @@ def draw_curves(
     signals: Signals,
     *,
     x_label: bool,
+    others: Sequence[Signals] = (),
 ) -> None:
     """Draw a panel without its legend: curves, bands, marks, labels, ranges.
 
@@ -114,6 +131,7 @@ def draw_curves(
         styled: curves, each with what matplotlib is to know of its line.
         signals: what bands, marks and x are expressions of.
         x_label: whether x is labelled here.
+        others: signals of other runs that curves are of: where they differ, numbers in the title are given for each.
     """
     scale = float(panel.get("scale", 1.0))
     curves = []
@@ -127,8 +145,13 @@ def draw_curves(
         _draw_band(ax, [scale * number(end, signals) for end in band])
     title = panel.get("title", "")
     for text in numbers_in(title):
-        title = title.replace(f"{{{text}}}", f"{number(text, signals):.4g}")
-    ax.set_title(title)
+        found = [f"{number(text, signals):.4g}"]
+        for other in others:
+            with suppress(ExpressionError):  # a swapped model need not have it
+                found.append(f"{number(text, other):.4g}")
+        title = title.replace(f"{{{text}}}", " / ".join(dict.fromkeys(found)))
+    drawing: Any = ax.figure
+    ax.set_title(wrapped(title, drawing.get_figwidth() - _MARGIN))
     ax.set_ylabel(panel.get("y_label", y_label_of(panel, curves)))
     if x_label:
         ax.set_xlabel(panel.get("x_label", x_label_of(panel, signals)))

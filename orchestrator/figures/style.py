@@ -6,8 +6,9 @@ matplotlib is imported where it is used: importing it costs more than most comma
 from __future__ import annotations
 
 import io
+import re
 import textwrap
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -46,6 +47,8 @@ _NAMELESS: Any = {
     ".pdf": {"CreationDate": None, "Creator": None, "Producer": None},
 }
 DPI = 100.0
+_LEGEND_LETTERS = 24
+"""How long a line of a legend may be: what it takes of the page, the panel lacks."""
 
 
 @contextmanager
@@ -77,13 +80,19 @@ def page(
     with mpl.rc_context(_STYLE):
         figure = Figure(figsize=size, dpi=dpi or DPI, layout="constrained")
         FigureCanvasAgg(figure)
-        letters = int(72 * size[0] / (0.6 * title_size))
-        lines = [line for part in title.splitlines() for line in textwrap.wrap(part, letters)]
-        figure.suptitle("\n".join(lines), x=0.01, ha="left", fontsize=title_size, fontweight="bold")
+        figure.suptitle(wrapped(title, size[0], title_size), x=0.01, ha="left", fontsize=title_size, fontweight="bold")
         yield list(figure.subplots(panels, 1, sharex=share_x, squeeze=False)[:, 0])
         drawn = io.BytesIO()  # of a figure that cannot be drawn, no file is begun
         figure.savefig(drawn, format=path.suffix[1:], metadata=_NAMELESS[path.suffix])
         world.write_bytes(path, drawn.getvalue())
+
+
+def wrapped(text: str, width: float, size: float = _STYLE["axes.titlesize"]) -> str:
+    """A title in lines no longer than a width in inches; its size is in points. A formula is not torn apart."""
+    letters = int(72 * width / (0.6 * size))
+    return "\n".join(
+        line for part in text.splitlines() for line in ([part] if "$" in part else textwrap.wrap(part, letters))
+    )
 
 
 def colour(k: int, count: int) -> Any:
@@ -105,9 +114,30 @@ def room(panels: int, height: float) -> int:
     return max(2, int((height / panels - (0.9 if panels == 1 else 0.35)) / 0.19))
 
 
-def legend(ax: Axes, count: int, **more: Any) -> None:
-    """A legend of `count` lines beside the axes, where it hides no data; in columns where the panel is not as high."""
+def legend(ax: Axes, handles: Sequence[Any] = (), **more: Any) -> None:
+    """A legend beside the axes, where it hides no data: long names in lines, in columns where the panel is not as high.
+
+    Args:
+        ax: the axes.
+        handles: what it names; all that is drawn there by default.
+        **more: what matplotlib is to know of it.
+    """
     canvas: Any = ax.figure
-    lines = room(len(canvas.axes), canvas.get_figheight())
-    columns = 1 + (count - 1) // lines
-    ax.legend(loc="upper left", bbox_to_anchor=(1.01, 1.02), borderaxespad=0.0, ncols=columns, **more)
+    handles = handles or ax.get_legend_handles_labels()[0]
+    labels = [_folded(str(handle.get_label())) for handle in handles]
+    lines = sum(1 + label.count("\n") for label in labels)
+    columns = 1 + (lines - 1) // room(len(canvas.axes), canvas.get_figheight())
+    place: Any = {"loc": "upper left", "bbox_to_anchor": (1.01, 1.02), "borderaxespad": 0.0, "ncols": columns}
+    ax.legend(handles, labels, **place, **more)
+
+
+def _folded(label: str) -> str:
+    """A name in lines, broken after a sign that parts words."""
+    if "$" in label:
+        return label
+    lines = [""]
+    for part in re.split(r"(?<=[ ,=_:/])", label):
+        if lines[-1] and len(lines[-1]) + len(part.rstrip()) > _LEGEND_LETTERS:
+            lines.append("")
+        lines[-1] += part
+    return "\n".join(line.rstrip() for line in lines)

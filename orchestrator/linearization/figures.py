@@ -125,7 +125,7 @@ def _page(
 
 def _legend(ax: Axes, count: int) -> None:
     if count > 1 and ax.get_legend_handles_labels()[0]:
-        legend(ax, count)
+        legend(ax)
 
 
 def _poles(stability: Stability, title: str, page: _Page) -> Path:

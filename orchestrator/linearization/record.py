@@ -14,7 +14,13 @@ from .modes import Stability
 from .responses import Passing
 
 
-def write_linear(directory: Path, model: Linearization, stability: Stability, passings: Sequence[Passing]) -> Path:
+def write_linear(
+    directory: Path,
+    model: Linearization,
+    stability: Stability,
+    passings: Sequence[Passing],
+    figures: Sequence[Path] = (),
+) -> Path:
     """Write everything as ``linear.json``; the numbers read back to the same bits.
 
     Args:
@@ -22,6 +28,7 @@ def write_linear(directory: Path, model: Linearization, stability: Stability, pa
         model: the linear model.
         stability: its modes.
         passings: its string stability; empty where there are no trains in a row.
+        figures: those that were drawn of it.
 
     Returns:
         The file.
@@ -61,6 +68,7 @@ def write_linear(directory: Path, model: Linearization, stability: Stability, pa
             {"quantity": p.quantity, "pair": p.pair, "peak": p.peak, "at": p.at, "holds": p.holds} for p in passings
         ],
         "notes": model.notes,
+        "figures": [path.name for path in figures],
         "version": importlib.metadata.version("railcosim"),
     }
     path = directory / "linear.json"

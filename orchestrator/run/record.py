@@ -16,6 +16,7 @@ from typing import Any
 from .. import world
 from ..errors import ScenarioError
 from ..evaluation import count_values
+from ..figures import remove_drawn
 from ..isolation import is_isolated
 from ..master import ALGORITHMS
 from ..system import System
@@ -41,6 +42,7 @@ def write(place: RunDirectory, checked: Checked, kind: str, *, anew: bool = True
     """
     directory = place.path
     if anew:
+        remove_drawn(directory / "run.json")
         for name in (CSV_FILE, "metrics.json", CHECKPOINT_FILE):
             world.unlink(directory / name, missing_ok=True)
         for name in (ROWS_FILE, SEEN_FILE):

@@ -1,10 +1,13 @@
 """Figures as files: what was recorded is in them, and one that cannot be drawn costs no other."""
 
+import copy
+
 import matplotlib.image
 import numpy as np
 import pytest
+from matplotlib.figure import Figure
 from railcosim.orchestrator.errors import ScenarioError
-from railcosim.orchestrator.figures import draw, written_as
+from railcosim.orchestrator.figures import draw, draw_curves, remove_drawn, written_as
 
 GAP = "train[i-1].position - train[i].position"
 
@@ -138,9 +141,45 @@ def test_a_title_says_the_numbers_of_the_run(drawn):
     (ax,) = drawn(panels=[{"title": "gap over {cruise[1].gap_min / 1000} km", "y": ["target.value"]}])
     assert ax.get_title(loc="left") == "gap over 15 km"
     (ax,) = drawn(panels=[{"title": "$x_{1}$", "y": ["target.value"]}])
-    assert ax.get_title(loc="left") == "$x_{1}$"
+    assert ax.get_title() == "$x_{1}$"
 
 
 def test_a_remark_stands_below_the_title(drawn):
     axes = drawn(title="Speed", remark="of a law of ours", y=["target.value"])
     assert axes[0].figure._suptitle.get_text() == "Speed\nof a law of ours"
+
+
+@pytest.mark.parametrize(
+    "record",
+    [
+        '{"figures": ["speed.png", "gap.svg", "../other.png", "sub/in.png", ".png"]}',
+        "{",
+        '{"figures": [1]}',
+        "[]",
+        None,
+    ],
+)
+def test_figures_of_earlier_results_go_in_every_format(tmp_path, record):
+    folder = tmp_path / "out"
+    (folder / "sub").mkdir(parents=True)
+    files = [folder / name for name in ("speed.png", "speed.pdf", "gap.svg", "mine.png", "../other.png", "sub/in.png")]
+    for file in files:
+        file.touch()
+    if record is not None:
+        (folder / "run.json").write_text(record)
+    remove_drawn(folder / "run.json")
+    gone = files[:3] if record and "speed" in record else []
+    assert [file for file in files if not file.exists()] == gone
+
+
+def test_numbers_in_a_title_are_those_of_all_runs(recorded):
+    other = copy.deepcopy(recorded)
+    other.columns["target.value"] = recorded.columns["target.value"] + 1.0
+    lacking = copy.deepcopy(recorded)
+    lacking.columns = {}
+    panel = {"title": "to {final(target.value)} m/s, {final(train[1].speed)}", "y": ["target.value"]}
+    ax = Figure().subplots()
+    draw_curves(ax, panel, [], recorded, x_label=True, others=[other, recorded, lacking])
+    first = recorded["target.value"][-1]
+    assert ax.get_title().startswith(f"to {first:.4g} / {first + 1.0:.4g} m/s, ")
+    assert "/" not in ax.get_title().partition("m/s, ")[2]

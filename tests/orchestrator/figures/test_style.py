@@ -6,6 +6,7 @@ import sys
 from pathlib import Path
 
 import pytest
+from railcosim.orchestrator.figures.style import _folded, wrapped
 
 
 def test_many_curves_are_coloured_by_order(drawn):
@@ -55,3 +56,17 @@ def test_matplotlib_is_imported_only_to_draw():
         [sys.executable, "-c", code], capture_output=True, text=True, check=True, cwd=Path(__file__).parent
     )
     assert said.stdout.strip() == "False"
+
+
+def test_long_names_do_not_take_the_page_from_the_panel():
+    assert _folded("comfort_cruise_bottom_layer cruise=FixedDistanceCruise,train=Tram") == (
+        "comfort_cruise_bottom_\nlayer cruise=\nFixedDistanceCruise,\ntrain=Tram"
+    )
+    assert _folded("train 1") == "train 1"
+    assert _folded("$a = b$ and more than there is room for") == "$a = b$ and more than there is room for"
+
+
+def test_a_title_is_no_wider_than_its_panel():
+    text = "a title of a panel " * 12
+    assert max(map(len, wrapped(text, 7.8).splitlines())) <= 94
+    assert wrapped(text + "$x = 1$", 7.8) == text + "$x = 1$"
