@@ -141,7 +141,7 @@ def test_a_title_says_the_numbers_of_the_run(drawn):
     (ax,) = drawn(panels=[{"title": "gap over {cruise[1].gap_min / 1000} km", "y": ["target.value"]}])
     assert ax.get_title(loc="left") == "gap over 15 km"
     (ax,) = drawn(panels=[{"title": "$x_{1}$", "y": ["target.value"]}])
-    assert ax.get_title() == "$x_{1}$"
+    assert ax.get_title(loc="left") == "$x_{1}$"
 
 
 def test_a_remark_stands_below_the_title(drawn):
