@@ -3,7 +3,7 @@
 An archive is unpacked (`archive`), its description read into an `Interface` (`reader`, with `repair` for what tools get
 wrong and `translation` for other versions), and what can be instantiated is a `Model` (`models`). An instance is a
 `Slave`, whatever it is made of: an FMU in this process (`binding`), one in another (the room `isolation`), or a
-component as Python objects (`plain`). What a component's file executes when it is imported is told before (`trust`).
+component as Python objects (`plain`).
 """
 
 from ...fmus.kinds import Kind
@@ -14,7 +14,6 @@ from .recognition import is_fmu_name
 from .slave import Channel, Slave
 from .snapshot import state_names, take_snapshot
 from .translation import is_pedantry
-from .trust import import_notes, untrusted_code
 
 __all__ = [
     "Channel",
@@ -27,12 +26,10 @@ __all__ = [
     "Unit",
     "Variable",
     "Workspace",
-    "import_notes",
     "is_fmu_name",
     "is_pedantry",
     "load_fmu",
     "load_models",
     "state_names",
     "take_snapshot",
-    "untrusted_code",
 ]

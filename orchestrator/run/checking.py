@@ -10,11 +10,12 @@ from dataclasses import dataclass
 from ..errors import ScenarioError
 from ..evaluation import check_metrics, check_requirements, check_values, metric_indices, split_metric
 from ..figures import check_figures, remarked
-from ..fmi import Interface, Kind, Model, Workspace, import_notes, load_models, untrusted_code
+from ..fmi import Interface, Kind, Model, Workspace, load_models
 from ..isolation import check_isolation, check_once_per_process, isolation_notes
 from ..master import ALGORITHMS, check_coupling, check_events, describe_coupling
 from ..names import SignalName
 from ..problems import Problem, suggestion
+from ..scenario import import_notes, untrusted_code
 from ..system import System
 from ..times import count_steps, digits
 from ..wiring import Order, Wiring, derive_order, wire

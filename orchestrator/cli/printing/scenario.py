@@ -8,8 +8,8 @@ from collections.abc import Iterable, Sequence
 from rich.console import Console
 from rich.text import Text
 
-from ...fmi import import_notes
 from ...names import SignalName
+from ...scenario import import_notes
 from ...system import Connection, Event, Instance, Provenance, System
 from ...times import digits
 from .console import counted, say, show_notes
