@@ -3,8 +3,7 @@
 from __future__ import annotations
 
 import math
-import threading
-from collections.abc import Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import replace
 
 from ..errors import ScenarioError
@@ -22,13 +21,13 @@ def is_isolated(model: Model, instance: Instance) -> bool:
     return instance.isolate and model.plain is None
 
 
-def instantiate(model: Model, instance: Instance, stopped: threading.Event | None = None) -> Slave:
+def instantiate(model: Model, instance: Instance, stopped: Callable[[], bool] | None = None) -> Slave:
     """One instance, in a process of its own if it asks for that.
 
     Args:
         model: its model.
         instance: how it is used.
-        stopped: is set when the run is to stop: an isolated instance is not waited for long then.
+        stopped: whether the run is to stop: an isolated instance is not waited for long then.
 
     Raises:
         FmuError: it cannot be loaded or instantiated; of an isolated one, its first call says so.

@@ -5,7 +5,6 @@ from __future__ import annotations
 import contextlib
 import subprocess
 import sys
-import threading
 from collections.abc import Callable
 from pathlib import Path
 
@@ -47,7 +46,7 @@ class HostProcess:
         name_call: the name of the FMU's function that `note` speaks of.
         patience: wall time in s after which a call counts as hanging; None for the default.
         memory_limit: what the FMU may allocate, in MiB; None for half of what the machine has.
-        stopped: is set when the run is to stop; calls are given `LAST_PATIENCE` from then on.
+        stopped: whether the run is to stop; calls are given `LAST_PATIENCE` from then on.
     """
 
     def __init__(
@@ -60,7 +59,7 @@ class HostProcess:
         name_call: Callable[[str, int], str],
         patience: float | None,
         memory_limit: float | None,
-        stopped: threading.Event | None = None,
+        stopped: Callable[[], bool] | None = None,
     ) -> None:
         self.patience = PATIENCE if patience is None else patience
         self.is_ready = False
@@ -156,7 +155,7 @@ class HostProcess:
             raise self._is_lost()
         self._is_over = world.poll(self._process) is not None  # its last answer may have come since
         self._left -= self._moment
-        if self._stopped is not None and self._stopped.is_set():
+        if self._stopped is not None and self._stopped():
             self._last_left -= self._moment
         if min(self._left, self._last_left) <= 0.0:
             raise self._hangs()

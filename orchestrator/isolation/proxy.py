@@ -9,8 +9,7 @@ from __future__ import annotations
 
 import logging
 import struct
-import threading
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
@@ -49,7 +48,7 @@ class IsolatedSlave:
         folder: where the FMU was unpacked.
         step_timeout: wall time in s after which a call counts as hanging; None for a minute.
         memory_limit: what it may allocate, in MiB; None for half of the machine's memory.
-        stopped: is set when the run is to stop: its calls do not take long any more then.
+        stopped: whether the run is to stop: its calls do not take long any more then.
 
     Raises:
         FmuError: no process can be started.
@@ -63,7 +62,7 @@ class IsolatedSlave:
         *,
         step_timeout: float | None = None,
         memory_limit: float | None = None,
-        stopped: threading.Event | None = None,
+        stopped: Callable[[], bool] | None = None,
     ) -> None:
         self.name = name
         self.interface = interface

@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-import threading
-from collections.abc import Collection, Iterator
+from collections.abc import Callable, Collection, Iterator
 from contextlib import ExitStack, contextmanager
 
 from ..fmi import Slave
@@ -19,7 +18,7 @@ def assembled(
     *,
     threads: int = 1,
     restoring: Collection[str] = (),
-    stopped: threading.Event | None = None,
+    stopped: Callable[[], bool] | None = None,
 ) -> Iterator[Master]:
     """A master of all instances, each in a process of its own if it asks for that; they are freed at the end.
 
@@ -27,7 +26,7 @@ def assembled(
         checked: the system, found fit to run.
         threads: how many step instances in parallel.
         restoring: instances that are restored after steps that they discard.
-        stopped: is set when the run is to stop: isolated instances are not waited for long then.
+        stopped: whether the run is to stop: isolated instances are not waited for long then.
 
     Raises:
         FmuError: an instance cannot be loaded or instantiated.

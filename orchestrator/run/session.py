@@ -119,7 +119,9 @@ class Session:
         return True
 
     def _assembled(self) -> AbstractContextManager[Master]:
-        return assembled(self.checked, threads=self.job.threads, restoring=self._restoring, stopped=self._stopped)
+        return assembled(
+            self.checked, threads=self.job.threads, restoring=self._restoring, stopped=self._stopped.is_set
+        )
 
     @contextmanager
     def _ending(self) -> Iterator[None]:

@@ -238,7 +238,7 @@ def test_once_the_run_is_to_stop_a_call_is_not_waited_for_long(
     """The run is interrupted then; not so by an instance that is given back."""
     monkeypatch.setattr(host_process, "LAST_PATIENCE", 0.5)
     stopped = threading.Event()
-    it = apart(path=hostile(f"{where} hang"), stopped=stopped)
+    it = apart(path=hostile(f"{where} hang"), stopped=stopped.is_set)
 
     def stop():
         while it._process.last_call()[0] != where:
