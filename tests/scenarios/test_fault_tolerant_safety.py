@@ -30,7 +30,7 @@ def test_a_fault_larger_than_the_actuator():
     assert not result["cruise[1].force_limited"][-1]
     first = result.time[np.argmax(result["cruise[1].barrier_violated"])]
     assert 10.0 < first < 15.0
-    assert failed["barrier"].time == pytest.approx(first)
+    assert first - 0.1 < failed["barrier"].time <= first, "seen at every step, recorded every 0.1 s"
     assert not any(result[f"cruise[{i}].barrier_violated"][-1] for i in (1, 2, 3))
 
 

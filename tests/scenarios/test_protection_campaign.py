@@ -90,7 +90,7 @@ def test_the_judge_sees_a_signal_that_stays_silent(campaign, signal, text):
     values = outcome.results[signal]
     where = values.argmax() if signal == "protection.service_brake" else slice(None)
     values[where] = -400e3 if signal == "ato.force" else 0.0  # braking harder than the protection did
-    evaluate(outcome)  # 0 m/s above the limit is not a violation
+    evaluate(outcome, outcome.results)  # 0 m/s above the limit is not a violation
     broken = campaign.judge(outcome, case, intervene=True).broken
     assert broken
     assert all(text in found for found in broken)
