@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import io
+import zipfile
 from array import array
 from collections.abc import Iterable
 from pathlib import Path
@@ -9,7 +11,6 @@ from typing import Any
 
 from fmpy.model_description import read_model_description
 
-from .. import world
 from ..errors import FmuFileError
 from .document import Schema, parse, sections
 from .entries import Description, Entry, Texts, problems, read_entry, resolve
@@ -184,8 +185,8 @@ def _refers_ahead(root: Any) -> bool:
 
 
 def _read_rest(root: Any) -> Any:
-    """What FMPy makes of everything else. Of a folder with FMI 3.0 it would read the description of sources, too."""
-    with world.TemporaryDirectory() as place:
-        source = f"{place}/modelDescription.xml"
-        root.getroottree().write(source, encoding="UTF-8", xml_declaration=True)
-        return read_model_description(source, validate=False)
+    """What FMPy makes of everything else, out of an archive in memory."""
+    archive = io.BytesIO()
+    with zipfile.ZipFile(archive, "w") as stream, stream.open("modelDescription.xml", "w") as file:
+        root.getroottree().write(file, encoding="UTF-8", xml_declaration=True)
+    return read_model_description(archive, validate=False)
