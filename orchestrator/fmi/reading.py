@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import Any
 
 from fmpy.model_description import read_model_description
+from lxml import etree
 
 from ..errors import FmuFileError
 from .document import Schema, parse, sections
@@ -187,6 +188,6 @@ def _refers_ahead(root: Any) -> bool:
 def _read_rest(root: Any) -> Any:
     """What FMPy makes of everything else, out of an archive in memory."""
     archive = io.BytesIO()
-    with zipfile.ZipFile(archive, "w") as stream, stream.open("modelDescription.xml", "w") as file:
-        root.getroottree().write(file, encoding="UTF-8", xml_declaration=True)
+    with zipfile.ZipFile(archive, "w") as stream:
+        stream.writestr("modelDescription.xml", etree.tostring(root, encoding="UTF-8", xml_declaration=True))
     return read_model_description(archive, validate=False)
