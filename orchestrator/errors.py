@@ -1,6 +1,7 @@
 """The errors of this package: one small family, each also the builtin a caller would catch."""
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Iterator, Sequence
+from contextlib import contextmanager
 from itertools import groupby
 from pathlib import Path
 
@@ -98,6 +99,16 @@ class FmuError(RunError):
         said = ((line, len(list(same))) for line, same in groupby(self.log))
         lines = (f"    {line}" + (f" ({count} times)" if count > 1 else "") for line, count in said)
         return "\n".join([f"{head}{super().__str__()}", *lines])
+
+
+@contextmanager
+def naming(path: Path) -> Iterator[None]:
+    """Let an error of the system's name the file: those of writing to one that is open do not."""
+    try:
+        yield
+    except OSError as error:
+        error.filename = error.filename or str(path)
+        raise
 
 
 def cut(line: str, length: int = 500) -> str:

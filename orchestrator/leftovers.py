@@ -25,12 +25,21 @@ def own(folder: Path) -> FileLock:
 
 
 def sweep(own: Path) -> None:
-    """Remove what runs left behind that were killed: folders beside our own whose lock is there and held by nobody."""
+    """Remove what runs left behind that were killed: folders beside our own whose lock is there and held by nobody.
+
+    One that was killed before it took its lock has left an empty folder.
+    """
     for folder in world.glob(own.parent, f"{PREFIX}*"):
         try:
-            if folder != own and world.now() - world.stat(folder / _OWNED).st_mtime >= _NEW:
+            lock = folder / _OWNED
+            has_lock = lock.is_file()
+            if folder == own or world.now() - world.stat(lock if has_lock else folder).st_mtime < _NEW:
+                continue
+            if has_lock:
                 _remove(folder)
-        except OSError:  # has no lock, or is somebody else's
+            else:
+                world.rmdir(folder)
+        except OSError:  # somebody else's, or not empty
             continue
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import errno
 import hashlib
 import tempfile
 import zipfile
@@ -13,6 +14,12 @@ from ..errors import FmuFileError
 from ..leftovers import PREFIX, own, sweep
 from .members import extract, list_members
 from .recognition import describe_file
+
+_OF_THE_MACHINE = {
+    *(errno.ENOSPC, errno.EDQUOT, errno.EIO, errno.EROFS, errno.EACCES, errno.EPERM),
+    *(errno.EMFILE, errno.ENFILE, errno.ENOMEM),
+}
+"""Errors for which no archive is to blame."""
 
 
 class Unpacked(NamedTuple):
@@ -40,10 +47,14 @@ class Workspace:
 
     def __init__(self) -> None:
         self._place = _plain_folder()
-        self._lock = own(self._place)
-        sweep(self._place)
         self.folder = self._place / "fmus"
-        world.mkdir(self.folder)
+        try:
+            self._lock = own(self._place)
+            sweep(self._place)
+            world.mkdir(self.folder)
+        except BaseException:
+            world.rmtree(self._place, ignore_errors=True)
+            raise
         self._unpacked: dict[str, tuple[Path, tuple[str, ...]]] = {}
 
     def unpack(self, path: Path) -> Unpacked:
@@ -110,6 +121,9 @@ def _extract(path: Path, target: Path) -> tuple[str, ...]:
         raise
     except Exception as error:  # damaged, encrypted, unwritable (a file where a folder stands): all kinds are raised
         world.rmtree(target, ignore_errors=True)
+        if isinstance(error, OSError) and error.errno in _OF_THE_MACHINE:
+            where = f"{error.strerror}: {error.filename or target}; set TMPDIR to a folder with room"
+            raise FmuFileError(f"{path} cannot be unpacked: {where}") from error
         what = describe_file(path)
         why = f"{path} is {what}" if what else f"{path} is not a usable FMU: {error}"
         raise FmuFileError(why) from error

@@ -238,7 +238,9 @@ def _completed(session: Session, figures: bool) -> Run:
                 outcome.error.explain(finding.message)
     outcome.notes += session.disturbances()
     evaluate(outcome, session.judged(outcome.results))
-    if place is not None:
+    if place is not None and job.begin is not None and not outcome.results.points:  # what there was is all there is
+        record_file.add(place.path, status=outcome.status, error=outcome.error and str(outcome.error))
+    elif place is not None:
         _write(outcome, session, place)
         if figures and outcome.results.points and not isinstance(outcome.error, RecordError):
             _draw(outcome, place)

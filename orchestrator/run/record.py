@@ -14,7 +14,7 @@ from pathlib import Path
 from typing import Any
 
 from .. import world
-from ..errors import ScenarioError
+from ..errors import ScenarioError, naming
 from ..evaluation import count_values
 from ..figures import remove_drawn
 from ..isolation import is_isolated
@@ -216,7 +216,8 @@ def _dump(path: Path, content: dict[str, Any]) -> None:
     part = path.with_name(path.name + ".part")
     text = json.dumps(_plain(content), indent=1, ensure_ascii=False) + "\n"
     # What stands for the bytes of a file name that is not UTF-8 becomes the escape that JSON has for it.
-    world.write_text(part, text, encoding="utf-8", errors="backslashreplace")
+    with naming(part):
+        world.write_text(part, text, encoding="utf-8", errors="backslashreplace")
     world.replace(part, path)
 
 

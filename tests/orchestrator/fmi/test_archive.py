@@ -1,5 +1,6 @@
 """The place in which FMUs are unpacked."""
 
+import errno
 import os
 import subprocess
 import sys
@@ -62,6 +63,43 @@ def test_what_a_killed_process_has_unpacked_is_removed_at_the_next_start_and_nob
     finally:
         runs[1].kill()
         runs[1].communicate()
+
+
+def test_a_folder_of_a_run_that_was_killed_before_it_took_its_lock_is_removed(tmp_path, monkeypatch):
+    monkeypatch.setattr("tempfile.tempdir", str(tmp_path))
+    for name in ("railcosim_dead", "railcosim_full"):
+        (tmp_path / name).mkdir()
+    (tmp_path / "railcosim_full" / "mine.txt").write_text("somebody else's")
+    Workspace().close()
+    assert len(list(tmp_path.iterdir())) == 2  # so young that its owner may be about to take the lock
+    monkeypatch.setattr(world, "now", lambda: time.time() + 100.0)
+    Workspace().close()
+    assert [path.name for path in tmp_path.iterdir()] == ["railcosim_full"]
+
+
+def test_a_place_that_cannot_be_had_leaves_nothing(tmp_path, monkeypatch):
+    monkeypatch.setattr("tempfile.tempdir", str(tmp_path))
+    monkeypatch.setattr(world, "mkdir", failing(errno.ENOSPC))
+    with pytest.raises(OSError, match="No space left"):
+        Workspace()
+    assert not list(tmp_path.iterdir())
+
+
+def test_a_full_disk_is_not_the_archive_s_fault(refused, tmp_path, xml, monkeypatch):
+    path = xml["write_archive"](tmp_path / "a.fmu", DESCRIPTION)
+    monkeypatch.setattr(world, "copyfileobj", failing(errno.ENOSPC))
+    told = refused(path)
+    assert told.startswith(f"{path} cannot be unpacked: No space left on device: ")
+    assert told.endswith("set TMPDIR to a folder with room")
+
+
+def failing(number):
+    """A function that raises what the system would."""
+
+    def fail(*_, **__):
+        raise OSError(number, os.strerror(number))
+
+    return fail
 
 
 def test_no_such_file(refused, tmp_path):

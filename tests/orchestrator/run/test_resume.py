@@ -14,7 +14,8 @@ from railcosim.orchestrator import load, world
 from railcosim.orchestrator.cli import app as cli
 from railcosim.orchestrator.cli import runs
 from railcosim.orchestrator.cli.printing.progress import Shown
-from railcosim.orchestrator.run import checkpoint
+from railcosim.orchestrator.errors import FmuError
+from railcosim.orchestrator.run import checkpoint, session
 from railcosim.orchestrator.run.execution import execute, resume, run
 from railcosim.orchestrator.run.recording import ROWS_FILE, Recorder, Results
 from railcosim.orchestrator.run.recording import recorder as recording
@@ -221,6 +222,21 @@ def test_a_stop_before_the_old_end_leaves_the_rows_up_to_there(mine, tmp_path):
     assert len(Results.load(out).time) == 32
     assert json.loads((out / "run.json").read_text())["time_reached"] == pytest.approx(3.1)
     assert not list(out.glob("*.new"))
+
+
+def test_a_resumption_that_does_not_begin_leaves_what_there_was(mine, tmp_path, monkeypatch):
+    """An FMU that cannot be had once, for want of a licence say, costs nothing of what was computed."""
+    out = tmp_path / "out"
+    run(things(mine), kind="plain", output=out, checkpoint_every=1.0, stop_time=2.5, figures=False)
+    before = Results.load(out)
+    with monkeypatch.context() as patch:
+        patch.setattr(session, "assembled", lambda *_, **__: (_ for _ in ()).throw(FmuError("no licence")))
+        with pytest.raises(FmuError, match="no licence"):
+            resume(out, stop_time=4.0, figures=False)
+    record = json.loads((out / "run.json").read_text())
+    assert (record["status"], record["error"]) == ("failed", "no licence")
+    assert np.array_equal(Results.load(out)["a.x"], before["a.x"])
+    assert resume(out, stop_time=4.0, figures=False).status == "completed"
 
 
 # -------------------------------------------------------------------- the command line
