@@ -20,7 +20,7 @@ from typing import NamedTuple
 
 import pytest
 import typer.main
-from faults import Counts, Faults, Plan, manners
+from faults import FATAL, MANNERS, Counts, Faults, Plan, manners
 from railcosim.orchestrator import Results
 from railcosim.orchestrator.cli import app
 
@@ -105,12 +105,13 @@ class Ended(NamedTuple):
 
 
 class Reference(NamedTuple):
-    """The undisturbed run of a variant: its exit code, its calls, its rows, and those at every point."""
+    """The undisturbed run of a variant: its exit code, its calls, its rows, those at every point, times of events."""
 
     code: int
     counts: dict
     rows: dict
     every_row: dict
+    events: tuple
 
 
 class Bench:
@@ -137,7 +138,9 @@ class Bench:
                 found.append((ended, {"time": results.time, **results}))
             (ended, rows), (_, every_row) = found[0], found[-1]
             assert ended.code == int(variant.fails), ended
-            self._references[variant] = Reference(ended.code, ended.counts, rows, every_row)
+            self._references[variant] = Reference(
+                ended.code, ended.counts, rows, every_row, (0.5, 1.2) if variant.has_event else ()
+            )
         return self._references[variant]
 
     def place(self, variant, *, thinned=True):
@@ -165,24 +168,28 @@ class Bench:
             )
         return variant, plans
 
-    def run(self, place, arguments, tick):
-        """Run a command undisturbed, in this process."""
-        said, counts = io.StringIO(), Counts()
+    def run(self, place, arguments, tick, plan=None):
+        """Run a command in this process."""
+        said, counts, struck = io.StringIO(), Counts(), place / "struck"
+        struck.unlink(missing_ok=True)
         with (
             contextlib.chdir(place),
             contextlib.redirect_stdout(said),
             contextlib.redirect_stderr(said),
             pytest.MonkeyPatch.context() as patch,
             warnings.catch_warnings(action="ignore"),
-            Faults(counts, place / "struck", tick).installed(),
+            Faults(counts, struck, tick, plan).installed(),
         ):
             patch.setattr(tempfile, "tempdir", str(place / "tmp"))
             patch.setattr(app, "app", self._command)
             code = app.call(arguments)
-        return Ended(code, said.getvalue(), "", counts.all(), _are_left())
+        where = struck.read_text() if struck.exists() else ""
+        return Ended(code, said.getvalue(), where, counts.all(), _are_left())
 
     def disturb(self, place, arguments, tick, plan):
-        """Run a command of which something fails, in a fork of this process that may end in any way."""
+        """Run a command of which something fails; where that may end the process, in a fork of this one."""
+        if plan.kind != "fmi" and plan.manner in MANNERS[plan.kind] and plan.manner not in FATAL:
+            return self.run(place, arguments, tick, plan)
         counts, struck = Counts(), place / "struck"
         struck.unlink(missing_ok=True)
         gc.freeze()

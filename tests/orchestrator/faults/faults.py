@@ -39,6 +39,8 @@ MANNERS = {
     "load": ("ENOENT",),
 }
 """How calls of a kind fail. A process may also be sent a signal during any of them."""
+FATAL = (_TWICE, "cut off")
+"""Those among them that may end the process."""
 _FILE = (
     *("read_text", "read_bytes", "mkdir", "unlink", "rmdir", "chmod", "stat", "iterdir", "glob", "rglob", "listdir"),
     *("replace", "fsync", "truncate", "copyfileobj", "mkdtemp", "map_memory"),
