@@ -21,7 +21,7 @@ from pathlib import Path
 from typing import NamedTuple
 
 from railcosim.orchestrator import world
-from railcosim.orchestrator.isolation import host
+from railcosim.orchestrator.isolation import guard, host
 
 KINDS = ("fmi", "file", "write", "clock", "send", "receive", "start", "load")
 PROCESSES = 4
@@ -43,7 +43,7 @@ FATAL = (_TWICE, "cut off")
 """Those among them that may end the process."""
 _FILE = (
     *("read_text", "read_bytes", "mkdir", "unlink", "rmdir", "chmod", "stat", "iterdir", "glob", "rglob", "listdir"),
-    *("replace", "fsync", "truncate", "copyfileobj", "mkdtemp", "map_memory"),
+    *("replace", "fsync", "copyfileobj", "mkdtemp", "map_memory", "open_descriptor", "read"),
 )
 _COUNT = struct.Struct("=q")
 _BEGIN, _LONG = 1000.0, 3600.0
@@ -100,7 +100,7 @@ class Faults:
         self.counts, self.struck, self.tick, self.plan = counts, struck, tick, plan
         self.process, self.started = 0, 0
         self.time, self.is_full = _BEGIN, False
-        self.is_dead, self.is_pressed = False, False
+        self.is_dead, self.is_pressed, self.is_hanging = False, False, False
         self.workers = {}
 
     @contextlib.contextmanager
@@ -116,16 +116,16 @@ class Faults:
     def _install(self):
         for name in _FILE:
             setattr(world, name, self._file(name))
-        for name in ("bound", "lock", "open", "write_text", "write_bytes", "sleep", "rmtree", "start", "send"):
+        for name in ("bound", "lock", "open", "write_text", "write_bytes", "sleep", "rmtree", "start", "fork", "send"):
             setattr(world, name, getattr(self, name))
-        for name in ("receive", "receive_into", "load_library", "wait", "poll", "kill"):
+        for name in ("receive", "send_part", "load_library", "wait", "poll", "kill"):
             setattr(world, name, getattr(self, name))
         world.perf_counter = world.monotonic = self.clock
         world.now = lambda: time.time() + self.clock() - _BEGIN
 
     def meet(self, kind, what):
         """Count a call; how it fails, or nothing."""
-        if threading.current_thread() is not threading.main_thread():
+        if self.process is None or threading.current_thread() is not threading.main_thread():
             return ""
         index = self.counts.add(self.process, kind)
         if self.is_dead and kind in ("file", "write"):
@@ -180,7 +180,7 @@ class Faults:
             try:
                 self.fail("file", f"{name} {' '.join(map(str, arguments))[:200]}")
             except OSError as error:
-                if name not in ("fsync", "map_memory", "copyfileobj"):
+                if name not in ("fsync", "map_memory", "copyfileobj", "read"):
                     error.filename = str(arguments[0]) if arguments else None
                 raise
             return None if name == "fsync" else real(*arguments, **named)
@@ -198,6 +198,8 @@ class Faults:
             return _REAL["open"](path, mode, **how)
         raw = _Raw(path, mode.replace("b", ""))
         raw.faults = self
+        if how.pop("buffering", None) == 0:
+            return raw
         stream = io.BufferedRandom(raw) if "+" in mode else io.BufferedWriter(raw)
         return stream if "b" in mode else io.TextIOWrapper(stream, **how)
 
@@ -248,16 +250,24 @@ class Faults:
 
     def _serve(self, arguments, output):
         with contextlib.suppress(BaseException):
-            self.process = self.started
+            self.process = None  # the guard, of which nothing fails; what it forks does the work
+            master = os.getppid()
             os.setsid()
             os.dup2(output, 1)
             os.dup2(output, 2)
             door = int(arguments[1])
             os.closerange(3, door)
             os.closerange(door + 1, 256)
-            host.main(*arguments)
+            guard.run(host, str(master), *arguments)
         traceback.print_exc()
         os._exit(1)
+
+    def fork(self):
+        """A guard makes the process it watches."""
+        pid = _REAL["fork"]()
+        if not pid:
+            self.process = self.started
+        return pid
 
     def wait(self, process, timeout=None):
         """Wait for the end of a process."""
@@ -278,30 +288,30 @@ class Faults:
 
     def send(self, end, frames):
         """Ring, or fail to."""
+        self.send_part(end, frames, _REAL["send"])
+
+    def send_part(self, end, frames, send=_REAL["send_part"]):
+        """Say a part of what is to be said."""
         manner = self.fail("send", f"send {len(frames)} bytes")
         if manner == "lost":
             self._lose(signal.SIGKILL)
-        frames = _garbled(frames) if manner == "garble" else frames
-        _REAL["send"](end, frames[: len(frames) // 2] if manner == "cut" else frames)
+        frames = _garbled(bytes(frames)) if manner == "garble" else frames
+        sent = send(end, frames[: len(frames) // 2] if manner == "cut" else frames)
         if manner == "cut":
             end.shutdown(1)
+        return sent
 
     def receive(self, end, size, *flags):
         """Hear, or fail to."""
         manner = self.fail("receive", "receive")
         if manner in ("hang", "lost"):
             self._lose(signal.SIGSTOP if manner == "hang" else signal.SIGKILL)
-        if manner == "hang" and self.process == 0:
+        self.is_hanging = self.is_hanging or manner == "hang"
+        if self.is_hanging and self.process == 0:
             raise TimeoutError
         self._await(end)
         found = b"" if manner == "end" else _REAL["receive"](end, size, *flags)
         return _garbled(found) if manner == "garble" else found
-
-    def receive_into(self, end, view):
-        """Hear more."""
-        self.fail("receive", "receive_into")
-        self._await(end)
-        return _REAL["receive_into"](end, view)
 
     def _await(self, end):
         if self.process == 0 and not select.select([end], [], [], _WAIT)[0]:
@@ -361,6 +371,13 @@ class _Process:
             pid, status = os.waitpid(self.pid, os.WNOHANG)
             self.returncode = os.waitstatus_to_exitcode(status) if pid else None
         return self.returncode
+
+    def send_signal(self, number):
+        if self.poll() is None:
+            os.kill(self.pid, number)
+
+    def terminate(self):
+        self.send_signal(signal.SIGTERM)
 
     def wait(self, timeout=None):
         until = time.monotonic() + (timeout or _WAIT)

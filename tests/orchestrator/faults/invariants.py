@@ -8,7 +8,7 @@ from railcosim.orchestrator import Results
 from railcosim.orchestrator.errors import ScenarioError
 from railcosim.orchestrator.run import recover_rows
 
-_NAMES = {"run.json", "units.json", "results.csv", "metrics.json", "checkpoint.zip", ".lock"}
+_NAMES = {"run.json", "units.json", "results.csv", "metrics.json", "checkpoint.zip", "seen.bin", ".lock"}
 _ENDED = {
     "SIGINT": {130},
     "SIGINT twice": {130},
