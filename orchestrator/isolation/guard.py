@@ -19,7 +19,6 @@ import signal
 import sys
 import threading
 from collections.abc import Callable
-from itertools import pairwise
 from pathlib import Path
 from typing import Any, NoReturn
 
@@ -55,6 +54,7 @@ def run(module: Any, master: str, *arguments: str) -> None:
         arguments: of ``main`` and of ``watching``; the first is a path in the workspace of the master.
     """
     if sys.platform == "win32":
+        _keep_line(1)
         threading.Thread(target=_leave_with, args=(int(master),), daemon=True).start()
         module.main(*arguments)
         return
@@ -133,13 +133,19 @@ def _widen(pipe: int) -> None:
 
 
 def _close_all_but(*kept: int) -> None:
-    for one, other in pairwise([*sorted(kept), os.sysconf("SC_OPEN_MAX")]):
-        os.closerange(one + 1, other)
+    for descriptor in {*map(int, world.listdir("/dev/fd"))} - {*kept}:  # how many there may be is a large number
+        with contextlib.suppress(OSError):  # the one by which they were listed
+            world.close(descriptor)
+
+
+def _keep_line(descriptor: int) -> None:
+    """Let `say` print by this descriptor, whatever becomes of standard output."""
+    global _line, _line_identity
+    _line, _line_identity = descriptor, _identity(descriptor)
 
 
 def _begin(guard: int, saying: int) -> None:
     """Make the child what the work expects: it prints to the guard, and ends with it."""
-    global _line, _line_identity  # noqa: PLW0603 (of the process, as standard output is)
     os.setsid()
     for number in (signal.SIGCHLD, signal.SIGTERM, signal.SIGHUP):
         signal.signal(number, signal.SIG_DFL)
@@ -149,8 +155,7 @@ def _begin(guard: int, saying: int) -> None:
         world.exit_at_once(1)
     os.dup2(saying, 1)
     os.dup2(saying, 2)
-    _line = high(saying)
-    _line_identity = _identity(_line)
+    _keep_line(high(saying))
 
 
 class _Guard:
