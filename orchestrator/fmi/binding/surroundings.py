@@ -1,9 +1,9 @@
 """What all FMUs of a process share with it, so that one could change another's numbers: noted before, put back after.
 
 The floating-point environment (rounding mode, flushing of subnormal numbers to zero: per thread, and changed by merely
-loading a library that was compiled with ``-ffast-math``), the working directory, the locale, environment variables, and
-what the process does at the signals by which it is controlled. Handlers of crashes are left alone: Java, .NET and Go
-live by theirs.
+loading a library that was compiled with ``-ffast-math``), the working directory, the locale, environment variables, the
+mask of new files' rights, limits of resources, and what the process does at the signals by which it is controlled, and
+whether they reach it. Handlers of crashes are left alone: Java, .NET and Go live by theirs.
 """
 
 from __future__ import annotations
@@ -11,6 +11,7 @@ from __future__ import annotations
 import ctypes
 import locale
 import os
+import platform
 import signal
 import sys
 from collections.abc import Callable, Iterator
@@ -18,19 +19,30 @@ from contextlib import contextmanager, suppress
 from dataclasses import dataclass, field
 from typing import Any
 
-FLOATS = "the floating-point mode (rounding, or tiny numbers taken for zero)"
+try:
+    import resource
+except ImportError:  # pragma: no cover: Windows has none
+    resource = None  # type: ignore[assignment]
+
+FLOATS = "the floating-point mode (rounding, precision, traps, or tiny numbers taken for zero)"
 """The floating-point environment, in words."""
 _SIGNALS = [
     int(getattr(signal, name))
     for name in ("SIGHUP", "SIGINT", "SIGPIPE", "SIGTERM", "SIGCHLD")
     if hasattr(signal, name)
 ]
+_LIMITED = [
+    getattr(resource, f"RLIMIT_{name}")
+    for name in ("FSIZE", "NOFILE", "STACK", "AS", "DATA", "CPU", "CORE")
+    if resource is not None
+]
 _ACTION, _FLOATS = 512, 512
 """Bytes that hold C's ``struct sigaction`` and ``fenv_t`` on every platform."""
 
 # Variables, not constants: the sums are to be made when they are asked for.
 ONE, SMALL, TINY = 1.0, 1e-30, 5e-324
-"""``ONE + SMALL != ONE or ONE - SMALL != ONE or TINY * ONE == 0.0`` tells of another rounding mode and of flushing."""
+"""``ONE + SMALL != ONE or ONE - SMALL != ONE or TINY * ONE == 0.0`` tells of another rounding mode and of flushing, not
+of what traps, nor of the precision of x86's old unit."""
 
 
 def _library() -> Any:
@@ -55,6 +67,22 @@ _AT_FIRST = _environment_of_floats()
 """That of the process before it has loaded any FMU."""
 
 
+_CONTROLS = {"x86_64": ((0, 2, 0xFFFF), (28, 32, 0xFFC0)), "aarch64": ((0, 4, 0xFFFFFFFF),)}
+"""Where Linux' ``fenv_t`` says how to compute, and in which bits: of x86 its old unit and its new one, of ARM."""
+
+
+def _controls(floats: Any) -> list[int]:
+    """How a thread computes that has this floating-point environment; nothing where that is not known."""
+    places = _CONTROLS.get(platform.machine(), ()) if sys.platform == "linux" and floats is not None else ()
+    return [int.from_bytes(floats[begin:end], sys.byteorder) & mask for begin, end, mask in places]
+
+
+def are_floats_changed() -> bool:
+    """Whether this thread computes in any way otherwise than it did at first; that takes some 2 us."""
+    # Before any sum is made: that might trap.
+    return _controls(_environment_of_floats()) != _controls(_AT_FIRST) or are_floats_disturbed()
+
+
 def are_floats_disturbed() -> bool:
     """Whether this thread rounds in another way than to the nearest, or takes tiny numbers for zero."""
     return ONE + SMALL != ONE or ONE - SMALL != ONE or TINY * ONE == 0.0
@@ -71,8 +99,12 @@ class Surroundings:
     """What there was at one moment."""
 
     folder: str
-    locale: str
+    locale: tuple[str, int]
+    """That of the process, and of this thread, which is C's ``LC_GLOBAL_LOCALE`` where it has none of its own."""
     variables: dict[bytes, bytes]
+    mask: int
+    limits: dict[int, tuple[int, int]]
+    blocked: frozenset[int]
     handlers: dict[int, bytes]
     actions: dict[int, bytes] = field(compare=False)
     """All of C's ``struct sigaction`` by signal, whose padding may differ; ``handlers`` are the addresses in there."""
@@ -82,7 +114,8 @@ class Surroundings:
         """What there is."""
         actions = _actions()
         handlers = {number: action[: ctypes.sizeof(ctypes.c_void_p)] for number, action in actions.items()}
-        return cls(_folder(), locale.setlocale(locale.LC_ALL), _variables(), handlers, actions)
+        place, language = _folder(), (locale.setlocale(locale.LC_ALL), _locale_of_thread())
+        return cls(place, language, _variables(), _mask(), _limits(), _blocked(), handlers, actions)
 
     def put_back(self) -> list[str]:
         """Put back what has changed since; what that was, in words."""
@@ -91,6 +124,9 @@ class Surroundings:
             "folder": ("the working directory", self._put_back_folder),
             "locale": ("the locale", self._put_back_locale),
             "variables": ("environment variables", self._put_back_variables),
+            "mask": ("the mask of new files' rights (umask)", self._put_back_mask),
+            "limits": ("limits of resources", self._put_back_limits),
+            "blocked": ("which signals reach it", self._put_back_blocked),
             "handlers": ("signal handlers", self._put_back_actions),
         }
         if self == found:
@@ -106,7 +142,19 @@ class Surroundings:
         os.chdir(self.folder)
 
     def _put_back_locale(self, _: Surroundings) -> None:
-        locale.setlocale(locale.LC_ALL, self.locale)
+        locale.setlocale(locale.LC_ALL, self.locale[0])
+        _locale_of_thread(self.locale[1])
+
+    def _put_back_mask(self, _: Surroundings) -> None:
+        os.umask(self.mask)
+
+    def _put_back_limits(self, found: Surroundings) -> None:
+        for kind, (soft, _) in self.limits.items():
+            hard = found.limits[kind][1]  # which may be lowered, and never raised again
+            resource.setrlimit(kind, (soft if hard == resource.RLIM_INFINITY else min(soft, hard), hard))
+
+    def _put_back_blocked(self, _: Surroundings) -> None:
+        signal.pthread_sigmask(signal.SIG_SETMASK, self.blocked)
 
     def _put_back_variables(self, found: Surroundings) -> None:
         for name in _differing(self, found):
@@ -137,6 +185,31 @@ def _folder() -> str:
         return os.getcwd()
     except OSError:  # somebody has removed it
         return ""
+
+
+def _locale_of_thread(new: int = 0) -> int:
+    """C's locale of this thread; a new one where that is given."""
+    with suppress(Exception):
+        _C.uselocale.restype, _C.uselocale.argtypes = ctypes.c_ssize_t, [ctypes.c_ssize_t]
+        return int(_C.uselocale(new))
+    return 0
+
+
+def _mask() -> int:
+    """The mask of new files' rights, which must be set to be read."""
+    mask = os.umask(0o077)
+    os.umask(mask)
+    return mask
+
+
+def _limits() -> dict[int, tuple[int, int]]:
+    """Limits of resources, the present ones and the highest; nothing on Windows."""
+    return {} if resource is None else {kind: resource.getrlimit(kind) for kind in _LIMITED}
+
+
+def _blocked() -> frozenset[int]:
+    """The signals that do not reach this thread."""
+    return frozenset(signal.pthread_sigmask(signal.SIG_BLOCK, ())) if sys.platform != "win32" else frozenset()
 
 
 def _variables() -> dict[bytes, bytes]:
@@ -175,7 +248,7 @@ def kept(tell: Callable[[str], None]) -> Iterator[None]:
     try:
         yield
     finally:
-        if are_floats_disturbed():
+        if are_floats_changed():
             mend_floats()
             tell(FLOATS)
         for what in before.put_back():

@@ -7,7 +7,7 @@ from collections.abc import Iterable
 from ... import world
 from ..slave import Slave
 from .loaded import LoadedSlave
-from .surroundings import Surroundings
+from .surroundings import FLOATS, Surroundings, are_floats_changed, mend_floats
 
 _EVERY = 0.05
 """How often it looks, in s."""
@@ -19,7 +19,8 @@ def is_watched(slave: Slave | None) -> bool:
 
 
 class Watch:
-    """Puts back what FMUs of other makers change while they step, all but how numbers are rounded: see `surroundings`.
+    """Puts back what FMUs of other makers change while they step: see `surroundings`. How numbers are rounded need not
+    wait for it: that is looked at after every call.
 
     Args:
         slaves: the instances; those in processes of their own, and those of our own make, are not looked at.
@@ -41,6 +42,10 @@ class Watch:
         if (now < self._due and not at_once) or self._before is None:
             return
         self._due = now + _EVERY
-        for what in self._before.put_back():
+        changed = self._before.put_back()
+        if are_floats_changed():
+            mend_floats()
+            changed.append(FLOATS)
+        for what in changed:
             for slave in self._watched:
                 slave.tell(what if len(self._watched) == 1 else f"{what} (this one or another)")

@@ -4,6 +4,7 @@ import ctypes
 import json
 import locale
 import os
+import platform
 import shutil
 import signal
 import subprocess
@@ -12,7 +13,7 @@ import sys
 import pytest
 from railcosim.orchestrator import System, run
 from railcosim.orchestrator.cli.app import call
-from railcosim.orchestrator.fmi.binding.surroundings import are_floats_disturbed
+from railcosim.orchestrator.fmi.binding.surroundings import FLOATS, are_floats_changed
 from railcosim.orchestrator.isolation import isolate
 
 pytestmark = pytest.mark.skipif(
@@ -21,10 +22,12 @@ pytestmark = pytest.mark.skipif(
 
 DECAY = "Y = t < 0.05 ? 1e-303 : 1e-3 * Y; return fmi2OK;"
 UPWARD = "fesetround(FE_UPWARD);"
+PRECISION = '{ short x87 = 0x7f; __asm__ volatile("fldcw %0" : : "m"(x87)); }'
+TRAPS = "feenableexcept(FE_DIVBYZERO | FE_INVALID);"
 FLUSH = "__builtin_ia32_ldmxcsr(__builtin_ia32_stmxcsr() | 0x8040);"
 GOES_ON = "static void *spin(void *x) { for (volatile int k = 0;; k++) usleep(100); return x; }"
-MODE = "changed the floating-point mode (rounding, or tiny numbers taken for zero), put back since"
-X86 = os.uname().machine == "x86_64" if hasattr(os, "uname") else False
+MODE = f"changed {FLOATS}, put back since"
+OF_X86 = pytest.mark.skipif(platform.machine() != "x86_64", reason="sets a register of x86")
 
 
 @pytest.fixture
@@ -32,8 +35,9 @@ def pair(lag):
     """A system of one FMU whose numbers tell of flushing and rounding, and another one."""
 
     def make(**other):
-        options = ["-include", "fenv.h", "-include", "unistd.h", "-include", "signal.h", "-include", "locale.h"]
-        other["options"] = [*options, "-include", "pthread.h", *other.get("options", ())]
+        headers = ["fenv", "unistd", "signal", "locale", "pthread", "sys/stat", "sys/resource"]
+        included = [part for header in headers for part in ("-include", f"{header}.h")]
+        other["options"] = [*included, "-D_GNU_SOURCE", *other.get("options", ())]
         system = System(stop_time=1.0, step=0.1)
         system.add("a", str(lag(name="decay.fmu", on_step=DECAY)))
         system.add("b", str(lag(name="other.fmu", **other)))
@@ -52,7 +56,7 @@ def check_numbers(outcome):
     assert outcome["a.y"][3] == 1e-309
     assert outcome["a.y"][4] == 1e-312
     assert list(outcome.time) == [k * 0.1 for k in range(11)]
-    assert not are_floats_disturbed()
+    assert not are_floats_changed()
 
 
 @pytest.mark.usefixtures("loop")
@@ -64,7 +68,7 @@ def check_numbers(outcome):
         {"on_instantiate": UPWARD},
         {"on_step": UPWARD},
         {"on_get": UPWARD},
-        pytest.param({"on_step": FLUSH}, marks=pytest.mark.skipif(not X86, reason="sets a register of x86")),
+        pytest.param({"on_step": FLUSH}, marks=OF_X86),
     ],
     ids=["fast-math", "instantiate", "step", "get", "flush"],
 )
@@ -72,6 +76,15 @@ def test_how_one_fmu_rounds_is_not_how_others_do(pair, code, algorithm):
     outcome = run(pair(**code), algorithm=algorithm)
     check_numbers(outcome)
     assert outcome.notes == [f"b (Lag) {MODE}; isolate it to keep that to itself"]
+
+
+@pytest.mark.usefixtures("loop")
+@pytest.mark.parametrize("place", ["on_instantiate", "on_step"])
+@pytest.mark.parametrize("code", [TRAPS, pytest.param(PRECISION, marks=OF_X86)], ids=["traps", "precision"])
+def test_what_sums_do_not_tell_of_is_read_from_the_registers(pair, place, code):
+    outcome = run(pair(**{place: code}))
+    check_numbers(outcome)
+    assert outcome.notes[-1].startswith(f"b (Lag) changed {FLOATS}")
 
 
 @pytest.mark.parametrize("place", ["on_instantiate", "on_step"])
@@ -90,9 +103,13 @@ def test_threads_and_processes_of_their_own_do_not_change_it(pair, place):
         ('chdir("/");', "the working directory"),
         ('setenv("OF_AN_FMU", "1", 1); unsetenv("OF_A_USER");', "environment variables (OF_AN_FMU, OF_A_USER)"),
         ('setlocale(LC_NUMERIC, "C.UTF-8");', "the locale"),
+        ('uselocale(newlocale(LC_ALL_MASK, "C.UTF-8", 0));', "the locale"),
         ("signal(SIGINT, SIG_IGN);", "signal handlers"),
+        ("{ sigset_t all; sigfillset(&all); sigprocmask(SIG_BLOCK, &all, 0); }", "which signals reach it"),
+        ("umask(0777);", "the mask of new files' rights (umask)"),
+        ("{ struct rlimit it = {100, RLIM_INFINITY}; setrlimit(RLIMIT_FSIZE, &it); }", "limits of resources"),
     ],
-    ids=["folder", "environment", "locale", "signals"],
+    ids=["folder", "environment", "locale", "locale of the thread", "signals", "blocked", "mask", "limits"],
 )
 def test_what_is_shared_is_put_back_and_told(pair, tmp_path, place, code, what):
     before = locale.setlocale(locale.LC_ALL), signal.getsignal(signal.SIGINT)
