@@ -35,8 +35,12 @@ _OTHER_METHODS = {zipfile.ZIP_BZIP2: "bzip2", zipfile.ZIP_LZMA: "lzma"}
 _DESCRIPTION = "modelDescription.xml"
 _POINTER = b"version https://git-lfs"
 _HEAD = len(_POINTER)
-_PROGRAMS = (b"\x7fELF", b"#!")
-"""How programs begin. An archive made on Windows doesn't say which of its files may be run."""
+_PROGRAMS = (b"\x7fELF", b"#!", b"\xcf\xfa\xed\xfe", b"\xca\xfe\xba\xbe")
+"""How programs begin: of Linux, scripts, of macOS. Archives made on Windows, by Java or by Python's `zipfile` don't say
+which of their files may be run, or say that none may."""
+_DOS_FOLDER = 0x10
+_FOLDERS = ("binaries", "resources", "sources", "documentation", "extra", "terminalsAndIcons", "licenses")
+"""The folders of an FMU that the standards name; those below ``binaries`` have no capitals."""
 
 
 @dataclass(frozen=True)
@@ -70,17 +74,19 @@ def list_members(path: Path, archive: zipfile.ZipFile) -> Members:
         name = "/".join(PurePosixPath(entry.filename.replace("\\", "/")).parts)
         if not name:
             continue
-        name += "/" * entry.filename.endswith(("/", "\\"))
+        name += "/" * _is_folder(entry)
         twice[name] += name in files and files[name].CRC != entry.CRC
         files[name] = entry
     notes += [f"it holds {name!r} {count + 1} times; the last counts" for name, count in twice.items() if count]
     _follow_links(path, archive, files)
     _check_size(path, files.values())
     files, more = _at_top(path, files)
+    files, spelled = _spelled(files)
+    _check_folders(path, files)
     description = files.get(_DESCRIPTION)
     if description and description.file_size > MAX_DESCRIPTION:
         raise FmuFileError(f"{path} is refused: its {_DESCRIPTION} is {description.file_size >> 20} MiB")
-    return Members(files, (*notes, *more, *_alike(files)))
+    return Members(files, (*notes, *more, *spelled, *_alike(files)))
 
 
 def extract(archive: zipfile.ZipFile, members: Members, target: Path) -> None:
@@ -98,8 +104,7 @@ def extract(archive: zipfile.ZipFile, members: Members, target: Path) -> None:
         if head.startswith(_POINTER):
             what = f"holds a Git LFS pointer in place of {name!r}; fetch that with 'git lfs pull' and pack it again"
             raise FmuFileError(f"{archive.filename} {what}")
-        mode = entry.external_attr >> 16
-        if mode & 0o111 or (not mode and head.startswith(_PROGRAMS)):
+        if (entry.external_attr >> 16) & 0o111 or head.startswith(_PROGRAMS):
             world.chmod(place, 0o755)
 
 
@@ -138,6 +143,7 @@ def _follow_links(path: Path, archive: zipfile.ZipFile, files: dict[str, zipfile
         while end in links:
             entry = files[end]
             text = archive.read(entry).decode(errors="replace") if entry.file_size <= _MAX_LINK else "/"
+            text = text.replace("\\", "/")
             end = posixpath.normpath(posixpath.join(posixpath.dirname(end), text))
             if end in seen or end not in files:
                 raise FmuFileError(
@@ -163,6 +169,41 @@ def _at_top(path: Path, files: dict[str, zipfile.ZipInfo]) -> tuple[dict[str, zi
         return {_DESCRIPTION if name == written[0] else name: entry for name, entry in files.items()}, [note]
     what = describe_members(files)
     raise FmuFileError(f"{path} is {what}" if what else f"{path} is not an FMU: it holds no {_DESCRIPTION}")
+
+
+def _is_folder(entry: zipfile.ZipInfo) -> bool:
+    """Whether an entry stands for a folder: by a slash at its end, by a Unix mode, or by DOS' bit."""
+    if entry.filename.endswith(("/", "\\")):
+        return True
+    return not entry.file_size and bool(stat.S_ISDIR(entry.external_attr >> 16) or entry.external_attr & _DOS_FOLDER)
+
+
+def _spelled(files: dict[str, zipfile.ZipInfo]) -> tuple[dict[str, zipfile.ZipInfo], list[str]]:
+    """The files with the folders that the standards name as they name them: on Windows capitals do not count."""
+    known = {name.lower(): name for name in _FOLDERS}
+    found: dict[str, zipfile.ZipInfo] = {}
+    changed: dict[str, str] = {}
+    for name, entry in files.items():
+        top, *rest = name.split("/")
+        meant = [known.get(top.lower(), top), *rest] if rest else [top]
+        if meant[0] == "binaries" and len(meant) > 2:
+            meant[1] = meant[1].lower()
+        right = "/".join(meant)
+        right = name if right in files or right in found else right
+        if right != name:
+            depth = 2 if meant[0] == "binaries" and rest[0] != meant[1] else 1
+            changed["/".join(name.split("/")[:depth])] = "/".join(meant[:depth])
+        found[right] = entry
+    return found, [f"its folder {given!r} is taken for {right!r}" for given, right in changed.items()]
+
+
+def _check_folders(path: Path, files: dict[str, zipfile.ZipInfo]) -> None:
+    """No file stands where others need a folder; one that is empty was meant as one."""
+    folders = {str(parent) for name in files for parent in PurePosixPath(name).parents}
+    for name in folders & files.keys():
+        if files[name].file_size:
+            raise FmuFileError(f"{path} is refused: {name!r} in it is a file, and a folder of others as well")
+        files[f"{name}/"] = files.pop(name)
 
 
 def _alike(files: dict[str, zipfile.ZipInfo]) -> Iterator[str]:

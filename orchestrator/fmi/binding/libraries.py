@@ -150,7 +150,8 @@ def library(folder: Path, interface: Interface, name: str) -> Path:
         place = binaries / platform
         if (place / named).is_file():
             return place / named
-        others = sorted(world.glob(place, f"*{fmpy.sharedLibraryExtension}")) if place.is_dir() else []
+        files = world.iterdir(place) if place.is_dir() else ()
+        others = sorted(path for path in files if path.suffix.lower() == fmpy.sharedLibraryExtension)
         usable = [path for path in others if len(others) == 1 or b"DoStep" in world.read_bytes(path)]
         if len(usable) == 1:
             return usable[0]

@@ -19,8 +19,9 @@ def is_watched(slave: Slave | None) -> bool:
 
 
 class Watch:
-    """Puts back what FMUs of other makers change while they step: see `surroundings`. How numbers are rounded need not
-    wait for it: that is looked at after every call.
+    """Puts back what FMUs of other makers change while they step: see `surroundings`.
+
+    How numbers are rounded need not wait for it: that is looked at after every call.
 
     Args:
         slaves: the instances; those in processes of their own, and those of our own make, are not looked at.

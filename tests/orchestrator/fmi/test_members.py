@@ -54,8 +54,9 @@ def test_a_symbolic_link_that_leads_to_no_file_of_the_archive_is_refused(refused
     assert "the entry 'resources/link' is a symbolic link to no file of the archive" in said
 
 
-def test_a_symbolic_link_becomes_the_file_that_it_leads_to(workspace, tmp_path):
-    path = _with_link(tmp_path / "link.fmu", "../binaries/lib.so.1", {"binaries/lib.so.1": "code"})
+@pytest.mark.parametrize("target", ["../binaries/lib.so.1", "..\\binaries\\lib.so.1"])
+def test_a_symbolic_link_becomes_the_file_that_it_leads_to(workspace, tmp_path, target):
+    path = _with_link(tmp_path / "link.fmu", target, {"binaries/lib.so.1": "code"})
     place = workspace.unpack(path).folder / "resources" / "link"
     assert place.read_text() == "code"
     assert not place.is_symlink()
@@ -105,7 +106,29 @@ def test_a_damaged_entry(refused, tmp_path, xml):
 
 def test_a_file_where_a_folder_is_needed(refused, tmp_path, xml):
     path = xml["write_archive"](tmp_path / "clash.fmu", DESCRIPTION | {"resources": "file", "resources/data": "x"})
-    assert "is not a usable FMU" in refused(path)
+    assert "is refused: 'resources' in it is a file, and a folder of others as well" in refused(path)
+
+
+@pytest.mark.parametrize("bits", [0, 0x10, 0o40755 << 16])
+def test_a_folder_without_a_slash_is_a_folder(workspace, tmp_path, bits):
+    path = tmp_path / "a.fmu"
+    with zipfile.ZipFile(path, "w") as fmu:
+        for name, content in [("modelDescription.xml", "<x/>"), ("resources", ""), ("resources\\a", "7")]:
+            entry = zipfile.ZipInfo(name)
+            entry.external_attr = 0 if content else bits
+            fmu.writestr(entry, content)
+    assert (workspace.unpack(path).folder / "resources" / "a").read_text() == "7"
+
+
+def test_folders_of_the_standard_in_other_capitals(workspace, tmp_path, xml):
+    files = {"Binaries/Linux64/a.so": "1", "RESOURCES/A.txt": "2", "resources/B": "3", "Other/c": "4"}
+    found = workspace.unpack(xml["write_archive"](tmp_path / "a.fmu", DESCRIPTION | files))
+    for name in ("binaries/linux64/a.so", "resources/A.txt", "resources/B", "Other/c"):
+        assert (found.folder / name).is_file()
+    assert [note.partition(": ")[2] for note in found.notes] == [
+        "its folder 'Binaries/Linux64' is taken for 'binaries/linux64'",
+        "its folder 'RESOURCES' is taken for 'resources'",
+    ]
 
 
 def test_an_unknown_compression(refused, tmp_path, xml):
@@ -161,10 +184,18 @@ def test_links_to_one_large_file_count_as_often_as_they_are(refused, tmp_path, m
 @pytest.mark.skipif(os.name == "nt", reason="Windows knows no run bits")
 @pytest.mark.parametrize(
     ("mode", "content", "runs"),
-    [(0o755, "x", True), (0o4711, "x", True), (0o644, "#!/bin/sh", False), (0, "#!/bin/sh", True), (0, "x", False)],
+    [
+        (0o755, "x", True),
+        (0o4711, "x", True),
+        (0o644, "#!/bin/sh", True),
+        (0o600, "\x7fELF", True),
+        (0o600, "x", False),
+        (0, "#!/bin/sh", True),
+        (0, "x", False),
+    ],
 )
 def test_what_may_be_run_may_be_run_here(workspace, tmp_path, mode, content, runs):
-    """Where an archive says nothing of modes, as those made on Windows do, programs are known by their beginning."""
+    """Programs are known by their beginning: what an archive says of modes is often what the tool that made it says."""
     entry = zipfile.ZipInfo("resources/helper")
     entry.external_attr = (stat.S_IFREG | mode) << 16 if mode else 0
     path = tmp_path / "a.fmu"

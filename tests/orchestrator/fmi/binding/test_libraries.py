@@ -56,12 +56,14 @@ def test_a_library_of_another_description(fmu, go):
     ]
 
 
-@pytest.mark.parametrize("others", [{}, {"libneeded.so": b"\x7fELF"}])
-def test_a_library_of_another_name(fmu, go, others):
-    path = fmu(binaries={"its_own.so": "whole", **others})
+@pytest.mark.parametrize(
+    ("own", "others"), [("its_own.so", {}), ("its_own.so", {"libneeded.so": b"\x7fELF"}), ("FOREIGN.SO", {})]
+)
+def test_a_library_of_another_name(fmu, go, own, others):
+    path = fmu(binaries={own: "whole", **others})
     found = go(path)
     assert (found.code, found.record["status"]) == (0, "completed")
-    assert found.notes[0] == f"{path}: its library its_own.so is not named after its model identifier 'Foreign'"
+    assert found.notes[0] == f"{path}: its library {own} is not named after its model identifier 'Foreign'"
     assert found.record["notes"][0] == found.notes[0]
 
 
