@@ -24,6 +24,9 @@ from ..components.spelling import did_you_mean
 _PRESENT = sys.stdlib_module_names | {"numpy", __package__.partition(".")[0]}
 """What every component file may import."""
 
+_MOST = 1 << 24
+"""Bytes of a data file: as much as of a scenario."""
+
 
 def resolve(reference: str, folder: Path | None = None) -> type[Component]:
     """The component behind a catalogue name or ``"file.py:Class"``.
@@ -106,17 +109,22 @@ def read_arguments(arguments: Mapping[str, Any] | None) -> dict[str, Any]:
     """Build arguments with data files read: a text that ends in ``.json`` names one.
 
     Raises:
-        ComponentError: the file is missing or is not JSON.
+        ComponentError: the file is missing, too large or not JSON.
     """
     given = dict(arguments or {})
     for name, value in given.items():
         if isinstance(value, str) and value.endswith(".json"):
             try:
+                size = Path(value).stat().st_size
+                if size > _MOST:
+                    raise ComponentError(f"{name}: {value} has {size >> 20} MiB; no more than {_MOST >> 20} are read")
                 given[name] = json.loads(Path(value).read_text(encoding="utf-8"))
             except OSError as error:
                 raise ComponentError(f"{name}: {value} cannot be read: {error.strerror or error}") from error
             except ValueError as error:
                 raise ComponentError(f"{name}: {value} is not JSON: {error}") from error
+            except RecursionError:
+                raise ComponentError(f"{name}: {value} is nested too deep") from None
     return given
 
 

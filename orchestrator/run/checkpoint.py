@@ -24,6 +24,7 @@ from ..errors import RailcosimError, ScenarioError
 from ..fmi import Kind, Model
 from ..master import Master
 from ..system import Connection, Event, Instance, Judged, Provenance, Stepping, System
+from .recording import check_size
 
 CHECKPOINT_FILE = "checkpoint.zip"
 _FORMAT = 5
@@ -225,6 +226,7 @@ def read_checkpoint(directory: Path) -> Checkpoint:
         )
     try:
         with world.open(path, "rb") as stream, zipfile.ZipFile(stream) as archive:
+            check_size("checkpoint.json", archive.getinfo("checkpoint.json").file_size)
             content = json.loads(archive.read("checkpoint.json"))
             if content["format"] != _FORMAT:
                 raise ScenarioError(f"{path} is of another version of railcosim; run the scenario from the start")

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import os
 import socket
 from pathlib import Path
@@ -13,6 +12,7 @@ from filelock import Timeout
 
 from .. import world
 from ..errors import RailcosimError
+from .recording import read_json
 
 LOCK_FILE = ".lock"
 
@@ -66,7 +66,7 @@ class RunDirectory:
     def _holder(self) -> str:
         """Which run has it, as far as its record says."""
         try:
-            record = json.loads(world.read_text(self.path / "run.json", encoding="utf-8"))
+            record = read_json(self.path / "run.json")
             process = record["process"]
             return f" ({record['scenario'] or 'of Python'}, process {process['pid']} on {process['host']})"
         except (OSError, ValueError, LookupError, TypeError):

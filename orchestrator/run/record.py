@@ -24,7 +24,7 @@ from .checking import Checked
 from .checkpoint import CHECKPOINT_FILE
 from .directory import RunDirectory
 from .outcome import Run
-from .recording import CSV_FILE, ROWS_FILE, SEEN_FILE, remove_rows
+from .recording import CSV_FILE, ROWS_FILE, SEEN_FILE, read_json, remove_rows
 from .step_check import StepCheck
 
 _PACKAGES = ("railcosim", "fmpy", "pythonfmu", "numpy", "scipy")
@@ -117,7 +117,7 @@ def read(directory: Path) -> dict[str, Any]:
         ScenarioError: there is none that can be read.
     """
     try:
-        record = json.loads(world.read_text(directory / "run.json", encoding="utf-8"))
+        record = read_json(directory / "run.json")
         return {"texts": record["texts"], **record}
     except (OSError, ValueError, LookupError, TypeError, RecursionError) as error:
         raise ScenarioError(f"{directory} holds no run that can be read: {error}") from error
@@ -126,7 +126,7 @@ def read(directory: Path) -> dict[str, Any]:
 def add(directory: Path, **entries: Any) -> None:
     """Add to the record of a run that has ended."""
     path = directory / "run.json"
-    _dump(path, json.loads(world.read_text(path, encoding="utf-8")) | entries)
+    _dump(path, read_json(path) | entries)
 
 
 def add_step_check(directory: Path, found: StepCheck) -> None:

@@ -13,6 +13,9 @@ Rows = Sequence[Sequence[Any]]
 ROUNDING = 1e-9
 """Deviations up to here, as a part of a column's size, are of rounding: of a sum in another order, say."""
 
+_SHOWN = 8
+"""Values of a row that are shown."""
+
 
 def compare(expected: Rows, found: Rows, where: str) -> float:
     """How far rows deviate at most, as a part of their columns' size; refuse what is more than rounding.
@@ -26,8 +29,17 @@ def compare(expected: Rows, found: Rows, where: str) -> float:
         parts = [_part(x, y, size) for x, y, size in zip(a, b, sizes, strict=True)]
         worst = max([worst, *parts])
         if worst > ROUNDING:
-            raise FmuError(f"other outputs {where}: at step {k + 1}, {a!r} became {b!r}")
+            raise FmuError(f"other outputs {where}: at step {k + 1}, {_shown(a, b, parts)}")
     return worst
+
+
+def _shown(expected: Sequence[Any], found: Sequence[Any], parts: Sequence[float]) -> str:
+    """What became of a row; of a long one only a few that changed, for there may be a million."""
+    if len(expected) <= _SHOWN:
+        return f"{expected!r} became {found!r}"
+    changed = [k for k, part in enumerate(parts) if part > ROUNDING]
+    few = ", ".join(f"number {k + 1} from {expected[k]!r} to {found[k]!r}" for k in changed[:_SHOWN])
+    return f"{len(changed)} of {len(parts)} changed: {few}{', ...' if len(changed) > _SHOWN else ''}"
 
 
 def typical_deviation(expected: Rows, found: Rows) -> float:

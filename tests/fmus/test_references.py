@@ -85,12 +85,22 @@ def test_a_data_file_is_read_and_belongs_to_the_identity(tmp_path):
     assert build("Line", {"profile": str(line)}) != first
 
 
-@pytest.mark.parametrize(("text", "complaint"), [(None, "cannot be read"), ("[1,", "is not JSON")])
+@pytest.mark.parametrize(
+    ("text", "complaint"), [(None, "cannot be read"), ("[1,", "is not JSON"), (100_000 * "[", "is nested too deep")]
+)
 def test_a_data_file_that_cannot_be_used(tmp_path, text, complaint):
     path = tmp_path / "line.json"
     if text is not None:
         path.write_text(text, encoding="utf-8")
     with pytest.raises(ComponentError, match=complaint):
+        build("Line", {"profile": str(path)})
+
+
+def test_a_vast_data_file_is_not_read(tmp_path):
+    path = tmp_path / "line.json"
+    with path.open("wb") as stream:
+        stream.truncate(100 << 20)
+    with pytest.raises(ComponentError, match=r"^profile: .*line\.json has 100 MiB; no more than 16 are read$"):
         build("Line", {"profile": str(path)})
 
 

@@ -6,6 +6,7 @@ from .recording import Recording, check_stored
 from .results import Results
 from .stored import Telling, finish_rows, recover_rows
 from .text import CSV_FILE
+from .told import check_size, read_json
 
 __all__ = [
     "CSV_FILE",
@@ -16,8 +17,10 @@ __all__ = [
     "Recording",
     "Results",
     "Telling",
+    "check_size",
     "check_stored",
     "finish_rows",
+    "read_json",
     "recover_rows",
     "remove_rows",
 ]

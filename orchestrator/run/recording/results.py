@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Collection, Iterator, Mapping, Sequence
 from functools import cached_property
 from pathlib import Path
@@ -11,12 +10,12 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ... import world
 from ...errors import ScenarioError, SignalError
 from ...times import digits
 from .columns import Columns, InMemory
 from .missing import missing_signal, shortened
 from .stored import read_stored
+from .told import read_json
 
 _TIME = "time"
 
@@ -120,7 +119,7 @@ class Results(Mapping[str, NDArray[Any]]):
         """
         directory = Path(directory)
         try:
-            record = json.loads(world.read_text(directory / "run.json", encoding="utf-8"))
+            record = read_json(directory / "run.json")
             columns = read_stored(directory, record)
             if _TIME not in columns:
                 raise KeyError(_TIME)
