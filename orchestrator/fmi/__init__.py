@@ -10,6 +10,7 @@ from ...fmus.kinds import Kind
 from .archive import Workspace
 from .interface import Interface, Sort, Type, Unit, Variable
 from .models import Model, load_fmu, load_models
+from .reading import read as read_as_written
 from .recognition import is_fmu_name
 from .slave import Channel, Slave
 from .snapshot import state_names, take_snapshot
@@ -30,6 +31,7 @@ __all__ = [
     "is_pedantry",
     "load_fmu",
     "load_models",
+    "read_as_written",
     "state_names",
     "take_snapshot",
 ]

@@ -118,7 +118,16 @@ class Reading:
 
     def problems(self) -> Iterable[str]:
         """What is wrong all the same, a sentence each: with the form or, if that is kept, with what is written."""
-        return self._schema.problems or problems(self._entries, self.description.found, self.version)
+        return self.against_schema or self.inconsistencies()
+
+    @property
+    def against_schema(self) -> list[str]:
+        """What is wrong with the form."""
+        return self._schema.problems
+
+    def inconsistencies(self) -> Iterable[str]:
+        """What is wrong with variables that keep the form, before they are translated."""
+        return problems(self._entries, self.description.found, self.version)
 
     def _begin(self, root: Any) -> None:
         """What must be known before any part is read."""

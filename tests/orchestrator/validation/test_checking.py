@@ -13,7 +13,7 @@ from railcosim.fmus.build import build, native_problem
 from railcosim.fmus.references import resolve
 from railcosim.orchestrator import FmuFileError, world
 from railcosim.orchestrator.cli.app import call
-from railcosim.orchestrator.validation import validate
+from railcosim.orchestrator.validation import checking, validate
 from railcosim.orchestrator.validation.probing import PROBES
 
 needs_native = pytest.mark.skipif(
@@ -275,3 +275,32 @@ def test_the_command_prints_a_table_and_tells_by_its_exit_code(lag, capsys):
 def test_what_an_fmu_prints_is_its_last_words(found):
     _, detail = found("simulate", on_step='write(2,"all is lost",11);abort();')
     assert "last words: all is lost" in detail
+
+
+Y = '<ScalarVariable name="y" valueReference="1" causality="output"><Real {}/></ScalarVariable>'
+
+
+@pytest.mark.parametrize(
+    ("given", "found"),
+    [
+        (
+            'unit="m"',
+            [("schema", "pass", "FMI 2.0"), ("description", "pass", "more than 0 MiB names and model structure")],
+        ),
+        ('colour="red"', [("schema", "fail", "'colour'"), ("description", "skipped", "does not keep the schema")]),
+        (
+            'unit="mm"',
+            [("schema", "pass", "FMI 2.0"), ("description", "fail", 'The unit "mm" of variable "y" (line 2)')],
+        ),
+    ],
+)
+def test_a_description_too_large_for_fmpy_is_read_in_parts(tmp_path, monkeypatch, given, found):
+    monkeypatch.setattr(checking, "_LARGE", 0)
+    (tmp_path / "modelDescription.xml").write_text(
+        '<fmiModelDescription fmiVersion="2.0" modelName="m" guid="g"><CoSimulation modelIdentifier="m"/>\n'
+        '<UnitDefinitions><Unit name="m"/></UnitDefinitions>'
+        f"<ModelVariables>{Y.format(given)}</ModelVariables><ModelStructure/></fmiModelDescription>"
+    )
+    findings = checking._described(tmp_path / "their.fmu", tmp_path, "2.0")
+    assert [(each.check, each.verdict) for each in findings] == [(check, verdict) for check, verdict, _ in found]
+    assert all(part in each.detail for each, (*_, part) in zip(findings, found, strict=True))
