@@ -165,7 +165,8 @@ class Provenance:
         modified: whether anything was changed beyond file and preset, so that known values are not judged.
         rescaled_from: the step in s before `--step` changed it: every sample time equal to it follows the step.
         origins: where things were written, for messages: by ``"train[1]"``, ``"train[1].speed"`` (a start value),
-            ``"instances.train[1].step"`` (an option of an instance), ``"simulation.step"``,
+            ``"instances.train[1].step"`` (an option of an instance), ``"instances.train[1].build.carriages"`` (a build
+            argument that a preset or an option gave), ``"simulation.step"``,
             ``"simulation.tolerances.train[1].speed"``, ``"events[1]"``, ``"require.comfort"``, ``"metrics.settling"``,
             ``"published[1]"``, ``"references[1]"``, ``"figures[1]"``.
     """

@@ -90,7 +90,7 @@ Trust = Annotated[
         help="Import Python code wherever a file names it; else only what is in the scenario's folder or named here.",
     ),
 ]
-Quiet = Annotated[bool, typer.Option("--quiet", "-q", help="Print nothing but errors.")]
+Quiet = Annotated[bool, typer.Option("--quiet", "-q", help="Print only errors, what was found, and what failed.")]
 
 
 def build_arguments(builds: list[str] | None) -> dict[str, Any]:

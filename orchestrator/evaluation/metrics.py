@@ -140,6 +140,8 @@ def unit_of(expression: Expression, signals: Signals, index: int | None = None) 
                 return None
             case Operation(operator="+" | "-" | "negative" | "positive", operands=operands):
                 return shared([visit(operand) for operand in operands])
+            case Operation(operator="*", operands=operands):
+                return _PRODUCTS.get(frozenset(visit(operand) or "" for operand in operands), "")
             case Call(name=name, arguments=arguments) if arguments:
                 unit = expression.functions[name].unit
                 first = visit(arguments[0]) or ""
@@ -155,6 +157,10 @@ def unit_of(expression: Expression, signals: Signals, index: int | None = None) 
     return visit(expression.tree) or ""
 
 
+_PRODUCTS = {
+    frozenset(units): product
+    for *units, product in (("N", "m/s", "W"), ("N", "m", "J"), ("W", "s", "J"), ("kg", "m/s2", "N"), ("m/s", "s", "m"))
+}
 _PER_SECOND = {"m": "m/s", "m/s": "m/s2", "m/s2": "m/s3"}
 
 

@@ -54,10 +54,14 @@ def _string_ratio(_: Span, x: Array) -> Reduction:
     return x, folds.peaks(lambda peaks: max(_ratio(float(b), float(a)) for a, b in itertools.pairwise(peaks)))
 
 
+_ROUNDING = 1e-9
+"""Up to this closing speed, in m/s, trains keep their distance: it is what is left of equal speeds."""
+
+
 def _time_to_collision(_: Span, gap: Array, closing: Array) -> Reduction:
     distance, speed = np.broadcast_arrays(gap, closing)
     with np.errstate(divide="ignore", invalid="ignore"):
-        times = np.where(speed > 0.0, np.maximum(distance, 0.0) / speed, np.inf)
+        times = np.where(speed > _ROUNDING, np.maximum(distance, 0.0) / speed, np.inf)
     times = np.where(distance <= 0.0, 0.0, times)
     return np.where(np.isnan(distance) | np.isnan(speed), np.nan, times), folds.minimum()
 

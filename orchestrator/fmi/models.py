@@ -70,10 +70,17 @@ def load_models(system: System, workspace: Workspace, kind: Kind = "auto") -> di
             models[instance.name] = shared[key]
         except (ValueError, OSError) as error:  # ComponentError and FmuFileError among them
             place = f"instance {SignalName(instance.name).group!r}"
-            problems[Problem(place, str(error)).at(instance.origin)] = None
+            problems[Problem(place, str(error)).at(_origin(system, instance, str(error)))] = None
     if problems:
         raise ScenarioError(problems)
     return models
+
+
+def _origin(system: System, instance: Instance, message: str) -> str:
+    """Where what a message complains of was written: the build argument that it names, or the instance."""
+    known = system.provenance.origins
+    places = (known.get(f"instances.{instance.name}.build.{name}") for name in instance.build if repr(name) in message)
+    return next(filter(None, places), instance.origin)
 
 
 def _load(instance: Instance, workspace: Workspace, kind: Kind) -> Model:

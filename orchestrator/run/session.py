@@ -209,7 +209,7 @@ class Session:
         stride = count if every is None else max(1, round(every / system.stepping.step))
         # Every point is watched; of steps of one length those that are recorded are picked out of all.
         told_every, kept_every = (row_every, 1) if varies else (1, int(row_every))
-        observe = self._observer(master, Due(kept_every, count))
+        observe = self._observer(master, Due(kept_every, count), -1 if varies else count)
         begin, before = world.perf_counter(), master.steps
         try:
             while True:
@@ -227,7 +227,7 @@ class Session:
         finally:
             self.seconds.update(stepping=world.perf_counter() - begin, steps=master.steps - before)
 
-    def _observer(self, master: Master, due: Due) -> Callable[[int, Rows], bool]:
+    def _observer(self, master: Master, due: Due, count: int) -> Callable[[int, Rows], bool]:
         assert self._recording is not None
         assert self._watching is not None
         system, stopped, progress = self.system, self._stopped, self.job.progress
@@ -239,6 +239,9 @@ class Session:
         def observe(steps: int, rows: Rows) -> bool:
             nonlocal shown, told
             time = master.time
+            if steps == count:  # the end is what the user wrote, whatever start + k * step is rounded to
+                end: Any = rows[-1]
+                end[0] = time = system.stepping.stop_time
             points = rows if len(rows) else [[time, *master.values]]
             kept = due.of(steps, rows)
             watching.see(points)

@@ -115,7 +115,7 @@ def _change_instance(target: Target, entry: Entry, folder: str, problems: list[P
     elif word in OPTION_KEYS and not rest:
         group.set_option(word, entry, target.index)
     elif word == "build" and rest:
-        group.set_build(rest, build_argument(entry.value, folder), target.index)
+        group.set_build(rest, build_argument(entry.value, folder), entry.origin, target.index)
     else:
         if not is_plain(entry.value):
             raise ScenarioError(f"takes numbers, texts, true or false, or lists of these, not {shown(entry.value)}")

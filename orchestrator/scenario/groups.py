@@ -57,6 +57,7 @@ class Member:
     options: dict[str, Entry] = field(default_factory=dict)
     build: dict[str, Any] = field(default_factory=dict)
     start: dict[str, Entry] = field(default_factory=dict)
+    built_by: dict[str, str] = field(default_factory=dict)  # where build arguments were changed
 
 
 @dataclass
@@ -71,6 +72,7 @@ class Group:
     options: dict[str, Entry] = field(default_factory=dict)
     build: dict[str, Any] = field(default_factory=dict)
     start: dict[str, Entry] = field(default_factory=dict)
+    built_by: dict[str, str] = field(default_factory=dict)
     members: dict[int, Member] = field(default_factory=dict)
 
     def swap(self, model: str, index: int | None = None) -> None:
@@ -93,14 +95,13 @@ class Group:
         for one in self.members.values():
             one.options.pop(name, None)
 
-    def set_build(self, name: str, value: Any, index: int | None = None) -> None:
+    def set_build(self, name: str, value: Any, origin: str, index: int | None = None) -> None:
         """Give a build argument to all, or to one."""
-        if index is not None:
-            self.members.setdefault(index, Member()).build[name] = value
-            return
-        self.build[name] = value
-        for one in self.members.values():
-            one.build.pop(name, None)
+        one = self if index is None else self.members.setdefault(index, Member())
+        one.build[name], one.built_by[name] = value, origin
+        for other in self.members.values() if index is None else ():
+            other.build.pop(name, None)
+            other.built_by.pop(name, None)
 
     def set_start(self, name: str, entry: Entry, index: int | None = None) -> None:
         """Give a start value to all, or to one; what comes later wins, a whole array over its elements too."""
@@ -238,6 +239,8 @@ def expand_group(group: Group, problems: list[Problem]) -> list[tuple[Instance, 
         )
         origins = {f"instances.{instance.name}.{key}": entry.origin for key, entry in options.items()}
         origins |= {f"{instance.name}.{name}": entry.origin for name, entry in start.items()}
+        built_by = {**group.built_by, **one.built_by}
+        origins |= {f"instances.{instance.name}.build.{name}": origin for name, origin in built_by.items()}
         members.append((instance, origins))
     return members
 

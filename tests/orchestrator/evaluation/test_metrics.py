@@ -57,7 +57,7 @@ def ramp():
     """x = t, y = 10 - 2 t, both over 0 ... 10 s at every 0.5 s; two rows a[1] = t, a[2] = -2 t."""
     run = Run()
     t = run.time
-    run.put("s.x", t, "m").put("s.y", 10 - 2 * t, "m")
+    run.put("s.x", t, "m").put("s.y", 10 - 2 * t, "m").put("s.pull", t, "N")
     return run.put("a[1].v", t, "m/s").put("a[2].v", -2 * t, "m/s").put("s.nan", np.where(t == 3, np.nan, t))
 
 
@@ -338,6 +338,10 @@ def test_one_bad_metric_does_not_hide_the_others():
         ("final(s.x) * 2", ""),
         ("final(s.x) - final(a[1].v)", ""),
         ("max(s.x * a[1].v)", ""),
+        ("max(s.pull * a[1].v)", "W"),
+        ("max(abs(s.x) * s.pull)", "J"),
+        ("max(s.pull * s.pull)", ""),
+        ("max(2 * s.pull)", ""),
         ("max(3)", ""),
         ("-max(s.x)", "m"),
     ],

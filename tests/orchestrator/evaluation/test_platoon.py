@@ -80,6 +80,7 @@ def test_time_to_collision():
     assert value(f"time_to_collision({gap}, train[2].speed)", **columns) == pytest.approx(10.0)
     assert value(f"time_to_collision({gap}, -train[2].speed)", **columns) == math.inf
     assert value("time_to_collision(train[2].position - 20, -train[2].speed)", **columns) == 0.0
+    assert value(f"time_to_collision({gap}, 0.1 + 0.2 - 0.3 + 0 * train[2].speed)", **columns) == math.inf  # rounding
 
 
 def test_braking_margin():

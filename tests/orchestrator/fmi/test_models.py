@@ -8,6 +8,7 @@ from railcosim.orchestrator.errors import ScenarioError
 from railcosim.orchestrator.fmi.binding.fmi2 import FmuSlave
 from railcosim.orchestrator.fmi.models import load_fmu, load_models
 from railcosim.orchestrator.fmi.plain import PlainSlave
+from railcosim.orchestrator.scenario.loading import loads
 from railcosim.orchestrator.system import System
 
 
@@ -96,3 +97,15 @@ def test_a_component_file_with_a_mistake_in_it(workspace, components, kind):
     path = Path(reference.rpartition(":")[0])
     line = path.read_text().splitlines().index("    u = Inptu('m')") + 1
     assert found == f"instance 'odd': {path}:{line}: NameError: name 'Inptu' is not defined"
+
+
+@pytest.mark.parametrize("name", ["points", "pionts"])
+def test_a_wrong_build_argument_is_told_where_it_was_given(workspace, name):
+    text = '[simulation]\nstop_time = 1.0\n[instances.a]\ncomponent = "Schedule"\nbuild.points = 2\n[presets.p]\n"a.build.points" = 3\n'
+    option = f"a.{name}=0"
+    (told,) = problems(loads(text, "s.toml", builds=[option]), workspace)
+    assert told.startswith(f"--with {option}: instance 'a': Schedule")
+    (told,) = problems(loads(text.replace("= 3", "= 0"), "s.toml", preset="p"), workspace)
+    assert told.startswith("s.toml:7: instance 'a': Schedule")
+    (told,) = problems(loads(text.replace("= 2", "= 0"), "s.toml"), workspace)
+    assert told.startswith("s.toml:3: instance 'a': Schedule")

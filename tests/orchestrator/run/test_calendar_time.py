@@ -32,3 +32,17 @@ def test_events_and_windows_are_of_their_points(mine, algorithm):
     changed = [k for k, (x, y) in enumerate(zip(outcome["a.x"], still["a.x"], strict=True)) if x != y]
     assert changed[0] == 8
     assert next(iter(outcome.metrics[0].values.values())) == max(outcome["a.x"][3:14])
+
+
+@pytest.mark.parametrize("algorithm", ["gauss-seidel", "iterative", "adaptive"])
+@pytest.mark.parametrize("kind", ["plain", "native"])
+def test_the_last_point_is_the_end_as_it_was_written(algorithm, kind):
+    system = System(stop_time=0.3, step=0.1, algorithm=algorithm, requirements={"moves": "always train.speed > 0"})
+    system.add("train", "PointMassTrain", speed=10.0, force=0.0)
+    assert 3 * 0.1 != 0.3
+    outcome = run(system, kind=kind)
+    assert outcome.time[-1] == 0.3
+    longer = run(system, kind=kind, stop_time=0.6)
+    assert longer.time[-1] == 0.6
+    if algorithm != "adaptive":  # which chooses its steps for the end
+        assert longer["train.position"][3] == outcome["train.position"][-1]
