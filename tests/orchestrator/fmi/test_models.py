@@ -101,7 +101,8 @@ def test_a_component_file_with_a_mistake_in_it(workspace, components, kind):
 
 @pytest.mark.parametrize("name", ["points", "pionts"])
 def test_a_wrong_build_argument_is_told_where_it_was_given(workspace, name):
-    text = '[simulation]\nstop_time = 1.0\n[instances.a]\ncomponent = "Schedule"\nbuild.points = 2\n[presets.p]\n"a.build.points" = 3\n'
+    text = "[simulation]\nstop_time = 1.0\n[instances.a]\n"
+    text += 'component = "Schedule"\nbuild.points = 2\n[presets.p]\n"a.build.points" = 3\n'
     option = f"a.{name}=0"
     (told,) = problems(loads(text, "s.toml", builds=[option]), workspace)
     assert told.startswith(f"--with {option}: instance 'a': Schedule")
