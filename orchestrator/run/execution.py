@@ -252,7 +252,7 @@ def _write(outcome: Run, session: Session, place: RunDirectory) -> None:
     job = session.job
     try:
         record_file.finish(place, outcome, job.kind, session.rows)
-        if (place.path / ROWS_FILE).exists():
+        if outcome.results.points and (place.path / ROWS_FILE).exists():
             finish_rows(place.path, job.writing)
         if job.checkpoint_every is None:
             remove_rows(place.path / SEEN_FILE)

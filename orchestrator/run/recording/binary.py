@@ -67,7 +67,11 @@ class RowsWriter:
         head = {"run": identity, "columns": list(columns), "whole": list(whole), "texts": words.columns}
         line = json.dumps(head).encode() + b"\n"
         self.rows, self._begin, self._row = 0, len(line), len(columns) * _FLOAT.itemsize
-        self._write(memoryview(line))
+        try:
+            self._write(memoryview(line))
+        except OSError:
+            self._file.close()
+            raise
         if words.columns and not there:
             self._tell_words()
 

@@ -182,7 +182,11 @@ class Bench:
         ):
             patch.setattr(tempfile, "tempdir", str(place / "tmp"))
             patch.setattr(app, "app", self._command)
-            code = app.call(arguments)
+            try:
+                code = app.call(arguments)
+            except BaseException:
+                traceback.print_exc()
+                code = 99
         where = struck.read_text() if struck.exists() else ""
         return Ended(code, said.getvalue(), where, counts.all(), _are_left())
 

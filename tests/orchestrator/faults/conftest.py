@@ -1,8 +1,6 @@
 """What the campaign needs: its modules, FMUs, and a place."""
 
 import ctypes
-import functools
-import importlib.metadata
 import sys
 import zipfile
 from pathlib import Path
@@ -28,14 +26,12 @@ def small_fmus(mine, xml, tmp_path_factory, session_cache):
     return folder
 
 
-@pytest.fixture
-def bench(small_fmus, tmp_path, monkeypatch):
+@pytest.fixture(scope="module")
+def bench(small_fmus, tmp_path_factory):
     """Runs cases; what a case leaves behind becomes a child of this process."""
     from cases import Bench
 
-    # What takes longer than a case is done once.
-    monkeypatch.setattr(importlib.metadata, "version", functools.cache(importlib.metadata.version))
     prctl = ctypes.CDLL(None).prctl
     prctl(_SET_CHILD_SUBREAPER, 1, 0, 0, 0)
-    yield Bench(tmp_path, small_fmus)
+    yield Bench(tmp_path_factory.mktemp("cases"), small_fmus)
     prctl(_SET_CHILD_SUBREAPER, 0, 0, 0, 0)

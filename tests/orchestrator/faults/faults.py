@@ -336,7 +336,7 @@ class Faults:
             found = function(*arguments)
             if manner == "nan" and name.endswith("GetReal") and arguments[2]:
                 ctypes.c_double.from_address(arguments[3]).value = float("nan")
-            return status or found
+            return status if status and function.restype is ctypes.c_int else found
 
         return ctypes.CFUNCTYPE(function.restype, *function.argtypes)(call)
 

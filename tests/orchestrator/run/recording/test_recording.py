@@ -129,6 +129,13 @@ def test_a_disk_that_is_full_while_the_run_goes(mine, tmp_path, monkeypatch, lar
     np.testing.assert_array_equal(loaded["lag.x"], run(swinging(mine), kind="plain")["lag.x"][: len(loaded.time)])
 
 
+def test_a_disk_that_is_full_before_the_first_row(mine, tmp_path, monkeypatch):
+    no_room(monkeypatch, "results.bin", 0)
+    outcome = execute(swinging(mine), kind="plain", output=tmp_path)
+    assert (outcome.status, type(outcome.error)) == ("failed", RecordError)
+    assert json.loads((tmp_path / "run.json").read_text())["error"] == str(outcome.error)
+
+
 def test_a_disk_that_has_no_room_for_the_text(mine, tmp_path, monkeypatch):
     """The verdicts and the rows are there; the text is made when there is room."""
     out = tmp_path / "out"
