@@ -79,9 +79,8 @@ def describe(
         known = (*CATALOGUE, *dict(shipped()))
         remedy = suggestion(name, known) or "'orchestrate list' has them; a file is named with its ending"
         raise ScenarioError(Problem("", f"there is no component or shipped scenario {name!r}", remedy))
-    with show_compilations(quiet=False):
+    with show_compilations(quiet=False, doing=f"reading {name}"), Workspace() as workspace:
         path, _, lacks = (Path(name), "", "") if is_fmu else package(name, arguments)
-    with Workspace() as workspace:
         interface = load_fmu(path, workspace).interface
     out = open_console()
     annotation = interface.annotation or Annotation()
@@ -183,7 +182,8 @@ def validate(
 
     Exit codes: 0 nothing failed; 1 something did; 2 the file is no FMU that could be used.
     """
-    report = validate_fmu(fmu, timeout=timeout)
+    with show_compilations(quiet=False, doing=f"reading and trying {fmu}"):
+        report = validate_fmu(fmu, timeout=timeout)
     show_report(open_console(), report)
     raise typer.Exit(OK if report.passed else FAILED)
 

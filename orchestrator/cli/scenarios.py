@@ -51,7 +51,7 @@ def check(
     """
     system = load_system(scenario, preset, settings, builds, swaps, stop=stop, step=step, algorithm=algorithm)
     out = open_console()
-    with Workspace() as workspace, show_compilations(quiet=False):
+    with Workspace() as workspace, show_compilations(quiet=False, doing="reading what it is made of"):
         checked = check_system(system, workspace, trusted=trust)
     say(out, system.provenance.title or system.provenance.name, "bold")
     connections = len(checked.wiring.links)

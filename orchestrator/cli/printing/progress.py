@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import logging
 import sys
+import threading
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 
@@ -30,6 +31,10 @@ class Shown:
     def __call__(self, time: float, stop: float) -> None:
         """As a run calls it."""
         self._stepping(time, stop)
+
+
+_LONG = 1.0
+"""How long something may take before it is told what it is, in s."""
 
 
 @contextmanager
@@ -65,16 +70,33 @@ def show_progress(title: str, quiet: bool, start: float = 0.0, reached: float | 
 
 
 @contextmanager
-def show_compilations(quiet: bool) -> Iterator[None]:
-    """What is compiled for another machine, as it is begun: on a terminal with the time it takes, else a line each."""
+def show_compilations(quiet: bool, *, doing: str = "") -> Iterator[None]:
+    """What is compiled for another machine, as it is begun: on a terminal with the time it takes, else a line each.
+
+    Args:
+        quiet: whether to show nothing.
+        doing: what else may take long; it is shown on a terminal once it does.
+    """
     if quiet:
         yield
     elif sys.stderr.isatty():
         columns = (SpinnerColumn(), TextColumn("{task.description}", markup=False), TimeElapsedColumn())
         with Progress(*columns, console=open_console(stderr=True), transient=True) as bar:
             task = bar.add_task("", start=False, visible=False)
-            with _compilations(lambda what: bar.reset(task, description=what, visible=True)):
-                yield
+
+            def show(what: str) -> None:
+                later.cancel()
+                bar.reset(task, description=what, visible=True)
+
+            later = threading.Timer(_LONG, lambda: bar.update(task, description=printable(doing), visible=bool(doing)))
+            later.daemon = True
+            bar.start_task(task)
+            later.start()
+            try:
+                with _compilations(show):
+                    yield
+            finally:
+                later.cancel()
     else:
         with _compilations(tell):
             yield

@@ -3,10 +3,12 @@
 import io
 import logging
 import sys
+import threading
 from functools import partial
 
 import pytest
 from railcosim.fmus import toolchain
+from railcosim.orchestrator.cli.printing import progress as progress_module
 from railcosim.orchestrator.cli.printing import show_cases, show_compilations, show_progress
 
 
@@ -66,6 +68,19 @@ def test_on_a_terminal_a_compilation_shows_its_time(monkeypatch):
         compile_something()
     assert "compiling for win64" in terminal.getvalue()
     assert "0:00:0" in terminal.getvalue()
+
+
+@pytest.mark.parametrize(("long", "shown"), [(0.0, True), (60.0, False)])
+def test_on_a_terminal_what_takes_long_is_told(monkeypatch, long, shown):
+    terminal = Terminal()
+    monkeypatch.setattr(sys, "stderr", terminal)
+    monkeypatch.setattr(progress_module, "_LONG", long)
+    before = set(threading.enumerate())
+    with show_compilations(quiet=False, doing="reading [bold]a.fmu"):
+        for thread in set(threading.enumerate()) - before:
+            if isinstance(thread, threading.Timer) and shown:
+                thread.join()
+    assert ("reading [bold]a.fmu" in terminal.getvalue()) == shown
 
 
 def test_the_bar_over_many_cases_is_for_a_terminal(capsys):
