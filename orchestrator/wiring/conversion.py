@@ -38,9 +38,13 @@ def fit(a: Variable, of_a: Interface, b: Variable, of_b: Interface, connection: 
     if problem := _misfit(a.type, b.type, connection, is_changed=(scale, offset) != (1.0, 0.0)):
         return Conversion(problem=problem)
     found = relate(a, of_a, b, of_b)
-    if connection.scale is not None or offset:  # whoever gives one has taken care
+    if connection.scale is not None or offset:  # whoever gives a scale has taken care; an offset leaves its doubt
         told = f"{found.refused.partition(';')[0]}; what is given there is applied to the values"
-        found = found._replace(refused="", doubt="", note=told if found.refused else found.note)
+        found = found._replace(
+            refused="",
+            doubt="" if connection.scale is not None else found.doubt,
+            note=told if found.refused else found.note,
+        )
     note = found.doubt or found.note or _told(a.type, b.type, connection.threshold)
     note = "; ".join(filter(None, (note, _twice(found, scale, offset, a, b))))
     return Conversion(found.scale * scale, found.offset * scale + offset, found.refused, note)

@@ -3,14 +3,18 @@
 from __future__ import annotations
 
 import math
+import re
 from typing import NamedTuple
 
 from ..fmi import Interface, Unit, Variable
 
-_RATES = {"rad/s": 1.0, "deg/s": math.pi / 180.0, "Hz": 2.0 * math.pi, "kHz": 2000.0 * math.pi}
-_RATES |= dict.fromkeys(("rpm", "rev/min", "r/min"), math.pi / 30.0) | {"rev/s": 2.0 * math.pi}
+_RATES = {"rad/s": 1.0, "rad/min": 1.0 / 60.0, "deg/s": math.pi / 180.0, "deg/min": math.pi / 10800.0}
+_RATES |= {"Hz": 2.0 * math.pi, "kHz": 2e3 * math.pi, "MHz": 2e6 * math.pi, "rev/s": 2.0 * math.pi}
+_RATES |= dict.fromkeys(("rpm", "RPM", "rev/min", "r/min", "U/min", "1/min"), math.pi / 30.0)
 _ANGLES = {"rad": 1.0, "deg": math.pi / 180.0, "rev": 2.0 * math.pi, "turn": 2.0 * math.pi}
 """What units of angle and of rotation mean, in rad and rad/s: tools disagree on how to define them."""
+_PER = re.compile(r"[ .*·]?(s|min)(?:\^|\*\*)?\(?(?:-1|⁻¹)\)?")
+_OTHER_WORDS = {"°": "deg", "degrees": "deg", "degree": "deg", "radians": "rad", "radian": "rad"}
 
 
 class Relation(NamedTuple):
@@ -84,5 +88,13 @@ def _doubt(a: Unit, b: Unit, scale: float) -> str:
 
 def _known(a: str, b: str) -> float | None:
     """The scale between two units of angle or of rotation by their names."""
+    a, b = _spelled(a), _spelled(b)
     table = next((table for table in (_ANGLES, _RATES) if a in table and b in table), None)
     return None if table is None else table[a] / table[b]
+
+
+def _spelled(unit: str) -> str:
+    """A unit as the tables spell it: ``rad.s-1`` and ``rad s^-1`` are ``rad/s``."""
+    over, _, per = _PER.sub(r"/\1", unit.strip()).partition("/")
+    over = _OTHER_WORDS.get(over.strip(), over.strip() or "1")
+    return f"{over}/{'s' if per == 'sec' else per.strip()}" if per else over

@@ -151,6 +151,6 @@ def _lines(title: str, start: float, reached: float) -> OnProgress:
         told = max(told, before)
         while told < done:
             told += 1
-            tell(f"{title}: {10 * told} % of {digits(stop - start)} s")
+            tell(f"{title}: {10 * told} % of {digits(stop - start, start, stop)} s")
 
     return show

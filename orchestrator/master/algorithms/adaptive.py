@@ -49,6 +49,8 @@ _TOLD = 100
 """How many jumps are told one by one."""
 _SHORTEST = 2.0**-20
 """Part of the longest step that the shortest is, where nothing else is said."""
+_APART = 8
+"""So many numbers lie in the shortest step at least: seconds since 1970 are 2e-7 s apart, and a step has two halves."""
 
 
 def is_watched(variable: Variable) -> bool:
@@ -141,13 +143,14 @@ class Adaptive(VariableStep):
     def advance(self, time: float, until: float, longest: float) -> float:
         """Take one step, as `VariableStep.advance` says."""
         shortest = longest * _SHORTEST if self.shortest is None else self.shortest
+        shortest = max(shortest, _APART * math.ulp(max(abs(time), abs(until))))
         begin = self._keep()
         kept = [begin]
         wanted = min(self.length or longest, longest)
         try:
             while True:
                 end, length = _fit(time, wanted, until)
-                is_shortest = length <= shortest * (1.0 + _ROUNDING)
+                is_shortest = min(length, wanted) <= shortest * (1.0 + _ROUNDING)
                 try:
                     error, place = self._take(time, end, kept)
                 except RunError as failure:  # of a shorter step they may be capable

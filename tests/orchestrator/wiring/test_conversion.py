@@ -55,7 +55,7 @@ def test_units_that_nobody_defined(undefined):
     assert between(a, b) == Conversion(note=note.format("'furlong'", "'K'") + more)
     assert between(b, a) == Conversion(note=note.format("'K'", "'furlong'") + more)
     assert between(a, b, scale=201.168) == Conversion(201.168)
-    assert between(a, b, offset=1.0) == Conversion(offset=1.0)
+    assert between(a, b, offset=1.0) == Conversion(offset=1.0, note=note.format("'furlong'", "'K'") + more)
 
 
 def test_a_scale_settles_a_doubt():

@@ -27,6 +27,9 @@ def test_progress_starts_at_the_start_time(capsys):
             lines[time] = capsys.readouterr().err.splitlines()
     told = [f"late: {percent} % of 10 s" for percent in range(10, 101, 10)]
     assert lines == {100.0: [], 104.0: told[:4], 110.0: told[4:]}
+    with show_progress("micro", False, start=1.7e9) as progress:
+        progress(1700000010.1, 1700000010.1)
+    assert capsys.readouterr().err.splitlines()[-1] == "micro: 100 % of 10.1 s"
     with show_progress("quiet", True) as progress:
         assert progress is None
 

@@ -184,6 +184,22 @@ def test_a_jump_is_passed_in_a_shortest_step_and_told(mine):
     assert told["accepted"] < 60
 
 
+@pytest.mark.parametrize("min_step", [None, 1e-9, 1.33e-6])
+def test_the_shortest_step_has_two_halves_at_calendar_times_too(mine, min_step):
+    """Seconds since 1970 are 2.4e-7 s apart, and the shortest step is not whole of those."""
+    begin = 1.7e9
+    how = {"algorithm": "adaptive", "tolerance": 1e-12} | ({} if min_step is None else {"min_step": min_step})
+    it = System(start_time=begin, stop_time=begin + 0.4, step=0.1, **how)
+    it.add("wall", mine("Wall"), at=begin + 0.13)
+    it.add("sum", mine("Integral"))
+    it.connect("wall.y", "sum.u")
+    result = run(it, kind="plain")
+    assert result["sum.x"][-1] == pytest.approx(0.27, abs=5e-6)
+    told = result.coupling["adaptive"]
+    assert told["jumps"] == 1
+    assert told["shortest_step"] >= 4.0 * math.ulp(begin)
+
+
 def test_a_step_that_an_fmu_fails_in_is_tried_shorter(mine):
     """From x = 1 down to exp(-t): a step of 2 s would end below nought."""
     it = System(stop_time=4.0, step=2.0, algorithm="adaptive", tolerance=1e-3)
