@@ -14,7 +14,6 @@ from ..figures import remove_drawn
 from .options import (
     FAILED,
     FMU_FAILED,
-    INTERRUPTED,
     OK,
     Dpi,
     FigureFormat,
@@ -29,6 +28,7 @@ from .options import (
     Swap,
     With,
     draw_as,
+    interrupted,
     load_system,
 )
 from .printing import and_figures, open_console, say, show_comparison, show_progress
@@ -69,7 +69,7 @@ def compare(
 
     Variants: each SCENARIO as it stands, then under each --preset, then with each --swap. Several changes to one
     variant are parted by commas: --swap cruise=A,train=B. Exit codes: 0 fine; 1 a requirement failed in a variant; 2
-    the input is wrong; 3 a variant failed; 130 interrupted.
+    the input is wrong; 3 a variant failed; 130 interrupted by Ctrl-C, 143 by SIGTERM, 129 by SIGHUP.
     """
     systems = variants(
         scenarios,
@@ -95,7 +95,7 @@ def compare(
     )
     show_comparison(comparison, quiet)
     if comparison.interrupted:
-        raise typer.Exit(INTERRUPTED)
+        raise typer.Exit(interrupted(comparison.interrupted))
     if comparison.broken:
         raise typer.Exit(FMU_FAILED)
     raise typer.Exit(FAILED if comparison.requirement_failed else OK)

@@ -13,7 +13,12 @@ from ..master import ALGORITHMS
 from ..scenario import load, parse_value
 from ..system import System
 
-OK, FAILED, WRONG_INPUT, FMU_FAILED, INTERRUPTED = 0, 1, 2, 3, 130
+OK, FAILED, WRONG_INPUT, FMU_FAILED = 0, 1, 2, 3
+
+
+def interrupted(number: int) -> int:
+    """The exit code of a command that was ended by a signal, by the convention of shells: 130 for Ctrl-C."""
+    return 128 + number
 
 
 class KindName(StrEnum):

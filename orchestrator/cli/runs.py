@@ -31,7 +31,6 @@ from ..run import (
 from ..scenario import load
 from .options import (
     FAILED,
-    INTERRUPTED,
     OK,
     Algorithm,
     Dpi,
@@ -47,6 +46,7 @@ from .options import (
     Swap,
     With,
     draw_as,
+    interrupted,
     load_system,
 )
 from .printing import (
@@ -117,7 +117,8 @@ def run(
 
     Exit codes: 0 fine; 1 a requirement failed, a known value was missed, or --verify-step found the step too coarse;
     2 the input is wrong; 3 an FMU failed, or what the FMUs exchange does not settle (what was computed is on disk);
-    130 interrupted by Ctrl-C (what was computed is on disk).
+    130 interrupted by Ctrl-C, 143 by SIGTERM, 129 by SIGHUP (what was computed is on disk). A second Ctrl-C ends it at
+    once, also where an FMU does not return.
     """
     how: Any = {"figures": not no_figures, "threads": threads, "checkpoint_every": checkpoint_every}
     if resume_from is not None:
@@ -169,8 +170,9 @@ def _at_half_the_step(outcome: Run, kind: KindName, quiet: bool) -> Run | None:
 
 
 def _exit_code(outcome: Run, second: Run | None, verdict: StepCheck | None) -> int:
-    if "interrupted" in (outcome.status, second and second.status):
-        return INTERRUPTED
+    for ended in (outcome, second):
+        if ended is not None and ended.status == "interrupted":
+            return interrupted(ended.signal)
     coarse = verdict is not None and verdict.verdict == "too coarse"
     return FAILED if outcome.failed or coarse else OK
 
@@ -201,7 +203,7 @@ def reproduce(
             if outcome.error is not None:
                 raise outcome.error
             if outcome.status == "interrupted":
-                raise KeyboardInterrupt
+                raise typer.Exit(interrupted(outcome.signal))
             noticed[case.command.removeprefix("orchestrate run ")] = outcome.findings
             found = [*outcome.published, *outcome.references]
             every += found

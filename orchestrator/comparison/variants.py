@@ -125,9 +125,9 @@ class Comparison:
         return any(variant.status == "failed" for variant in self.variants)
 
     @property
-    def interrupted(self) -> bool:
-        """Whether the user stopped it; later variants were not run."""
-        return any(variant.status == "interrupted" for variant in self.variants)
+    def interrupted(self) -> int:
+        """The number of the signal that stopped it, so that later variants were not run; 0 where none did."""
+        return max((variant.run.signal for variant in self.variants if variant.run is not None), default=0)
 
     def verdicts(self) -> dict[str, list[str]]:
         """Verdicts of each requirement over the variants; empty text where a variant has no such requirement."""

@@ -260,6 +260,9 @@ def main(folder: str, door: str) -> None:
     _print_by_lines()
     memory, notes = _shared(folder)
     from ..fmi.binding import SLAVES, read_interface  # noqa: PLC0415 (after the path is set; and what it needs is not the FMU's memory)
+    from ..fmi.guard import stand_aside  # noqa: PLC0415
+
+    stand_aside()  # this process may end as it likes: the master tells how
 
     name, folder_of_fmu, interface = start["name"], Path(start["folder"]), read_interface(start["interface"])
     before = notes[NOTE_BASE] = _memory_in_use(os.getpid())

@@ -3,6 +3,7 @@
 from .assembly import assembled
 from .checking import Checked, check, describe_stepping, swaps
 from .checkpoint import CHECKPOINT_FILE, read_checkpoint
+from .ending import conclude
 from .execution import at_half_the_step, execute, go_on, resume, run
 from .outcome import Run
 from .record import add_step_check
@@ -28,6 +29,7 @@ __all__ = [
     "at_half_the_step",
     "check",
     "check_step",
+    "conclude",
     "describe_stepping",
     "execute",
     "go_on",

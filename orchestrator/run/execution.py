@@ -221,6 +221,7 @@ def _execute(system: System, job: Job, figures: bool) -> Run:
             outcome.notes += later
             if place is not None:
                 record_file.add(place.path, notes=_all_notes(outcome))
+    session.interruption.pass_on()
     return outcome
 
 
@@ -230,6 +231,7 @@ def _completed(session: Session, figures: bool) -> Run:
     place = job.place
     directory = None if place is None else place.given
     outcome = Run(checked.system, session.results(), session.status, checked, error=session.error, directory=directory)
+    outcome.signal = session.interruption.number
     outcome.coupling, outcome.seconds = session.coupling, session.seconds
     outcome.findings = session.findings(outcome.results)
     if outcome.error is not None and outcome.status == "failed":

@@ -31,6 +31,7 @@ class Run(Mapping[str, NDArray[Any]]):
         published: what a source printed, beside what was measured. references: the same for values of one's own.
         status: ``"completed"``, ``"terminated"`` (an FMU asked for the end), ``"interrupted"`` or ``"failed"``; error:
             why it failed or ended early.
+        signal: the number of the signal that interrupted it; 0 where none did.
         checked: models, wiring, order, and the notes a user should read.
         directory: where the files are, if there are any. figures: those that were drawn.
         coupling: how the master's iterations, step sizes, loops and events went, where there were any.
@@ -49,6 +50,7 @@ class Run(Mapping[str, NDArray[Any]]):
     references: list[ComparedValue] = field(default_factory=list)
     figures: list[Path] = field(default_factory=list)
     error: RunError | None = None
+    signal: int = 0
     coupling: dict[str, Any] = field(default_factory=dict)
     findings: list[Finding] = field(default_factory=list)
     notes: list[str] = field(default_factory=list)

@@ -3,8 +3,6 @@
 from __future__ import annotations
 
 import math
-import signal
-import threading
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import AbstractContextManager, contextmanager
 from dataclasses import dataclass
@@ -16,6 +14,7 @@ from .. import world
 from ..errors import RollbackError, RunError, StoppedError
 from ..evaluation import Signals, needed_signals
 from ..fmi import Interface, Kind, Slave
+from ..fmi.guard import run_guarded
 from ..master import ALGORITHMS, Master, Rows
 from ..times import slack
 from . import record as record_file
@@ -23,6 +22,7 @@ from .assembly import assembled
 from .checking import Checked, signal_names
 from .checkpoint import Checkpoint
 from .directory import RunDirectory
+from .ending import Interruption
 from .outcome import Status
 from .recording import Due, Recording, Results, Telling, check_stored
 from .watching import Finding, Watching
@@ -79,7 +79,7 @@ class Session:
         self._recording: Recording | None = None
         self._watching: Watching | None = None
         self._slaves: Mapping[str, Slave] = {}
-        self._stopped = threading.Event()
+        self.interruption = Interruption(self._abandon)
         self._restoring: list[str] = []
         self._is_complete = False
 
@@ -93,7 +93,8 @@ class Session:
         Raises:
             ScenarioError: initial values do not settle.
         """
-        with _interruptible(self._stopped):
+        place = None if self.job.place is None else self.job.place.path
+        with self.interruption.listening(), run_guarded(self._lose, place):
             try:
                 while not self._attempt(begin, complete):
                     pass
@@ -120,8 +121,27 @@ class Session:
 
     def _assembled(self) -> AbstractContextManager[Master]:
         return assembled(
-            self.checked, threads=self.job.threads, restoring=self._restoring, stopped=self._stopped.is_set
+            self.checked,
+            threads=self.job.threads,
+            restoring=self._restoring,
+            stopped=lambda: self.interruption.is_asked_for,
         )
+
+    def _lose(self, error: RunError) -> None:
+        """An FMU is about to end the process: keep what there is."""
+        self._save("failed", str(error))
+
+    def _abandon(self, why: str) -> None:
+        """The process is about to end, because an FMU does not return: keep what there is."""
+        self._save("interrupted", why)
+
+    def _save(self, status: Status, why: str) -> None:
+        """Bring to the disk what was recorded, and how the run has ended, unless all that is done."""
+        if self._is_complete or self.job.place is None:
+            return
+        if self._recording is not None:
+            self._recording.flush()
+        record_file.add(self.job.place.path, status=status, error=why)
 
     @contextmanager
     def _ending(self) -> Iterator[None]:
@@ -230,7 +250,7 @@ class Session:
     def _observer(self, master: Master, due: Due, count: int) -> Callable[[int, Rows], bool]:
         assert self._recording is not None
         assert self._watching is not None
-        system, stopped, progress = self.system, self._stopped, self.job.progress
+        system, interruption, progress = self.system, self.interruption, self.job.progress
         recording, watching = self._recording, self._watching
         last = system.stepping.stop_time - 0.5 * system.stepping.step
         percent = 0.01 * (system.stepping.stop_time - system.stepping.start_time)
@@ -250,7 +270,7 @@ class Session:
             if progress is not None and (reached > told or world.monotonic() - shown > 0.1 or time >= last):
                 shown, told = world.monotonic(), reached
                 progress(time, system.stepping.stop_time)
-            if not stopped.is_set():
+            if not interruption.is_asked_for:
                 return True
             if time < last and not (len(kept) and kept[-1][0] == time):
                 recording.see((), [[time, *master.values]])  # the point at which the run was stopped
@@ -329,22 +349,3 @@ def rows_before(job: Job) -> list[int]:
     if job.begin is None or job.place is None:
         return [0, 0]
     return check_stored(job.place.path, record_file.read(job.place.path), job.begin.marks)
-
-
-@contextmanager
-def _interruptible(stopped: threading.Event) -> Iterator[None]:
-    """Turn Ctrl-C into an event that is looked at between steps: never inside an FMU, and nothing is lost."""
-    if threading.current_thread() is not threading.main_thread():
-        yield
-        return
-    before = signal.getsignal(signal.SIGINT)
-
-    def stop(*_: Any) -> None:
-        stopped.set()
-        signal.signal(signal.SIGINT, before)  # a second Ctrl-C does not wait
-
-    signal.signal(signal.SIGINT, stop)
-    try:
-        yield
-    finally:
-        signal.signal(signal.SIGINT, before)

@@ -15,6 +15,7 @@ import fmpy
 
 from ... import world
 from ...errors import FmuFileError
+from ..guard import guarded, loading, unload
 from ..interface import Interface
 
 Signatures = Mapping[str, tuple[Any, ...]]
@@ -34,7 +35,8 @@ class Library:
         here = os.getcwd()
         os.chdir(path.parent)  # where some libraries look for others
         try:
-            self._dll = world.load_library(str(path))
+            with loading(path):
+                self._dll = world.load_library(str(path))
         except OSError as error:
             raise OSError(f"Failed to load shared library {path}. {error}") from error
         finally:
@@ -42,8 +44,9 @@ class Library:
         self.path = path
         self.users = 0
         bound = {name: self._bind(prefix + name, types) for name, types in signatures.items()}
-        self.functions = {name: function for name, function in bound.items() if function is not None}
-        self.addresses = {name: address(function) for name, function in self.functions.items()}
+        there = {name: function for name, function in bound.items() if function is not None}
+        self.addresses = {name: address(function) for name, function in there.items()}
+        self.functions = {name: guarded(function, self.addresses[name], name) for name, function in there.items()}
 
     def _bind(self, name: str, types: tuple[Any, ...]) -> Any:
         try:
@@ -72,7 +75,7 @@ class Library:
                 return False
             world.sleep(_LOOK)
             patience -= _LOOK
-        fmpy.freeLibrary(self._dll._handle)
+        unload(self._dll._handle)
         return True
 
 

@@ -17,6 +17,7 @@ from pathlib import Path
 from typing import Any, ClassVar
 
 from ...errors import FmuError
+from ..guard import dismiss, introduce, noted
 from ..interface import Interface, Type
 from ..slave import STATUS, Channel
 from .arrays import prepared
@@ -82,13 +83,15 @@ class LoadedSlave(Stepping):
         # pythonfmu passes even its errors on only while debug logging is on; others then flood us with details.
         self._talks = interface.annotation is not None or "pythonfmu" in interface.generator.lower()
         prefix = f"{interface.identifier}_" if self.PREFIXED else ""
+        introduce(id(self), self, interface.model)
         try:
-            with self._carefully():
+            with self._carefully(), noted(self, "loading"):
                 self._library = open_library(library(folder, interface, interface.model), self.SIGNATURES, prefix)
                 self.functions, self._addresses = self._library.functions, self._library.addresses
                 self.pointer = self._instantiate(folder) or self._ask_why(folder)
             if not self.pointer:
                 raise RuntimeError("it gives no instance" + ("" if self.log else _NO_INSTANCE))
+            introduce(self.pointer, self, interface.model)
             self._do_step = self.function(self.DO_STEP)
         except Exception as error:
             self._release()
@@ -176,6 +179,11 @@ class LoadedSlave(Stepping):
         """Stop a step under way, without which an FMU must not be freed; where that fails, it is left alone."""
         cancel = self.functions.get(self.CANCEL)
         self._dead = cancel is None or cancel(self.pointer) not in (OK, WARNING)
+
+    def lose(self, what: str) -> FmuError:
+        """It has left a call instead of returning from it, and must not be called any more: the error of that."""
+        self._dead = True
+        return FmuError(what, instance=self.name, time=self.time, log=self.log)
 
     def refuse(self, what: str) -> FmuError:
         """An error about something that this FMU does not do."""
@@ -306,14 +314,19 @@ class LoadedSlave(Stepping):
         """
         with kept(self.tell):
             if not self._dead and self._library is not None:
-                self.function(self.FREE)(self.pointer)
-            self._release()
+                try:
+                    self.function(self.FREE)(self.pointer)
+                except FmuError as error:
+                    self.disturbed[without_head(error)] = None
+            with noted(self, "unloading"):
+                self._release()
 
     def _release(self) -> None:
         if not self._dead and self._library is not None:
             if not close_library(self._library):
                 self.disturbed["left threads behind: its library stays loaded"] = None
             self._library = None
+        dismiss(self)
         for key in self._keys:
             if LOGS.get(key) is self.log:
                 del LOGS[key]

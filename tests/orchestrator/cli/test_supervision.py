@@ -9,6 +9,8 @@ import time
 
 import psutil
 import pytest
+from railcosim.orchestrator.cli import supervision
+from railcosim.orchestrator.fmi.guard import NOTES, notes
 
 pytestmark = pytest.mark.skipif(sys.platform != "linux", reason="commands are supervised on Linux")
 CODE = """
@@ -92,3 +94,71 @@ def test_ctrl_c_in_a_terminal_comes_once():
     _, status = os.waitpid(child, 0)
     os.close(terminal)
     assert os.waitstatus_to_exitcode(status) == 1
+
+
+@pytest.fixture
+def seen(monkeypatch):
+    """As if an FMU's function had been called when the process ended."""
+    monkeypatch.setattr(supervision, "NOTES", notes.Notes())
+    found = [notes.Seen("train[1]", "Lag", "fmi2DoStep", 3.0)]
+    monkeypatch.setattr(supervision.NOTES, "under_way", lambda: found)
+    supervision.NOTES.directory = "out"
+    told = []
+    monkeypatch.setattr(supervision, "conclude", lambda *arguments: told.append(arguments))
+    return told
+
+
+@pytest.mark.parametrize(
+    ("code", "said"), [(0, "ended the process (exit code 0)"), (-signal.SIGSEGV, "crashed (SIGSEGV)")]
+)
+def test_who_ended_the_process_is_named_and_noted(seen, capsys, code, said):
+    assert supervision._untimely(7, code, ()) == 3
+    who = "train[1] (Lag) in fmi2DoStep at t = 3 s"
+    assert capsys.readouterr().err == f"error: {who} {said}; --isolate keeps that to itself\n"
+    ((directory, child, status, why),) = seen
+    assert (str(directory), child, status, why) == ("out", 7, "failed", f"{who} {said}")
+
+
+def test_who_does_not_return_is_named_and_noted(seen, capsys):
+    assert supervision._interrupted(7, signal.SIGTERM) == 128 + signal.SIGTERM
+    why = "interrupted: train[1] (Lag) in fmi2DoStep at t = 3 s does not return"
+    assert capsys.readouterr().err == f"error: {why}; --isolate keeps that to itself\n"
+    assert seen[0][2:] == ("interrupted", why)
+
+
+def test_a_command_that_hears_nothing_is_ended_after_the_second_signal(monkeypatch):
+    monkeypatch.setattr(supervision, "_PATIENCE", 0.05)
+    monkeypatch.setattr(supervision, "_TOGETHER", 0.0)
+    awaited = {signal.SIGTERM, signal.SIGCHLD}
+    before = signal.pthread_sigmask(signal.SIG_BLOCK, awaited)
+    child = os.fork()
+    if child == 0:  # where both stay blocked
+        for _ in range(2):
+            os.kill(os.getppid(), signal.SIGTERM)
+            time.sleep(0.02)
+        time.sleep(60.0)
+        os._exit(0)
+    try:
+        status, asked = supervision._outlived(child, awaited)
+    finally:
+        signal.pthread_sigmask(signal.SIG_SETMASK, before)
+    assert (os.waitstatus_to_exitcode(status), asked) == (-signal.SIGKILL, signal.SIGTERM)
+
+
+@pytest.mark.parametrize("number", [signal.SIGHUP])
+def test_a_signal_that_is_ignored_stays_ignored(number):
+    """As nohup and shells have it for what runs in the background."""
+    work = "print('ready', flush=True); time.sleep(0.3)"
+    code = f"import signal; signal.signal({int(number)}, signal.SIG_IGN)" + CODE.replace("WORK", work)
+    with subprocess.Popen([sys.executable, "-c", code], stdout=subprocess.PIPE, text=True) as process:
+        process.stdout.readline()
+        process.stdout.readline()
+        process.send_signal(number)
+        process.send_signal(number)
+        assert process.wait(30) == 7
+
+
+def test_what_a_command_has_decided_on_is_said_by_nobody_else():
+    work = "from railcosim.orchestrator.fmi.guard import NOTES; NOTES.decide(130); os._exit(130)"
+    assert end_of(start(work)) == (130, "")
+    assert NOTES.decided is None
