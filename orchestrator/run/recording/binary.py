@@ -19,6 +19,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ... import world
+from ...errors import naming
 from .words import Words
 
 NEW = ".new"
@@ -168,9 +169,10 @@ class RowsFile:
         count = max(0, min(last, self.count) - first)
         os.lseek(self._file, self._begin + first * self._row, os.SEEK_SET)
         wanted, pieces = count * self._row, []
-        while wanted and (piece := world.read(self._file, wanted)):
-            pieces.append(piece)
-            wanted -= len(piece)
+        with naming(self._path):
+            while wanted and (piece := world.read(self._file, wanted)):
+                pieces.append(piece)
+                wanted -= len(piece)
         if wanted:
             raise OSError(errno.EIO, "it has become shorter", str(self._path))
         numbers = np.frombuffer(b"".join(pieces) if len(pieces) != 1 else pieces[0], _FLOAT)
