@@ -53,7 +53,8 @@ _ENTRY = np.dtype(
 _CHANGES = np.dtype(
     [("active", "i8"), ("place", "i8"), ("is_real", "i8"), *((n, "f8") for n in ("scale", "offset", "slope", "since"))]
 )
-_OPERATION = np.dtype([(name, "i4") for name in ("kind", "index", "period", "phase", "rank", "is_watched")])
+_OPERATION = np.dtype([(name, "i4") for name in ("kind", "index", "period", "phase", "is_watched")])
+_PLACE = np.dtype([(name, "i8") for name in ("begin", "failed", "status")])
 
 _Entry = tuple[int, int, int, float, float, int, float]
 
@@ -83,17 +84,17 @@ class CompiledLoop:
         self._slaves = {name: slave for name, slave in coupling.slaves.items() if isinstance(slave, FmuSlave)}
         self._whole = [place for place, kind in enumerate(self._exchange.kinds) if kind != "Real"]
         is_shared = kernel.HAS_THREADS and algorithm.takes_threads
-        self.threads = min(coupling.settings.threads, len(self._slaves)) if is_shared else 1
+        self.threads = max(1, min(coupling.settings.threads, len(self._slaves))) if is_shared else 1
         ends: list[int] = []
         for batch in algorithm.batches():
-            for share in np.array_split(list(batch.names), max(1, self.threads)):
+            for share in np.array_split(list(batch.names), self.threads):
                 self._add(list(share), batch.operations)
                 ends.append(len(self._operations))
         self._plan = (
             np.array(
                 [
-                    (*operation, rank, is_watched(slave))
-                    for operation, rank, (slave, _) in zip(self._operations, self._ranks(), self._culprits, strict=True)
+                    (*operation, is_watched(slave))
+                    for operation, (slave, _) in zip(self._operations, self._culprits, strict=True)
                 ],
                 _OPERATION,
             ),
@@ -110,14 +111,9 @@ class CompiledLoop:
             for name in names:
                 add[operation](self._slaves[name], self._coupling.settings.rates.get(name, 1))
 
-    def _ranks(self) -> list[int]:
-        """Where each operation would stand without threads, so that of two that fail the first is told."""
-        stage = {Operation.SET: 0, Operation.STEP: 1, Operation.GET: 2, _CHANGE: 2}
-        numbers = range(len(self._operations))
-        if self.threads > 1:
-            order = sorted(numbers, key=lambda n: (stage[self._operations[n][0]], n))
-            return [rank for rank, _ in sorted(enumerate(order), key=lambda pair: pair[1])]
-        return list(numbers)
+    def _rank(self, operation: int) -> tuple[bool, int]:
+        """Where an operation of several that failed would stand without threads: all are set before any steps."""
+        return self._operations[operation][0] != Operation.SET, operation
 
     def _add_operation(self, kind: int, index: int, culprit: tuple[FmuSlave | None, str], due: tuple[int, int]) -> None:
         self._operations.append((kind, index, *due))
@@ -187,6 +183,9 @@ class CompiledLoop:
         """
         coupling, exchange = self._coupling, self._exchange
         done, stop, count = points
+        places = np.zeros(self.threads, _PLACE)
+        places["failed"] = -1
+        disturbed = np.zeros(len(self._operations), np.uint8)
         values = np.array(exchange.values, dtype=np.float64)
         history, newest = self._unrolled(len(values))
         changes = np.array(
@@ -196,19 +195,18 @@ class CompiledLoop:
             ],
             dtype=_CHANGES,
         )
-        width, goes_on, block, begin = len(values) + 1, True, 1, 0
+        width, goes_on, block = len(values) + 1, True, 1
         while done < stop and goes_on:
             block = min(block, stop - done, max(1, _MOST_VALUES // width) * every)
             rows = np.empty((_rows_due(done, block, every, count), width))
-            clock_begin = world.perf_counter()
-            taken, written, failed, status, newest, disturber = kernel.run(
-                *self._plan, changes, values, history, newest, rows, every, start_time, step, done, block, count, begin
+            begin = world.perf_counter()
+            taken, written, newest = kernel.run(
+                *(*self._plan, changes, values, history, newest, rows, places, disturbed),
+                *(every, start_time, step, done, block, count),
             )
-            seconds = world.perf_counter() - clock_begin
-            begin = 0
+            seconds = world.perf_counter() - begin
             done += taken
-            if disturber >= 0:
-                self._tell_disturber(disturber)
+            self._tell_disturbers(disturbed)
             coupling.steps, coupling.time = done, start_time + done * step
             exchange.values[:] = values.tolist()
             for place in self._whole:  # the kernel's values are all doubles
@@ -216,18 +214,19 @@ class CompiledLoop:
             if taken:
                 self._roll(history, newest)
                 goes_on = observe(done, rows[:written])
-            if failed >= 0:
-                self._recover(failed, status, start_time + done * step, step)
-                begin = failed + 1  # the step goes on where it was left
+            if goes_on:
+                self._go_on(places, start_time + done * step, step)
             block = max(1, int(taken * min(_BLOCK_SECONDS / max(seconds, 1e-9), _GROWTH)))
         for slave in coupling.slaves.values():
             slave.time = start_time + done * step
         return goes_on
 
-    def _tell_disturber(self, operation: int) -> None:
-        slave = self._culprits[operation][0]
-        if slave is not None:
-            slave.mend()
+    def _tell_disturbers(self, disturbed: NDArray[np.uint8]) -> None:
+        for operation in np.flatnonzero(disturbed):
+            slave = self._culprits[operation][0]
+            if slave is not None:
+                slave.mend()
+        disturbed[:] = 0
 
     def _unrolled(self, width: int) -> tuple[NDArray[np.float64], int]:
         """The recorded points that delayed connections look back on, as the kernel's ring, and its newest row."""
@@ -239,12 +238,20 @@ class CompiledLoop:
         if len(history):
             self._exchange.history.extend(np.roll(history, -newest - 1, axis=0).tolist())
 
+    def _go_on(self, places: NDArray[np.void], time: float, step: float) -> None:
+        """After the first failure of a step let its part of the step go on; those after it wait for their turn."""
+        failed: list[int] = places["failed"].tolist()
+        if max(failed) >= 0:
+            part = min((n for n, operation in enumerate(failed) if operation >= 0), key=lambda n: self._rank(failed[n]))
+            self._recover(failed[part], int(places[part]["status"]), time, step)
+            places[part] = failed[part] + 1, -1, 0
+
     def _recover(self, failed: int, status: int, time: float, step: float) -> None:
         """Go on where an FMU discarded a step that it takes in parts; raise what happens in Python otherwise."""
         slave, call = self._culprits[failed]
         assert slave is not None
         period, phase = self._operations[failed][2:]
-        if call == "fmi2DoStep" and status == _DISCARD and self.threads <= 1:
+        if call == "fmi2DoStep" and status == _DISCARD:
             slave.resume(time, period * step, status, final=True)
             return
         if call.startswith("fmi2Set") and 0 <= status <= 1:  # a number that C's int does not hold

@@ -14,11 +14,12 @@ def run(
     history: Any,
     newest: int,
     rows: Any,
+    places: Any,
+    disturbed: Any,
     every: int,
     start: float,
     step: float,
     first: int,
     count: int,
     last: int,
-    begin: int,
-) -> tuple[int, int, int, int, int, int]: ...
+) -> tuple[int, int, int]: ...

@@ -273,8 +273,23 @@ def arrays(compile_c, tmp_path):
 
 
 @pytest.fixture
-def odd(compile_c, tmp_path):
+def odd(odd_fmu, tmp_path):
     """The FMU of odd.c: y depends directly on v."""
+    return odd_fmu(tmp_path)
+
+
+@pytest.fixture(scope="session")
+def odd_fmu(compile_c):
+    """Writes the FMU of odd.c into a folder; ``able`` are the abilities that it is said to have."""
+
+    def write(folder, *able):
+        simulation = " ".join(f'{name}="true"' for name in able)
+        return str(write_archive(folder / "odd.fmu", _odd_files(compile_c("odd.c"), simulation)))
+
+    return write
+
+
+def _odd_files(binary, simulation):
     v, discrete = variable, {"variability": "discrete"}
     shown = [
         v("u", "input", start=0.0, unit="m"),
@@ -287,11 +302,11 @@ def odd(compile_c, tmp_path):
         v("off", "output", "Boolean", **discrete),
         v("mode", "parameter", "Integer", 0, variability="tunable"),
     ]
-    files = {
-        "modelDescription.xml": description(shown, '<Unit name="m"><BaseUnit m="1"/></Unit>', identifier="Odd"),
-        f"binaries/{fmpy.platform}/Odd{fmpy.sharedLibraryExtension}": compile_c("odd.c"),
+    unit = '<Unit name="m"><BaseUnit m="1"/></Unit>'
+    return {
+        "modelDescription.xml": description(shown, unit, identifier="Odd", simulation=simulation),
+        f"binaries/{fmpy.platform}/Odd{fmpy.sharedLibraryExtension}": binary,
     }
-    return str(write_archive(tmp_path / "odd.fmu", files))
 
 
 @pytest.fixture

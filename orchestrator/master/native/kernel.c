@@ -21,13 +21,15 @@
 #include <string.h>
 
 /* Buffers in the sequence of the arguments, and the size of what they hold; `values` and what follows is written. */
-enum { OPERATIONS, PARTS, CHANNELS, INSTANCES, ENTRIES, REFERENCES, CHANGES, VALUES, HISTORY, ROWS, N_BUFFERS };
+enum { OPERATIONS, PARTS, CHANNELS, INSTANCES, ENTRIES, REFERENCES, CHANGES, VALUES, HISTORY, ROWS, PLACES, DISTURBED, N_BUFFERS };
 static const char *const buffer_names[N_BUFFERS] = {
     "operations", "parts", "channels", "instances", "entries", "references", "changes", "values", "history", "rows",
+    "places", "disturbed",
 };
 static const size_t buffer_sizes[N_BUFFERS] = {
     sizeof(Operation), sizeof(int64_t), sizeof(Channel), sizeof(Instance), sizeof(Entry),
     sizeof(unsigned),  sizeof(Change),  sizeof(double),  sizeof(double),   sizeof(double),
+    sizeof(Place),     sizeof(unsigned char),
 };
 
 static size_t length(const Py_buffer *buffers, int which)
@@ -49,6 +51,10 @@ static int check_buffers(const Py_buffer *buffers)
     }
     if (length(buffers, REFERENCES) != length(buffers, ENTRIES)) {
         PyErr_SetString(PyExc_ValueError, "kernel: there must be a reference for each of the entries");
+        return 0;
+    }
+    if (length(buffers, DISTURBED) != length(buffers, OPERATIONS)) {
+        PyErr_SetString(PyExc_ValueError, "kernel: there must be a mark for each of the operations");
         return 0;
     }
     size_t value_count = length(buffers, VALUES);
@@ -97,7 +103,6 @@ static int resolve(const Plan *plan, const Py_buffer *buffers, const Operation *
     *group = (Group){.begin = call, .end = call + 1};
     group->period = operation->period;
     group->phase = operation->phase;
-    group->rank = operation->rank;
     group->is_watched = operation->is_watched;
     *call = (Call){0};
     if (operation->period < 1 || operation->phase < 0 || operation->phase >= operation->period) {
@@ -150,11 +155,12 @@ static int resolve(const Plan *plan, const Py_buffer *buffers, const Operation *
     return group->function != 0;
 }
 
-/* Whether the calls of `b` are like those of `a`, and follow them. */
+/* Whether calls are alike; one after which to look at how numbers are rounded stands alone. */
 static int are_alike(const Group *a, const Group *b)
 {
-    return a->rank + (int32_t)(a->end - a->begin) == b->rank && a->kind == b->kind && a->function == b->function && a->count == b->count && a->period == b->period &&
-           a->phase == b->phase && (a->count == 0 || memcmp(a->references, b->references, a->count * sizeof *a->references) == 0);
+    return !b->is_watched && a->kind == b->kind && a->function == b->function && a->count == b->count &&
+           a->period == b->period && a->phase == b->phase &&
+           (a->count == 0 || memcmp(a->references, b->references, a->count * sizeof *a->references) == 0);
 }
 
 static void free_plan(Plan *plan)
@@ -178,12 +184,27 @@ static int check_parts(Plan *plan, const Py_buffer *buffers, size_t count)
         PyErr_SetString(PyExc_ValueError, "kernel: the parts must end one after the other, the last with the operations");
         return 0;
     }
+    plan->ends = ends;
     plan->thread_count = n == 1 ? 1 : (int)(n / 2);
     plan->bounds = calloc(n + 1, sizeof *plan->bounds);
     if (plan->bounds == NULL) {
         PyErr_NoMemory();
     }
     return plan->bounds != NULL;
+}
+
+/* 0 with an exception unless there is a place for each thread, among the operations. */
+static int check_places(const Plan *plan, const Py_buffer *buffers, size_t count)
+{
+    const Place *places = buffers[PLACES].buf;
+    int is_sound = length(buffers, PLACES) == (size_t)plan->thread_count;
+    for (int n = 0; is_sound && n < plan->thread_count; n++) {
+        is_sound = is_within(places[n].begin, 0, count);
+    }
+    if (!is_sound) {
+        PyErr_SetString(PyExc_ValueError, "kernel: each thread must have a place among the operations");
+    }
+    return is_sound;
 }
 
 /* 0 with an exception if the plan is not sound. */
@@ -198,8 +219,9 @@ static int make_plan(Plan *plan, const Py_buffer *buffers, Py_ssize_t newest)
     plan->depth = plan->value_count ? length(buffers, HISTORY) / plan->value_count : 0;
     plan->newest = (size_t)newest;
     plan->changes = buffers[CHANGES].buf;
+    plan->disturbed = buffers[DISTURBED].buf;
     plan->largest = 1;
-    if (!check_parts(plan, buffers, count)) {
+    if (!check_parts(plan, buffers, count) || !check_places(plan, buffers, count)) {
         return 0;
     }
     plan->calls = calloc(count + 1, sizeof *plan->calls);
@@ -285,13 +307,13 @@ static int take(Plan *plan, const Block *block, Outcome *outcome)
 }
 
 PyDoc_STRVAR(run_doc,
-    "run(operations, parts, channels, instances, entries, references, changes, values, history, newest, rows, every,\n"
-    "    start, step, first, count, last, begin) -> (done, written, failed, status, newest, disturber)\n\n"
-    "Take up to `count` communication steps from number `first`, and from operation `begin` of that step, which one\n"
-    "that failed may have left undone. Rows (time, values) are written for every `every`-th\n"
-    "step and for step number `last`; the block ends before a row for which there is no room. `failed` is the operation\n"
-    "that ended the block, -1 if none did, and `status` its FMI status; of ok or warning, a value is not finite. `disturber` is an\n"
-    "operation after which numbers were rounded in another way, which was put back, or -1.");
+    "run(operations, parts, channels, instances, entries, references, changes, values, history, newest, rows, places,\n"
+    "    disturbed, every, start, step, first, count, last) -> (done, written, newest)\n\n"
+    "Take up to `count` communication steps from number `first`. Rows (time, values) are written for every `every`-th\n"
+    "step and for step number `last`; the block ends before a row for which there is no room, and where an operation\n"
+    "fails. `places` say for each thread with which operation its part of the first step begins, and whether it waits\n"
+    "because one has failed; then how far the step that was left has got. In `disturbed` the operations are marked after\n"
+    "which numbers were rounded in another way, which was put back.");
 
 static PyObject *run(PyObject *module, PyObject *arguments)
 {
@@ -300,25 +322,24 @@ static PyObject *run(PyObject *module, PyObject *arguments)
     Py_ssize_t newest;
     PyObject *result = NULL;
     (void)module;
-    Py_ssize_t from;
-    if (!PyArg_ParseTuple(arguments, "y*y*y*y*y*y*y*w*w*nw*LddLLLn:run", &b[OPERATIONS], &b[PARTS], &b[CHANNELS], &b[INSTANCES],
-                          &b[ENTRIES], &b[REFERENCES], &b[CHANGES], &b[VALUES], &b[HISTORY], &newest, &b[ROWS],
-                          &block.every, &block.start, &block.step, &block.first, &block.count, &block.last, &from)) {
+    if (!PyArg_ParseTuple(arguments, "y*y*y*y*y*y*y*w*w*nw*w*w*LddLLL:run", &b[OPERATIONS], &b[PARTS], &b[CHANNELS],
+                          &b[INSTANCES], &b[ENTRIES], &b[REFERENCES], &b[CHANGES], &b[VALUES], &b[HISTORY], &newest,
+                          &b[ROWS], &b[PLACES], &b[DISTURBED], &block.every, &block.start, &block.step, &block.first,
+                          &block.count, &block.last)) {
         return NULL;
     }
     Plan plan = {0};
     if (check_buffers(b) && make_plan(&plan, b, newest)) {
         if (block.every < 1 || block.first < 0 || block.count < 0 || block.count > INT64_MAX - block.first ||
-            newest < 0 || from < 0 || (plan.depth > 0 && plan.newest >= plan.depth)) {
-            PyErr_SetString(PyExc_ValueError, "kernel: every, first, count, newest and begin must fit the plan");
+            newest < 0 || (plan.depth > 0 && plan.newest >= plan.depth)) {
+            PyErr_SetString(PyExc_ValueError, "kernel: every, first, count and newest must fit the plan");
         } else {
             Outcome outcome;
-            block.from = (size_t)from;
+            block.places = b[PLACES].buf;
             block.rows = b[ROWS].buf;
             block.capacity = length(b, ROWS) / (plan.value_count + 1);
             if (take(&plan, &block, &outcome)) {
-                result = Py_BuildValue("(LnLinL)", outcome.done, (Py_ssize_t)outcome.written, (long long)outcome.failed,
-                                       outcome.status, (Py_ssize_t)plan.newest, (long long)outcome.disturber);
+                result = Py_BuildValue("(Lnn)", outcome.done, (Py_ssize_t)outcome.written, (Py_ssize_t)plan.newest);
             }
         }
     }

@@ -61,9 +61,16 @@ typedef struct {
     int32_t index;  /* of the channel, instance or change */
     int32_t period; /* it is due in every so manyth step, */
     int32_t phase;  /* in those with this rest */
-    int32_t rank;   /* where it would stand if all were done one after the other */
     int32_t is_watched; /* whether it may change how numbers are rounded */
 } Operation;
+
+/* How far a part of a step that was left has got; each thread has one. The others go on with a part that has failed only
+   when it is said to have not: by who knows what comes first, and whether it can be helped. */
+typedef struct {
+    int64_t begin;  /* operation to go on with */
+    int64_t failed; /* the one that failed, or -1 */
+    int64_t status; /* of its call; ok or warning: a value is not finite, or none that C's int holds */
+} Place;
 
 /* ------------------------------------------------------------------------------------------------ the plan, as it runs */
 
@@ -85,7 +92,6 @@ typedef struct {
     size_t count; /* of the references */
     int32_t period;
     int32_t phase;
-    int32_t rank; /* of the first call; they follow each other */
     int32_t is_watched;
     Call *begin;
     Call *end;
@@ -97,6 +103,7 @@ typedef struct {
     size_t group_count;
     size_t largest; /* channel, in values */
     size_t *bounds; /* groups of each part: those of part n are from bounds[n] to bounds[n + 1] */
+    const int64_t *ends; /* and where its operations end */
     int thread_count;
     double *values;
     size_t value_count;
@@ -104,6 +111,7 @@ typedef struct {
     size_t depth;
     size_t newest; /* the ring's newest row */
     const Change *changes;
+    unsigned char *disturbed; /* by operation, whether numbers were rounded in another way after it */
     unsigned control; /* how numbers are rounded when the block begins, as `float_control` has it, */
     fenv_t floats;    /* and all that belongs to it */
 } Plan;
@@ -115,16 +123,12 @@ typedef struct {
     int *integers;
 } Hand;
 
-/* When a communication step is, and how far it got. */
+/* When a communication step is. */
 typedef struct {
     long long number;
     double time;
     double step;
-    int is_due;     /* whether its row is to be written */
-    int64_t failed; /* operation, or -1 */
-    int32_t rank;   /* of the one that failed */
-    int status;
-    int64_t disturber; /* operation after which numbers were rounded in another way, or -1 */
+    int is_due; /* whether its row is to be written */
 } Advance;
 
 /* Which steps to take, and where their rows go. */
@@ -135,18 +139,15 @@ typedef struct {
     long long count;
     long long every;
     long long last; /* number of the step that is recorded whatever `every` says */
-    size_t from;    /* operation with which the first step is taken up */
+    Place *places;  /* of the parts of the first step, which may have been left; then of the one that is left */
     double *rows;
     size_t capacity;
 } Block;
 
-/* How far a block got: steps done, rows written, the operation that failed or -1, and its status. */
+/* How far a block got: steps done, and rows written. */
 typedef struct {
     long long done;
     size_t written;
-    int64_t failed;
-    int status;
-    int64_t disturber; /* the last operation after which numbers were rounded in another way, or -1 */
     long long wait; /* steps to the next row that is due; counted, because to divide takes as long as a light FMU's step */
 } Outcome;
 
@@ -178,13 +179,13 @@ static inline unsigned float_control(void)
 /* That of a block of which nothing is done. */
 Outcome outcome_of(const Block *block);
 
-/* One part of a communication step, from operation number `from` on. */
-void take_part(const Hand *hand, int part, size_t from, Advance *it);
+/* One part of a communication step, from its place on. */
+void take_part(const Hand *hand, int part, const Advance *it, Place *place);
 
 /* The block's next step; 0 if it is at its end, or has no room for the row that would be due. */
 int has_next(const Block *block, const Outcome *outcome, Advance *it);
 
-/* A step has been taken: remember its values, and write its row if it is due. */
+/* A step has been taken: remember its values, write its row if it is due, and let the next one begin at its begin. */
 void finish_step(Plan *plan, const Block *block, const Advance *it, Outcome *outcome);
 
 Outcome take_block(Plan *plan, const Hand *hand, const Block *block);

@@ -175,32 +175,35 @@ static const Call *take_group(const Hand *hand, const Group *group, double time,
     }
 }
 
-void take_part(const Hand *hand, int part, size_t from, Advance *it)
+void take_part(const Hand *hand, int part, const Advance *it, Place *place)
 {
     const Plan *plan = hand->plan;
     const Group *end = plan->groups + plan->bounds[part + 1];
+    Call *from = plan->calls + place->begin;
     for (const Group *group = plan->groups + plan->bounds[part]; group < end; group++) {
-        if (group->period > 1 && it->number % group->period != group->phase) {
+        if (group->end <= from || (group->period > 1 && it->number % group->period != group->phase)) {
             continue;
         }
         Group rest;
         const Group *taken = group;
-        if (from > 0 && group->begin < plan->calls + from) { /* taken up again in the middle */
+        if (group->begin < from) { /* taken up again in the middle */
             rest = *group;
-            rest.begin = plan->calls + from < rest.end ? plan->calls + from : rest.end;
+            rest.begin = from;
             taken = &rest;
         }
-        const Call *call = take_group(hand, taken, it->time, it->step, &it->status);
+        int status = 0;
+        const Call *call = take_group(hand, taken, it->time, it->step, &status);
         if (group->is_watched && float_control() != plan->control) { /* an FMU must not change the numbers of others */
             fesetenv(&plan->floats);
-            it->disturber = group->begin - plan->calls;
+            plan->disturbed[group->begin - plan->calls] = 1; /* a group of its own */
         }
         if (call < group->end) {
-            it->failed = call - plan->calls;
-            it->rank = group->rank + (int32_t)(call - group->begin);
+            place->failed = call - plan->calls;
+            place->status = status;
             return;
         }
     }
+    place->begin = place->begin < plan->ends[part] ? plan->ends[part] : place->begin;
 }
 
 static void remember(Plan *plan)
@@ -213,7 +216,7 @@ static void remember(Plan *plan)
 
 Outcome outcome_of(const Block *block)
 {
-    return (Outcome){.failed = -1, .disturber = -1, .wait = block->every - block->first % block->every};
+    return (Outcome){.wait = block->every - block->first % block->every};
 }
 
 int has_next(const Block *block, const Outcome *outcome, Advance *it)
@@ -227,8 +230,6 @@ int has_next(const Block *block, const Outcome *outcome, Advance *it)
     it->time = block->start + (double)k * block->step;
     it->step = block->step;
     it->is_due = is_due;
-    it->failed = -1;
-    it->disturber = -1;
     return 1;
 }
 
@@ -236,6 +237,9 @@ void finish_step(Plan *plan, const Block *block, const Advance *it, Outcome *out
 {
     outcome->done++;
     outcome->wait = outcome->wait > 1 ? outcome->wait - 1 : block->every;
+    for (int n = 0; n < plan->thread_count; n++) {
+        block->places[n].begin = 0;
+    }
     remember(plan);
     if (it->is_due) {
         double *row = block->rows + outcome->written * (plan->value_count + 1);
@@ -249,15 +253,11 @@ Outcome take_block(Plan *plan, const Hand *hand, const Block *block)
 {
     Outcome outcome = outcome_of(block);
     Advance it;
-    while (has_next(block, &outcome, &it)) {
-        take_part(hand, 0, outcome.done == 0 ? block->from : 0, &it);
-        outcome.disturber = it.disturber < 0 ? outcome.disturber : it.disturber;
-        if (it.failed >= 0) {
-            outcome.failed = it.failed;
-            outcome.status = it.status;
-            break;
+    while (block->places->failed < 0 && has_next(block, &outcome, &it)) {
+        take_part(hand, 0, &it, block->places);
+        if (block->places->failed < 0) {
+            finish_step(plan, block, &it, &outcome);
         }
-        finish_step(plan, block, &it, &outcome);
     }
     return outcome;
 }

@@ -1,8 +1,10 @@
 /* Blocks of steps by several threads, where all instances step at once (`jacobi`).
 
    Of n threads each has a part of the instances: it sets and steps them (part t of the plan), and when all have done that
-   it reads them (part n + t). The first one also keeps the books. They meet several times in a step, so they wait
-   actively. */
+   it reads them (part n + t). The first one also keeps the books. They meet three times in a step, so they wait actively.
+
+   Where one fails the others go on to the end of what they set and step: which of several failures is told is decided
+   by who knows their order. */
 
 #include "kernel.h"
 
@@ -17,9 +19,11 @@ typedef struct {
     Plan *plan;
     const Block *block;
     Outcome outcome;
+    Advance step;
     int count;
+    int is_begun;
     int goes_on;
-    Advance *steps; /* one for each thread */
+    atomic_int is_left; /* whether a thread has not set and stepped all that it has to */
     atomic_int gate; /* 0: wait to begin, 1: begin, -1: not all could be started */
     atomic_int waiting;
     atomic_int meeting;
@@ -49,59 +53,48 @@ static void meet(Team *team)
     }
 }
 
-/* Whether all got through; if not, the outcome is that of the operation that comes first. */
-static int all_succeeded(Team *team)
+/* The first thread's, while the others wait: end the step that was under way, and begin the next; 0 if there is none. */
+static int turn_over(Team *team)
 {
-    const Advance *worst = NULL;
-    for (int n = 0; n < team->count; n++) {
-        const Advance *it = &team->steps[n];
-        team->outcome.disturber = it->disturber < 0 ? team->outcome.disturber : it->disturber;
-        if (it->failed >= 0 && (worst == NULL || it->rank < worst->rank)) {
-            worst = it;
+    for (int n = 0; team->is_begun && n < team->count; n++) {
+        if (team->block->places[n].failed >= 0) {
+            return 0;
         }
     }
-    if (worst != NULL) {
-        team->outcome.failed = worst->failed;
-        team->outcome.status = worst->status;
+    if (team->is_begun) {
+        finish_step(team->plan, team->block, &team->step, &team->outcome);
     }
-    return worst == NULL;
+    team->is_begun = 1;
+    return has_next(team->block, &team->outcome, &team->step);
 }
 
 static void *work(void *argument)
 {
     Member *me = argument;
     Team *team = me->team;
-    Advance *mine = &team->steps[me->number];
-    int gate;
-    while ((gate = atomic_load_explicit(&team->gate, memory_order_acquire)) == 0) {
+    Place *mine = &team->block->places[me->number];
+    while (atomic_load_explicit(&team->gate, memory_order_acquire) == 0) {
         sched_yield();
     }
-    while (gate > 0) {
+    while (atomic_load_explicit(&team->gate, memory_order_relaxed) > 0) {
         if (me->number == 0) {
-            Advance next = {0};
-            team->goes_on = team->outcome.failed < 0 && has_next(team->block, &team->outcome, &next);
-            for (int n = 0; team->goes_on && n < team->count; n++) {
-                team->steps[n] = next;
-            }
+            team->goes_on = turn_over(team);
         }
         meet(team);
         if (!team->goes_on) {
             return NULL;
         }
-        take_part(&me->hand, me->number, 0, mine);
-        meet(team);
-        int failed = 0; /* of those who set and step; nobody is read after that */
-        for (int n = 0; n < team->count; n++) {
-            failed |= team->steps[n].failed >= 0;
+        if (mine->failed < 0) {
+            take_part(&me->hand, me->number, &team->step, mine);
+        }
+        if (mine->failed >= 0) { /* nobody is read before this has been helped */
+            atomic_store_explicit(&team->is_left, 1, memory_order_relaxed);
         }
         meet(team);
-        if (!failed) {
-            take_part(&me->hand, team->count + me->number, 0, mine);
+        if (!atomic_load_explicit(&team->is_left, memory_order_relaxed)) {
+            take_part(&me->hand, team->count + me->number, &team->step, mine);
         }
         meet(team);
-        if (me->number == 0 && all_succeeded(team)) {
-            finish_step(team->plan, team->block, mine, &team->outcome);
-        }
     }
     return NULL;
 }
@@ -111,8 +104,7 @@ int take_block_together(Plan *plan, const Hand *hands, const Block *block, Outco
     int count = plan->thread_count, started = 1;
     Team team = {.plan = plan, .block = block, .outcome = outcome_of(block), .count = count};
     Member *members = calloc((size_t)count, sizeof *members);
-    team.steps = calloc((size_t)count, sizeof *team.steps);
-    int is_fine = members != NULL && team.steps != NULL;
+    int is_fine = members != NULL;
     for (int n = 0; is_fine && n < count; n++) {
         members[n] = (Member){.team = &team, .hand = hands[n], .number = n};
     }
@@ -129,7 +121,6 @@ int take_block_together(Plan *plan, const Hand *hands, const Block *block, Outco
         pthread_join(members[n].thread, NULL);
     }
     free(members);
-    free(team.steps);
     return is_fine;
 }
 

@@ -2,14 +2,19 @@
    0 u, 1 v (real inputs); 2 x, 3 y (real outputs: der(x) = u - x, y = x + v); 4 m (integer input); 5 n (integer output:
    m + 1 a step ago); 6 on (boolean input); 7 off (boolean output: not on, a step ago); 8 mode.
    Modes 1 to 5: the status of the step; 9: status -1; 10, 11, 12: y is NaN, infinity, minus infinity; 20 + s, 30 + s: the
-   status of getting, of setting. */
+   status of getting, of setting; 40 to 43 discarded steps: 40 refuses more than 0.1 s, 41 gets 0.15 s of them done, 42
+   half of one and asks for the end, 43 is 40 and goes on only when it was restored; 44: rounds upward from then on;
+   60 + s, 70 + s: the status of getting, of setting whole numbers. */
 
 #include "fmi2.h"
+
+#include <fenv.h>
 
 typedef struct {
     double reals[4];
     int whole[9];
-    double time;
+    double time, reached;
+    int stuck, ends;
     Logger logger;
     void *environment;
     char name[100];
@@ -70,7 +75,7 @@ int fmi2SetInteger(void *c, const unsigned *vr, size_t count, const int *values)
     for (size_t k = 0; k < count; k++) {
         s->whole[vr[k]] = values[k];
     }
-    return 0;
+    return tell(s, mode(s, 70));
 }
 
 int fmi2GetInteger(void *c, const unsigned *vr, size_t count, int *values)
@@ -79,7 +84,7 @@ int fmi2GetInteger(void *c, const unsigned *vr, size_t count, int *values)
     for (size_t k = 0; k < count; k++) {
         values[k] = s->whole[vr[k]];
     }
-    return 0;
+    return tell(s, mode(s, 60));
 }
 
 int fmi2SetBoolean(void *c, const unsigned *vr, size_t count, const int *values)
@@ -98,20 +103,73 @@ int fmi2SetupExperiment(void *c, int has_tolerance, double tolerance, double sta
     return 0;
 }
 
-int fmi2DoStep(void *c, double time, double step, int final)
+static void advance(Odd *s, double step)
 {
-    Odd *s = c;
-    int status = mode(s, 0);
     s->reals[2] += step * (s->reals[0] - s->reals[2]);
     s->whole[5] = s->whole[4] + 1;
     s->whole[7] = !s->whole[6];
-    s->time = time + step;
+    s->time += step;
+}
+
+int fmi2DoStep(void *c, double time, double step, int final)
+{
+    Odd *s = c;
+    int status = mode(s, 0), how = s->time >= 5.0 ? s->whole[8] : 0;
+    s->reached = how >= 40 ? time : NAN;
+    if (s->stuck) {
+        return tell(s, 3);
+    }
+    if ((how == 40 || how == 43) && step > 0.1000001) {
+        s->stuck = how == 43;
+        return tell(s, 2);
+    }
+    if ((how == 41 && step > 0.1500001) || how == 42) {
+        s->ends = how == 42;
+        advance(s, how == 42 ? 0.5 * step : 0.15);
+        s->reached = s->time;
+        return tell(s, 2);
+    }
+    advance(s, step);
+    if (how == 44) {
+        fesetround(FE_UPWARD);
+    }
     return tell(s, status == 9 ? -1 : status);
 }
 
+int fmi2GetRealStatus(void *c, int kind, double *value)
+{
+    *value = ((Odd *)c)->reached;
+    return 0;
+}
+
+int fmi2GetBooleanStatus(void *c, int kind, int *value)
+{
+    *value = ((Odd *)c)->ends;
+    return 0;
+}
+
+int fmi2GetFMUstate(void *c, void **state)
+{
+    *state = *state ? *state : malloc(sizeof(Odd));
+    memcpy(*state, c, sizeof(Odd));
+    return 0;
+}
+
+int fmi2SetFMUstate(void *c, void *state)
+{
+    memcpy(c, state, sizeof(Odd));
+    return 0;
+}
+
+int fmi2FreeFMUstate(void *c, void **state)
+{
+    free(*state);
+    *state = NULL;
+    return 0;
+}
+
 FINE(fmi2SetDebugLogging) FINE(fmi2EnterInitializationMode) FINE(fmi2ExitInitializationMode) FINE(fmi2Terminate)
-FINE(fmi2Reset) FINE(fmi2GetString) FINE(fmi2SetString) FINE(fmi2GetFMUstate) FINE(fmi2SetFMUstate)
-FINE(fmi2FreeFMUstate) FINE(fmi2SerializedFMUstateSize) FINE(fmi2SerializeFMUstate) FINE(fmi2DeSerializeFMUstate)
-FINE(fmi2GetDirectionalDerivative) FINE(fmi2SetRealInputDerivatives) FINE(fmi2GetRealOutputDerivatives)
-FINE(fmi2CancelStep) FINE(fmi2GetStatus) FINE(fmi2GetRealStatus) FINE(fmi2GetIntegerStatus)
-FINE(fmi2GetBooleanStatus) FINE(fmi2GetStringStatus)
+FINE(fmi2Reset) FINE(fmi2GetString) FINE(fmi2SetString) FINE(fmi2SerializedFMUstateSize) FINE(fmi2SerializeFMUstate)
+FINE(fmi2DeSerializeFMUstate) FINE(fmi2GetDirectionalDerivative) FINE(fmi2SetRealInputDerivatives)
+FINE(fmi2GetRealOutputDerivatives) FINE(fmi2CancelStep) FINE(fmi2GetStatus) FINE(fmi2GetIntegerStatus)
+FINE(fmi2GetStringStatus)

@@ -285,13 +285,3 @@ def test_after_a_run_every_instance_knows_the_time(workspace, odd, ring, instant
     master = instantiated(ring(odd, 2, 1.0))
     assert master.run(0.0, 0.25, 4, 1, lambda *_: True)
     assert [slave.time for slave in master.slaves.values()] == [1.0, 1.0]
-
-
-# -------------------------------------------------------------------- blocks
-
-
-# -------------------------------------------------------------------- what the kernel is given
-
-
-def call(arguments, **changed):
-    return compiled.kernel.run(*(arguments | changed).values())

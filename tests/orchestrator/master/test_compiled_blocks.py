@@ -1,4 +1,4 @@
-"""The compiled step loop: how long a block is, what interrupts one, and several threads."""
+"""The compiled step loop: how long a block is, and what interrupts one."""
 
 import json
 import shutil
@@ -10,9 +10,7 @@ import time
 import numpy as np
 import pytest
 from railcosim.orchestrator.master import compiled
-from railcosim.orchestrator.run.execution import run
 from railcosim.orchestrator.run.recording import Results
-from railcosim.orchestrator.system import Event
 
 GCC = shutil.which("gcc")
 pytestmark = [
@@ -44,7 +42,6 @@ def test_blocks_are_short_in_time(workspace, odd, ring, instantiated):
 
 ENDLESS = """
 import sys
-from railcosim.orchestrator.run.execution import run
 from railcosim.orchestrator.system import Event, System
 system = System(stop_time=1e9, step=0.25, record=25.0)
 system.add("a", sys.argv[1], u=1.5)
@@ -74,42 +71,3 @@ def test_ctrl_c_and_kill(odd, tmp_path):
         assert (out / "results.csv").exists() == (ending == signal.SIGINT)
         if ending == signal.SIGINT:
             assert json.loads((out / "run.json").read_text())["time_reached"] == loaded.time[-1]
-
-
-# -------------------------------------------------------------------- threads
-
-THREADS = pytest.mark.skipif(not getattr(compiled.kernel, "HAS_THREADS", 0), reason="no threads here")
-
-
-@THREADS
-@pytest.mark.parametrize("threads", [2, 3, 5, 64])
-def test_threads_give_the_same_bits(both, used, odd, ring, contents, *, threads):
-    """Also with instances that step at their own rate, delays, and events; more threads than instances are not had."""
-    system = ring(odd, 7, algorithm="jacobi")
-    system.instances["odd[3]"].step = 0.5
-    system.instances["odd[4]"].step = 2.5
-    system.events = [
-        Event("odd[2].x", "bias", at=2.0, value=0.5, duration=3.0),
-        Event("odd[5].u", "ramp", at=1.0, rate=0.1),
-        Event("odd[1].off", "override", at=4.0, value=True),
-    ]
-    alone = contents(run(system))
-    used.clear()
-    assert contents(both(system, threads=threads)) == alone
-    parts = [len(arguments[1]) for arguments in used]
-    assert set(parts) == {2 * min(threads, 7)}
-
-
-@THREADS
-@pytest.mark.parametrize("mode", [3, 4, 10, 23, 33])
-def test_of_several_threads_that_fail_the_first_is_told(both, odd, mode, ring):
-    """As it would be without threads: the first instance of those whose call comes first."""
-    system = ring(odd, 6, algorithm="jacobi")
-    for k in (2, 3, 5):
-        system.instances[f"odd[{k}]"].start["mode"] = mode
-    assert both(system, threads=3).error.instance == "odd[2]"
-    system.instances["odd[5]"].start["mode"] = 33  # it is set before anyone is stepped, a step after others are read
-    assert both(system, threads=3).error.instance == ("odd[5]" if mode in (3, 4) else "odd[2]")
-
-
-# -------------------------------------------------------------------- what the kernel is given

@@ -25,8 +25,8 @@ pytestmark = [
 # -------------------------------------------------------------------- what the kernel is given
 
 NAMES = (
-    "operations parts channels instances entries references changes values history newest rows every start step first "
-    "count last begin"
+    "operations parts channels instances entries references changes values history newest rows places disturbed every "
+    "start step first count last"
 )
 
 
@@ -38,7 +38,9 @@ def arguments(workspace, odd, ring, instantiated):
     values = np.array(master.values)
     changes = np.zeros(1, compiled._CHANGES)
     rows = np.empty((8, len(values) + 1))
-    given = [*plan, changes, values, np.tile(values, (2, 1)), 1, rows, 1, 0.0, 0.25, 0, 4, 4, 0]
+    places = np.array([(0, -1, 0)], compiled._PLACE)
+    disturbed = np.zeros(len(plan[0]), np.uint8)
+    given = [*plan, changes, values, np.tile(values, (2, 1)), 1, rows, places, disturbed, 1, 0.0, 0.25, 0, 4, 4]
     yield dict(zip(NAMES.split(), given, strict=True))
     for slave in master.slaves.values():
         slave.free()
@@ -49,9 +51,10 @@ def call(arguments, **changed):
 
 
 def test_a_sound_plan(arguments):
-    assert call(arguments) == (4, 4, -1, 0, 1, -1)
+    assert call(arguments) == (4, 4, 1)
     assert list(arguments["rows"][:4, 0]) == [0.25, 0.5, 0.75, 1.0]
-    assert call(arguments, count=0) == (0, 0, -1, 0, 1, -1)
+    assert arguments["places"].tolist() == [(0, -1, 0)]
+    assert call(arguments, count=0) == (0, 0, 1)
 
 
 def test_a_block_ends_where_there_is_no_room_for_a_row(arguments):
@@ -103,7 +106,11 @@ WRONG = {
     "parts that go back": lambda a: {"parts": np.array([3, 2, 3, len(a["operations"])])},
     "an odd number of parts": lambda a: {"parts": np.array([1, 2, len(a["operations"])])},
     "a negative part": lambda a: {"parts": np.array([-1, 2, 3, len(a["operations"])])},
-    "a begin before the first operation": lambda a: {"begin": -1},
+    "no place": lambda a: {"places": a["places"][:0]},
+    "two places": lambda a: {"places": np.tile(a["places"], 2)},
+    "a place before the first operation": lambda a: {"places": changed(a["places"], "begin", -1)},
+    "a place after the last operation": lambda a: {"places": changed(a["places"], "begin", 10**6)},
+    "too few marks": lambda a: {"disturbed": a["disturbed"][:-1]},
     "a negative operation": lambda a: {"operations": changed(a["operations"], "kind", -1)},
     "an unknown channel": lambda a: {"operations": changed(a["operations"], "index", 10**6)},
     "a negative channel": lambda a: {"operations": changed(a["operations"], "index", -1)},

@@ -1,0 +1,169 @@
+"""team.c: several threads give what one gives, whatever FMUs do."""
+
+import shutil
+import sys
+
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from railcosim.orchestrator.master import compiled
+from railcosim.orchestrator.run.execution import execute, run
+from railcosim.orchestrator.system import Event, System
+
+GCC = shutil.which("gcc")
+pytestmark = [
+    pytest.mark.skipif(not getattr(compiled.kernel, "HAS_THREADS", 0), reason="no compiled step loop, or no threads"),
+    pytest.mark.skipif(not sys.platform.startswith("linux"), reason="FMUs by hand are compiled for Linux here"),
+    pytest.mark.skipif(GCC is None, reason="FMUs by hand need gcc"),
+]
+
+
+@pytest.mark.parametrize("threads", [2, 3, 5, 64])
+def test_threads_give_the_same_bits(both, used, odd, ring, contents, *, threads):
+    """Also with instances that step at their own rate, delays, and events; more threads than instances are not had."""
+    system = ring(odd, 7, algorithm="jacobi")
+    system.instances["odd[3]"].step = 0.5
+    system.instances["odd[4]"].step = 2.5
+    system.events = [
+        Event("odd[2].x", "bias", at=2.0, value=0.5, duration=3.0),
+        Event("odd[5].u", "ramp", at=1.0, rate=0.1),
+        Event("odd[1].off", "override", at=4.0, value=True),
+    ]
+    alone = contents(run(system))
+    used.clear()
+    assert contents(both(system, threads=threads)) == alone
+    parts = [len(arguments[1]) for arguments in used]
+    assert set(parts) == {2 * min(threads, 7)}
+
+
+@pytest.mark.parametrize("mode", [3, 4, 10, 23, 33])
+def test_of_several_threads_that_fail_the_first_is_told(both, odd, mode, ring):
+    """As it would be without threads: the first instance of those whose call comes first."""
+    system = ring(odd, 6, algorithm="jacobi")
+    for k in (2, 3, 5):
+        system.instances[f"odd[{k}]"].start["mode"] = mode
+    assert both(system, threads=3).error.instance == "odd[2]"
+    system.instances["odd[5]"].start["mode"] = 33  # it is set before anyone is stepped, a step after others are read
+    assert both(system, threads=3).error.instance == ("odd[5]" if mode in (3, 4) else "odd[2]")
+
+
+# -------------------------------------------------------------------- whatever FMUs do
+
+ABLE = "canHandleVariableCommunicationStepSize", "canGetAndSetFMUstate"
+DEEDS = [*[0] * 6, 1, 2, 3, 4, 9, 10, 22, 23, 33, 40, 40, 41, 41, 42, 43, 44, 62, 73]
+"""Modes of odd.c, the harmless ones and discarded steps more often than others."""
+OUTPUTS, INPUTS = ["x", "y", "n", "off"], {"u": "Real", "v": "Real", "m": "Integer", "on": "Boolean"}
+COUNT = st.integers(2, 7)
+
+
+@st.composite
+def systems(draw, count=COUNT):
+    """Instances of odd.c with what they do from t = 5 s on, connected at random, some with steps of their own."""
+    size = draw(count)
+    system = System(stop_time=7.5, step=0.25, algorithm="jacobi", record=draw(st.sampled_from([0.25, 0.75])))
+    for k in range(size):
+        system.add(f"odd[{k}]", "odd.fmu", mode=draw(st.sampled_from(DEEDS)), u=0.1 * k, v=1.0)
+        system.instances[f"odd[{k}]"].step = draw(st.sampled_from([None, None, None, 0.5, 1.5]))
+        for target, kind in INPUTS.items():
+            source = draw(st.sampled_from([None, *OUTPUTS]))
+            if source is not None:
+                sender, how = draw(st.integers(0, size - 1)), {"delay": draw(st.integers(0, 2))}
+                if kind == "Real":
+                    how |= {"scale": draw(st.sampled_from([1.0, 0.3])), "offset": draw(st.sampled_from([0.0, 0.1]))}
+                elif (source, target) not in (("n", "m"), ("off", "on")):
+                    how["threshold"] = 0.5
+                system.connect(f"odd[{sender}].{source}", f"odd[{k}].{target}", **how)
+    for k in range(draw(st.integers(0, 2))):
+        system.events.append(
+            Event(f"odd[{k}].x", "bias", at=draw(st.sampled_from([1.0, 5.5])), value=0.5, duration=1.0)
+        )
+    return system
+
+
+def told(system, contents, threads):
+    """All that is told of a run."""
+    found = execute(system, threads=threads)
+    error = found.error and (str(found.error), found.error.instance, found.error.time, found.error.log)
+    return found.status, error, found.coupling, found.notes, contents(found)
+
+
+@pytest.fixture(scope="module")
+def agree(odd_fmu, contents, tmp_path_factory):
+    """Holds that a system gives the same with any number of threads, and with the loop in Python."""
+    folder = tmp_path_factory.mktemp("threads")
+    path = odd_fmu(folder, *ABLE)
+
+    def hold(system):
+        for instance in system.instances.values():
+            instance.model = path
+        alone = told(system, contents, 1)
+        with pytest.MonkeyPatch.context() as patch:
+            patch.setattr(compiled, "kernel", None)
+            assert told(system, contents, 1) == alone
+        for threads in (2, 5):
+            assert told(system, contents, threads) == alone
+        return alone
+
+    return hold
+
+
+def doing(deeds):
+    """Four instances by what they do; with two threads the first two share one."""
+    system = System(stop_time=7.5, step=0.25, algorithm="jacobi")
+    for k, deed in enumerate(deeds):
+        system.add(f"odd[{k}]", "odd.fmu", mode=deed, u=0.1 * k, v=1.0)
+        system.connect(f"odd[{k}].x", f"odd[{(k + 1) % len(deeds)}].v")
+    return system
+
+
+def test_discarded_steps_are_taken_in_parts(agree):
+    """Two in a thread, and one in each; all steps are there, and as exact as they are in parts."""
+    for deeds in ([40, 41, 0, 0], [40, 41, 41, 0]):
+        status, *_, (time, *_) = agree(doing(deeds))
+        assert (status, len(time[1])) == ("completed", 31 * 8)
+
+
+@pytest.mark.parametrize(
+    ("deeds", "culprit", "what"),
+    [
+        ([40, 3, 2, 0], "odd[1]", "fmi2DoStep failed"),  # met when the first has been helped, after the third
+        ([40, 41, 2, 3], "odd[2]", "discarded the step"),
+        ([40, 41, 40, 3], "odd[3]", "fmi2DoStep failed"),
+        ([40, 0, 40, 22], "odd[3]", "fmi2GetReal failed"),
+        ([40, 0, 10, 22], "odd[2]", "output 'y' is nan"),
+        ([3, 0, 0, 33], "odd[3]", "fmi2SetReal failed"),
+        ([40, 42, 3, 0], "odd[1]", "asks for the end"),
+        ([40, 3, 42, 0], "odd[1]", "fmi2DoStep failed"),
+    ],
+)
+def test_of_failures_and_discarded_steps_the_first_is_told(agree, deeds, culprit, what):
+    status, error, *_ = agree(doing(deeds))
+    assert status == ("terminated" if 42 in deeds[:2] else "failed")
+    assert error[1] == culprit
+    assert what in error[0]
+
+
+def test_whom_it_takes_to_be_restored(agree):
+    """Two of them: the run begins anew twice."""
+    status, error, coupling, *_ = agree(doing([43, 40, 0, 43]))
+    assert (status, error, coupling["rollback"]["instances"]) == ("completed", None, ["odd[0]", "odd[3]"])
+
+
+def test_everyone_who_changes_how_numbers_are_rounded_is_told(agree):
+    """And changes those of nobody else, of the same FMU or in the same thread."""
+    status, _, _, notes, found = agree(doing([44, 0, 44, 0]))
+    assert [note.partition(" ")[0] for note in notes if "rounding" in note] == ["odd[0]", "odd[2]"]
+    assert (status, found) == ("completed", agree(doing([0, 0, 0, 0]))[-1])
+
+
+@settings(max_examples=5, deadline=None)
+@given(system=systems())
+def test_random_systems(agree, system):
+    agree(system)
+
+
+@pytest.mark.long
+@settings(max_examples=500, deadline=None)
+@given(system=systems(st.integers(2, 12)))
+def test_many_random_systems(agree, system):
+    agree(system)
