@@ -7,6 +7,7 @@ signals), steps are taken in Python with identical results.
 from __future__ import annotations
 
 from collections.abc import Sequence
+from functools import reduce
 
 import numpy as np
 from numpy.typing import NDArray
@@ -55,6 +56,23 @@ _CHANGES = np.dtype(
 )
 _OPERATION = np.dtype([(name, "i4") for name in ("kind", "index", "period", "phase", "is_watched")])
 _PLACE = np.dtype([(name, "i8") for name in ("begin", "failed", "status")])
+
+_OWN = [each.itemsize for each in (_OPERATION, _CHANNEL, _INSTANCE, _ENTRY, _CHANGES, _PLACE)]
+_SIZES = (_OWN[0], 8, *_OWN[1:4], 4, _OWN[4], 8, 8, 8, _OWN[5], 1)
+"""Of what the kernel's buffers hold, in bytes, in the order in which it takes them."""
+
+
+def _check_layout(found: int) -> None:
+    """Raise unless the kernel was compiled from the sources that stand beside this file."""
+    if found != reduce(lambda total, size: 31 * total + size & 0x7FFFFFFF, _SIZES, 0):
+        raise RuntimeError(
+            "the compiled step loop (orchestrator/master/kernel) is of another version than its Python files: install "
+            "the package again (`pip install -e . --no-deps` in a checkout)"
+        )
+
+
+if HAS_KERNEL:
+    _check_layout(getattr(kernel, "LAYOUT", 0))
 
 _Entry = tuple[int, int, int, float, float, int, float]
 

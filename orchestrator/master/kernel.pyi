@@ -1,6 +1,7 @@
 from typing import Any
 
 HAS_THREADS: int
+LAYOUT: int
 
 def run(
     operations: Any,

@@ -356,10 +356,21 @@ static struct PyModuleDef module = {
     PyModuleDef_HEAD_INIT, "kernel", "The compiled step loop of the master.", 0, methods, NULL, NULL, NULL, NULL,
 };
 
+/* The sizes of what the buffers hold in one number, by which Python knows a kernel that other sources were compiled to. */
+static uint32_t layout(void)
+{
+    uint32_t sum = 0;
+    for (int n = 0; n < N_BUFFERS; n++) {
+        sum = (31 * sum + (uint32_t)buffer_sizes[n]) & 0x7fffffffU;
+    }
+    return sum;
+}
+
 PyMODINIT_FUNC PyInit_kernel(void)
 {
     PyObject *made = PyModule_Create(&module);
-    if (made != NULL && PyModule_AddIntConstant(made, "HAS_THREADS", HAS_THREADS) < 0) {
+    if (made != NULL && (PyModule_AddIntConstant(made, "HAS_THREADS", HAS_THREADS) < 0 ||
+                         PyModule_AddIntConstant(made, "LAYOUT", (long)layout()) < 0)) {
         Py_DECREF(made);
         return NULL;
     }

@@ -143,6 +143,13 @@ def test_what_is_not_an_array_is_refused(arguments):
         call(arguments, count=2**64)
 
 
+def test_a_kernel_of_another_version_is_refused():
+    """One that was compiled before the sources changed would read the plan wrongly."""
+    compiled._check_layout(compiled.kernel.LAYOUT)
+    with pytest.raises(RuntimeError, match=r"of another version than its Python files: install the package again"):
+        compiled._check_layout(compiled.kernel.LAYOUT + 1)
+
+
 # -------------------------------------------------------------------- the compiler's and the sanitizers' word
 
 
