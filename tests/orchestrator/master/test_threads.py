@@ -66,6 +66,7 @@ def systems(draw, count=COUNT):
         system.instances[f"odd[{k}]"].step = draw(st.sampled_from([None, None, None, 0.5, 1.5]))
         for target, kind in INPUTS.items():
             source = draw(st.sampled_from([None, *OUTPUTS]))
+            source = None if (source, target) == ("y", "v") else source  # y depends on v at once: loops may not settle
             if source is not None:
                 sender, how = draw(st.integers(0, size - 1)), {"delay": draw(st.integers(0, 2))}
                 if kind == "Real":
