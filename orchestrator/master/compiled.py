@@ -58,7 +58,7 @@ _OPERATION = np.dtype([(name, "i4") for name in ("kind", "index", "period", "pha
 _PLACE = np.dtype([(name, "i8") for name in ("begin", "failed", "status")])
 
 _OWN = [each.itemsize for each in (_OPERATION, _CHANNEL, _INSTANCE, _ENTRY, _CHANGES, _PLACE)]
-_SIZES = (_OWN[0], 8, *_OWN[1:4], 4, _OWN[4], 8, 8, 8, _OWN[5], 1)
+_SIZES = (_OWN[0], 8, *_OWN[1:4], 4, _OWN[4], 8, 8, 8, _OWN[5], 8)
 """Of what the kernel's buffers hold, in bytes, in the order in which it takes them."""
 
 
@@ -203,7 +203,7 @@ class CompiledLoop:
         done, stop, count = points
         places = np.zeros(self.threads, _PLACE)
         places["failed"] = -1
-        disturbed = np.zeros(len(self._operations), np.uint8)
+        disturbed = np.zeros(len(self._operations), np.int64)
         values = np.array(exchange.values, dtype=np.float64)
         history, newest = self._unrolled(len(values))
         changes = np.array(
@@ -224,7 +224,7 @@ class CompiledLoop:
             )
             seconds = world.perf_counter() - begin
             done += taken
-            self._tell_disturbers(disturbed)
+            self._tell_disturbers(disturbed, done, places)
             coupling.steps, coupling.time = done, start_time + done * step
             exchange.values[:] = values.tolist()
             for place in self._whole:  # the kernel's values are all doubles
@@ -239,12 +239,16 @@ class CompiledLoop:
             slave.time = start_time + done * step
         return goes_on
 
-    def _tell_disturbers(self, disturbed: NDArray[np.uint8]) -> None:
-        for operation in np.flatnonzero(disturbed):
+    def _tell_disturbers(self, disturbed: NDArray[np.int64], done: int, places: NDArray[np.void]) -> None:
+        """Note who did it, in a step that was left up to what failed first: without threads there is nothing after."""
+        failed = min((self._rank(n) for n in places["failed"].tolist() if n >= 0), default=None)
+        for operation in np.flatnonzero(disturbed).tolist():
             slave = self._culprits[operation][0]
-            if slave is not None:
+            if slave is not None and (
+                disturbed[operation] <= done or (failed is not None and self._rank(operation) <= failed)
+            ):
                 slave.mend()
-        disturbed[:] = 0
+                disturbed[operation] = 0
 
     def _unrolled(self, width: int) -> tuple[NDArray[np.float64], int]:
         """The recorded points that delayed connections look back on, as the kernel's ring, and its newest row."""

@@ -29,7 +29,7 @@ static const char *const buffer_names[N_BUFFERS] = {
 static const size_t buffer_sizes[N_BUFFERS] = {
     sizeof(Operation), sizeof(int64_t), sizeof(Channel), sizeof(Instance), sizeof(Entry),
     sizeof(unsigned),  sizeof(Change),  sizeof(double),  sizeof(double),   sizeof(double),
-    sizeof(Place),     sizeof(unsigned char),
+    sizeof(Place),     sizeof(int64_t),
 };
 
 static size_t length(const Py_buffer *buffers, int which)
@@ -312,8 +312,8 @@ PyDoc_STRVAR(run_doc,
     "Take up to `count` communication steps from number `first`. Rows (time, values) are written for every `every`-th\n"
     "step and for step number `last`; the block ends before a row for which there is no room, and where an operation\n"
     "fails. `places` say for each thread with which operation its part of the first step begins, and whether it waits\n"
-    "because one has failed; then how far the step that was left has got. In `disturbed` the operations are marked after\n"
-    "which numbers were rounded in another way, which was put back.");
+    "because one has failed; then how far the step that was left has got. In `disturbed` an operation after which\n"
+    "numbers were rounded in another way, which was put back, has the number of the first step that ended so.");
 
 static PyObject *run(PyObject *module, PyObject *arguments)
 {

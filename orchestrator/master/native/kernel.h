@@ -111,7 +111,7 @@ typedef struct {
     size_t depth;
     size_t newest; /* the ring's newest row */
     const Change *changes;
-    unsigned char *disturbed; /* by operation, whether numbers were rounded in another way after it */
+    int64_t *disturbed; /* by operation, after which of its steps numbers were first rounded in another way, from 1 */
     unsigned control; /* how numbers are rounded when the block begins, as `float_control` has it, */
     fenv_t floats;    /* and all that belongs to it */
 } Plan;

@@ -195,7 +195,8 @@ void take_part(const Hand *hand, int part, const Advance *it, Place *place)
         const Call *call = take_group(hand, taken, it->time, it->step, &status);
         if (group->is_watched && float_control() != plan->control) { /* an FMU must not change the numbers of others */
             fesetenv(&plan->floats);
-            plan->disturbed[group->begin - plan->calls] = 1; /* a group of its own */
+            int64_t *mark = &plan->disturbed[group->begin - plan->calls]; /* a group of its own */
+            *mark = *mark == 0 ? it->number + 1 : *mark;
         }
         if (call < group->end) {
             place->failed = call - plan->calls;

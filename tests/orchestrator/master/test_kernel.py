@@ -39,7 +39,7 @@ def arguments(workspace, odd, ring, instantiated):
     changes = np.zeros(1, compiled._CHANGES)
     rows = np.empty((8, len(values) + 1))
     places = np.array([(0, -1, 0)], compiled._PLACE)
-    disturbed = np.zeros(len(plan[0]), np.uint8)
+    disturbed = np.zeros(len(plan[0]), np.int64)
     given = [*plan, changes, values, np.tile(values, (2, 1)), 1, rows, places, disturbed, 1, 0.0, 0.25, 0, 4, 4]
     yield dict(zip(NAMES.split(), given, strict=True))
     for slave in master.slaves.values():

@@ -155,6 +155,8 @@ def test_everyone_who_changes_how_numbers_are_rounded_is_told(agree):
     status, _, _, notes, found = agree(doing([44, 0, 44, 0]))
     assert [note.partition(" ")[0] for note in notes if "rounding" in note] == ["odd[0]", "odd[2]"]
     assert (status, found) == ("completed", agree(doing([0, 0, 0, 0]))[-1])
+    notes = agree(doing([44, 3, 44, 0]))[3]  # the third steps only where there are threads
+    assert [note.partition(" ")[0] for note in notes] == ["odd[0]"]
 
 
 @settings(max_examples=5, deadline=None)
