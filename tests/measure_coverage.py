@@ -3,7 +3,8 @@
 ``python tests/measure_coverage.py`` runs the quick tests (Python), and those of the step loop and of the C runtime with
 both built for gcov (C), prints the tables, and fails where a file has more unreached branches than `uncovered.txt`
 grants it. ``--write`` writes that file anew. Its numbers may only fall: a branch that no test can reach is marked where
-it stands, with the reason (``# pragma: no cover: it is for Windows``).
+it stands, with the reason (``# pragma: no cover: it is for Windows``). C is granted nothing: what no test reaches is
+marked with ``/* uncovered: the reason */``, which stands for its line, or for the block that the line opens.
 
 What the parts ``python`` and ``c`` find is kept in ``build/coverage`` and told by the part ``report``; without a part
 all three are done, from nothing. ``--select`` names the tests for Python: several calls of ``python`` add up, and so
@@ -14,6 +15,7 @@ one run of the quick tier measured by it.
 import argparse
 import json
 import os
+import re
 import shlex
 import shutil
 import subprocess
@@ -31,9 +33,12 @@ KERNEL = [ROOT / "orchestrator" / "master" / "native" / name for name in ("kerne
 RUNTIME = sorted((ROOT / "fmus" / "runtime").glob("*.c"))
 LOOP_TESTS = [
     *(f"tests/orchestrator/master/{name}.py" for name in ("test_compiled", "test_compiled_blocks", "test_kernel")),
+    "tests/orchestrator/master/test_threads.py",
     *("tests/orchestrator/master/test_event_loops.py", "tests/orchestrator/fmi/test_foreign.py"),
 ]
 RUNTIME_TESTS = ["tests/fmus/runtime"]
+SCARCE = ROOT / "tests" / "scarce.h"
+MARK = re.compile(r"/\* uncovered: \w.*\*/")
 COMPILER = """#!/bin/sh
 exec gcc "$@" -O0 --coverage -fprofile-update=atomic -dumpdir "$(mktemp -d "$COVERAGE_NOTES/XXXXXXXX")/"
 """
@@ -41,12 +46,13 @@ exec gcc "$@" -O0 --coverage -fprofile-update=atomic -dumpdir "$(mktemp -d "$COV
 
 @dataclass
 class Reached:
-    """Of a file: how many lines and branches it has, and how many of them were reached."""
+    """Of a file: how many lines and branches it has, and how many of them were reached; of C, where not."""
 
     lines: int = 0
     lines_reached: int = 0
     branches: int = 0
     branches_reached: int = 0
+    where: list[int] = field(default_factory=list)
 
     def __iadd__(self, other: "Reached") -> "Reached":
         self.lines += other.lines
@@ -123,6 +129,7 @@ def measure_c() -> None:
         "--coverage",
         "-fprofile-update=atomic",
         "-pthread",
+        *("-include", str(SCARCE)),
     ]
     command += [f"-I{sysconfig.get_paths()['include']}", "-dumpdir", f"{notes / 'kernel'}/", *map(str, KERNEL)]
     subprocess.run([*command, "-o", str(library)], check=True)
@@ -149,26 +156,43 @@ class Lines:
             before = self.branches[number].get(len(counts), [0] * len(counts))
             self.branches[number][len(counts)] = [a + b for a, b in zip(before, counts, strict=True)]
 
-    def reached(self) -> Reached:
-        found = Reached(len(self.counts), sum(count > 0 for count in self.counts.values()))
-        for builds in self.branches.values():
-            best = max(builds.values(), key=lambda counts: (sum(c > 0 for c in counts) / len(counts), len(counts)))
-            found += Reached(0, 0, len(best), sum(count > 0 for count in best))
+    def reached(self, marked: set[int]) -> Reached:
+        """What was reached of the lines that are not marked."""
+        found = Reached()
+        for number in sorted(self.counts.keys() - marked):
+            builds = self.branches[number].values() or [[]]
+            best = max(builds, key=lambda counts: (sum(c > 0 for c in counts) / (len(counts) or 1), len(counts)))
+            found += Reached(1, self.counts[number] > 0, len(best), sum(count > 0 for count in best))
+            if not (self.counts[number] and all(best)):
+                found.where.append(number)
         return found
+
+
+def marked_lines(text: str) -> set[int]:
+    """The lines of a C file that are marked as not to be reached: each, or all of the block that it opens."""
+    found: set[int] = set()
+    depth = 0
+    for number, line in enumerate(text.splitlines(), 1):
+        code = MARK.sub("", line)
+        if depth or code != line:
+            found.add(number)
+            depth += code.count("{") - code.count("}")
+    return found
 
 
 def read_c() -> dict[str, Reached]:
     """What was reached, by file."""
-    names = {path.name: path.relative_to(ROOT).as_posix() for path in [*KERNEL, *RUNTIME]}
-    found: dict[str, Lines] = defaultdict(Lines)
+    names = {path.name: path for path in [*KERNEL, *RUNTIME]}
+    found: dict[Path, Lines] = defaultdict(Lines)
     for data in sorted((DATA / "c").rglob("*.gcda")):
         command = ["gcov", "--json-format", "--branch-probabilities", "--stdout", str(data)]
         for text in subprocess.run(command, check=True, capture_output=True, text=True).stdout.splitlines():
             for file in json.loads(text)["files"]:
-                name = names.get(Path(file["file"]).name)
-                for line in file["lines"] if name else ():
-                    found[name].add(line)
-    return {name: found[name].reached() for name in sorted(found)}
+                path = names.get(Path(file["file"]).name)
+                for line in file["lines"] if path else ():
+                    found[path].add(line)
+    marked = {path: marked_lines(path.read_text()) for path in found}
+    return {path.relative_to(ROOT).as_posix(): found[path].reached(marked[path]) for path in sorted(found)}
 
 
 # -------------------------------------------------------------------- what is told
@@ -207,7 +231,7 @@ def report(write: bool) -> int:
         rooms[room(name)] += row
     table("Python", rooms)
     table("C", c)
-    missing = {name: row.missing for name, row in {**python, **c}.items() if row.missing}
+    missing = {name: row.missing for name, row in python.items() if row.missing}
     if write:
         head = (
             "# Branches that no test reaches, by file, and why: see measure_coverage.py. The numbers may only fall.\n"
@@ -222,7 +246,12 @@ def report(write: bool) -> int:
     print(f"; {better} files have fewer than they are granted: --write" if better else "")
     for name, count in sorted(worse.items()):
         print(f"{name}: {count} branches are reached by no test, {allowed.get(name, 0)} are granted")
-    return len(worse)
+    unmarked = {name: row.where for name, row in c.items() if row.where}
+    for name, where in unmarked.items():
+        print(
+            f"{name}: no test reaches all of lines {', '.join(map(str, where))}: reach them, or mark them with why not"
+        )
+    return len(worse) + len(unmarked)
 
 
 def main() -> None:

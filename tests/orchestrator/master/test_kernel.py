@@ -1,5 +1,7 @@
 """kernel.c, stepping.c and team.c: what they are given is checked, and the compiler and its sanitizers find nothing."""
 
+import ctypes
+import importlib.util
 import os
 import shutil
 import subprocess
@@ -11,9 +13,11 @@ import numpy as np
 import pytest
 from railcosim.orchestrator.master import compiled
 from railcosim.orchestrator.master.compiled import CompiledLoop
+from railcosim.orchestrator.master.settings import Settings
 
 MASTER = Path(__file__).parents[3] / "orchestrator" / "master"
 FOREIGN = Path(__file__).parents[1] / "foreign"
+SCARCE = Path(__file__).parents[2] / "scarce.h"
 GCC = shutil.which("gcc")
 pytestmark = [
     pytest.mark.skipif(compiled.kernel is None, reason="installed without the compiled step loop"),
@@ -87,6 +91,7 @@ WRONG = {
     "a channel that is too long": lambda a: {"channels": changed(a["channels"], "count", 2**62)},
     "a channel of negative length": lambda a: {"channels": changed(a["channels"], "count", -1)},
     "a channel without function": lambda a: {"channels": changed(a["channels"], "function", 0)},
+    "a channel without an entry": lambda a: {"channels": changed(a["channels"], "count", 0)},
     "a step without function": lambda a: {"instances": changed(a["instances"], "function", 0)},
     "an unknown operation": lambda a: {"operations": changed(a["operations"], "kind", 4)},
     "an unknown change": lambda a: {"entries": changed(a["entries"], "change", 1)},
@@ -104,7 +109,10 @@ WRONG = {
     "no parts": lambda a: {"parts": a["parts"][:0]},
     "parts that do not end with the operations": lambda a: {"parts": a["parts"] - 1},
     "parts that go back": lambda a: {"parts": np.array([3, 2, 3, len(a["operations"])])},
-    "an odd number of parts": lambda a: {"parts": np.array([1, 2, len(a["operations"])])},
+    "an odd number of parts": lambda a: {"parts": np.array([1, 2, 3, 4, len(a["operations"])])},
+    "three parts": lambda a: {"parts": np.array([1, 2, len(a["operations"])])},
+    "too many parts": lambda a: {"parts": np.full(2050, len(a["operations"]))},
+    "a part beyond the operations": lambda a: {"parts": np.array([1, 10**6, 10**6, len(a["operations"])])},
     "a negative part": lambda a: {"parts": np.array([-1, 2, 3, len(a["operations"])])},
     "no place": lambda a: {"places": a["places"][:0]},
     "two places": lambda a: {"places": np.tile(a["places"], 2)},
@@ -112,6 +120,7 @@ WRONG = {
     "a place after the last operation": lambda a: {"places": changed(a["places"], "begin", 10**6)},
     "too few marks": lambda a: {"disturbed": a["disturbed"][:-1]},
     "a negative operation": lambda a: {"operations": changed(a["operations"], "kind", -1)},
+    "an unknown instance": lambda a: {"operations": changed(changed(a["operations"], "kind", 1), "index", 10**6)},
     "an unknown channel": lambda a: {"operations": changed(a["operations"], "index", 10**6)},
     "a negative channel": lambda a: {"operations": changed(a["operations"], "index", -1)},
     "fewer references than entries": lambda a: {"references": a["references"][:-1]},
@@ -141,6 +150,44 @@ def test_what_is_not_an_array_is_refused(arguments):
         call(arguments, start="now")
     with pytest.raises(OverflowError):
         call(arguments, count=2**64)
+
+
+def scarce_kernel(folder):
+    """A kernel that can be refused what it asks for, and the number of times that it is granted."""
+    if not hasattr(ctypes.CDLL(compiled.kernel.__file__), "scarce_left"):
+        library = compile_kernel(folder / "kernel.so", "-O0", "-pthread", "-include", SCARCE)
+    else:  # the one in use can, in measure_coverage.py
+        library = compiled.kernel.__file__
+    spec = importlib.util.spec_from_file_location("railcosim.orchestrator.master.kernel", library)
+    module = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(module)
+    return module, ctypes.c_int.in_dll(ctypes.CDLL(library), "scarce_left")
+
+
+@pytest.mark.skipif(not getattr(compiled.kernel, "HAS_THREADS", 0), reason="no threads here")
+def test_memory_and_threads_that_cannot_be_had(tmp_path, odd, ring, instantiated):
+    """Each request in turn is refused; then nothing is left behind, and the same call succeeds."""
+    kernel, left = scarce_kernel(tmp_path)
+    said = []
+    for threads in (1, 3):
+        master = instantiated(ring(odd, 3))
+        master.coupling.settings = Settings(threads=threads)
+        values = np.array(master.values)
+        plan = CompiledLoop(master.coupling, master.algorithm)._plan
+        rows, places = np.empty((4, len(values) + 1)), np.array([(0, -1, 0)] * threads, compiled._PLACE)
+        state = np.zeros(0, compiled._CHANGES), values, np.tile(values, (2, 1)), 1, rows, places
+        for left.value in range(20):
+            try:
+                found = kernel.run(*plan, *state, np.zeros(len(plan[0]), np.int64), 1, 0.0, 0.25, 0, 4, 4)
+            except (MemoryError, RuntimeError) as error:
+                said.append(f"{type(error).__name__} {error}")
+            else:
+                assert found == (4, 4, 1)
+                break
+        left.value = -1
+        for slave in master.slaves.values():
+            slave.free()
+    assert said == ["MemoryError "] * 12 + ["RuntimeError kernel: no more threads can be started"] * 3
 
 
 def test_a_kernel_of_another_version_is_refused():
