@@ -122,6 +122,9 @@ class TapeDeck:
         """End a trip: if anything was recorded and is to be kept, the filtered rows become the ones that are read.
 
         Only the samples of this trip are filtered: what lies past its end is not part of the signal.
+
+        Raises:
+            ComponentError: filtered, they are no finite numbers.
         """
         if self.span is not None and keep():
             trip = slice(self.span[0], self.span[1] + 1)
@@ -129,6 +132,8 @@ class TapeDeck:
             self.committed[trip] = smooth(self.recording[trip], self.cutoff, self.sample_time)
         self.recording = self.committed.copy()
         self.span = None
+        if not np.isfinite(self.committed).all():
+            raise ComponentError(f"{self.owner}.tape_cutoff: the filter takes what was recorded beyond all numbers")
 
     def state(self) -> dict[str, Any]:
         """Everything a restore needs, as JSON-ready values."""
@@ -212,9 +217,10 @@ def smooth(rows: Rows, cutoff: float, sample_time: float) -> Rows:
     gain = 1.0 - math.exp(-2.0 * math.pi * cutoff * sample_time)
     # Ten time constants of run-in leave less than 5e-5 of the start value in the result.
     pad = math.ceil(10.0 / gain)
-    padded = _continued(rows, pad)
-    for direction in (1, -1):
-        padded = _low_pass(padded[::direction], gain)[::direction]
+    with np.errstate(over="ignore", invalid="ignore"):  # what comes of that is looked at
+        padded = _continued(rows, pad)
+        for direction in (1, -1):
+            padded = _low_pass(padded[::direction], gain)[::direction]
     return np.array(padded[pad : pad + len(rows)])
 
 

@@ -21,23 +21,27 @@ static bool is_kept(fmi2ValueReference reference)
     return kept && model_variables[reference].type == TYPE_REAL;
 }
 
-/* The direction at the present values. In initialization mode a start that is computed moves with what it follows from. */
-static fmi2Status complete_direction(Instance *s)
+/* The direction at the present values. In initialization mode a start that is computed moves with what it follows from:
+   that is found where it was computed, at the values before. */
+static void complete_direction(Instance *s)
 {
 #if N_INITIAL > 0
     if (s->phase == PHASE_INITIALIZATION) {
         const double clock[2] = {s->time, s->step};
+        double computed[N_INITIAL];
+        for (int k = 0; k < N_INITIAL; k++) {
+            computed[k] = s->values[model_initial_targets[k]];
+        }
         forget_computed_starts(s);
         MODEL_INITIAL_DIRECTIONAL(clock, s->values, s->direction, s->scratch);
         for (int k = 0; k < N_INITIAL; k++) {
             s->direction[model_initial_targets[k]] = s->scratch[k];
+            s->values[model_initial_targets[k]] = computed[k];
         }
-        return compute_starts(s);
     }
 #else
     (void)s;
 #endif
-    return fmi2OK;
 }
 
 fmi2Status fmi2GetDirectionalDerivative(fmi2Component c, const fmi2ValueReference vUnknown_ref[], size_t nUnknown,
@@ -66,9 +70,7 @@ fmi2Status fmi2GetDirectionalDerivative(fmi2Component c, const fmi2ValueReferenc
         }
         s->direction[vKnown_ref[k]] = dvKnown[k];
     }
-    if (complete_direction(s) != fmi2OK) {
-        return fmi2Error;
-    }
+    complete_direction(s);
 #if N_OUTPUTS + N_STATES > 0
     const double clock[2] = {s->time, s->step};
     MODEL_DIRECTIONAL(clock, s->values, s->direction, s->scratch);

@@ -189,8 +189,7 @@ fmi2Status fmi2Terminate(fmi2Component c)
 #if N_TAPE > 0
     const char *path = s->texts[model_variables[TAPE_FILE].text];
     if (path[0] != '\0') {
-        tape_commit(s);
-        if (tape_save(s, path) != fmi2OK) {
+        if (tape_commit(s) != fmi2OK || tape_save(s, path) != fmi2OK) {
             return broken(s);
         }
     }

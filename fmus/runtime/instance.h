@@ -88,6 +88,7 @@ typedef struct {
     double *line;
     int first; /* first and last sample recorded on the present trip; first is -1 when there is none */
     int last;
+    int row; /* that belongs to the outputs, -1 while waiting */
     bool has_trip;
     int trip;
 } Tape;

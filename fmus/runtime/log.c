@@ -7,11 +7,12 @@
 enum { LOG_ERROR, LOG_WARNING, LOG_EVENTS, N_LOG_CATEGORIES };
 static const char *const log_categories[N_LOG_CATEGORIES] = {"logStatusError", "logStatusWarning", "logEvents"};
 
-/* The importer reads a message as a printf format, and #r12# in it as a reference to a variable: double both signs. */
-static void escape(const char *from, char *to, size_t size)
+/* The importer reads a message as a printf format, and #r12# in it as a reference to a variable: double both signs.
+   There is room for twice the longest message. */
+static void escape(const char *from, char to[2 * MAX_MESSAGE])
 {
     size_t used = 0;
-    for (; *from != '\0' && used + 2 < size; from++) {
+    for (; *from != '\0'; from++) {
         if (*from == '%' || *from == '#') {
             to[used++] = *from;
         }
@@ -26,7 +27,7 @@ static void send(const Instance *s, fmi2Status status, int category, const char 
     if (s->logger == NULL) {
         return;
     }
-    escape(text, escaped, sizeof escaped);
+    escape(text, escaped);
     s->logger(s->environment, s->name, status, log_categories[category], escaped);
 }
 

@@ -200,9 +200,7 @@ static fmi2Status sample(Instance *s, double period, double elapsed)
         }
     }
 #if N_TAPE > 0
-    if (tape_record(s, trip_time_after(s, elapsed), row) != fmi2OK) {
-        return fmi2Error;
-    }
+    tape_record(s, row);
 #endif
     for (int k = 0; k < N_REINITIALISED; k++) {
         int target = model_reinitialised[k];

@@ -91,7 +91,7 @@ static fmi2Status restore_state(Instance *s, const State *state)
     if (state->head.tape_rows == 0) {
         tape_free(&s->tape);
     } else if (tape_allocate(s, state->head.tape_rows) != fmi2OK) {
-        return fmi2Error;
+        return broken(s); /* half of it is restored: nothing of that may be written at the end */
     }
     if (state->head.tape_rows > 0) {
         memcpy(s->tape.committed, state + 1, tape_bytes(state->head.tape_rows));

@@ -34,28 +34,24 @@ static fmi2Status tape_index(Instance *s, double trip_time, int *index)
 
 static fmi2Status tape_read(Instance *s, double trip_time)
 {
-    int n;
-    if (tape_index(s, trip_time, &n) != fmi2OK) {
+    if (tape_index(s, trip_time, &s->tape.row) != fmi2OK) {
         return fmi2Error;
     }
-    const double *row = n < 0 ? model_tape_start : s->tape.committed + (size_t)n * N_TAPE;
+    const double *row = s->tape.row < 0 ? model_tape_start : s->tape.committed + (size_t)s->tape.row * N_TAPE;
     memcpy(s->values + FIRST_TAPE, row, N_TAPE * sizeof(double));
     return fmi2OK;
 }
 
-static fmi2Status tape_record(Instance *s, double trip_time, const double *row)
+/* The row of the sample whose outputs have just been computed. */
+static void tape_record(Instance *s, const double *row)
 {
     Tape *tape = &s->tape;
-    int n;
-    if (tape_index(s, trip_time, &n) != fmi2OK) {
-        return fmi2Error;
-    }
+    int n = tape->row;
     if (n >= 0) {
         memcpy(tape->recording + (size_t)n * N_TAPE, row, N_TAPE * sizeof(double));
         tape->first = tape->first < 0 || n < tape->first ? n : tape->first;
         tape->last = n > tape->last ? n : tape->last;
     }
-    return fmi2OK;
 }
 
 /* A sample of one column of `count` > 1, continued beyond its ends by odd reflection as often as it takes. */
@@ -108,7 +104,7 @@ static bool keep_trip(Instance *s)
 }
 
 /* End a trip: if anything was recorded and is to be kept, the filtered rows become the ones that are read. */
-static void tape_commit(Instance *s)
+static fmi2Status tape_commit(Instance *s)
 {
     Tape *tape = &s->tape;
     size_t size = (size_t)tape->rows * N_TAPE * sizeof(double);
@@ -119,6 +115,12 @@ static void tape_commit(Instance *s)
     }
     memcpy(tape->recording, tape->committed, size);
     tape->first = tape->last = -1;
+    for (size_t n = 0; n < (size_t)tape->rows * N_TAPE; n++) {
+        if (!isfinite(tape->committed[n])) {
+            return fail(s, "tape_cutoff: the filter takes what was recorded beyond all numbers");
+        }
+    }
+    return fmi2OK;
 }
 
 /* Notice a new trip. */
@@ -139,8 +141,7 @@ static fmi2Status tape_follow(Instance *s)
                        "trip_time is negative (the wait before a departure)", tape->trip, trip, trip_time);
     }
     tape->trip = trip;
-    tape_commit(s);
-    return fmi2OK;
+    return tape_commit(s);
 }
 
 /* -------------------------------------------------------------------------------------------------------- the file */
@@ -156,14 +157,16 @@ static void decimal_point(char point[REAL_TEXT])
     point[length] = '\0';
 }
 
-/* The shortest decimal text that reads back to the same bits, in the form and with the point that Python writes. */
+/* The shortest decimal text of a finite number that reads back to the same bits, in the form and with the point that Python writes. */
 static void format_real(double value, char text[REAL_TEXT])
 {
-    /* A decimal of up to 15 digits survives the way to a double and back; behind it then stand zeros. */
+    /* A decimal of up to 15 digits survives the way to a double and back, behind it then stand zeros; and a double the
+       way to 17 digits and back. */
     int decimals = 14;
-    do {
-        snprintf(text, REAL_TEXT, "%.*e", decimals, value);
-    } while (strtod(text, NULL) != value && ++decimals <= 16);
+    snprintf(text, REAL_TEXT, "%.*e", decimals, value);
+    while (strtod(text, NULL) != value) {
+        snprintf(text, REAL_TEXT, "%.*e", ++decimals, value);
+    }
     const char *end = strchr(text, 'e');
     int exponent = atoi(end + 1);
     while (decimals > 0 && *--end == '0') {
@@ -267,19 +270,20 @@ static fmi2Status tape_save(Instance *s, const char *path)
         return fail(s, "tape_file: %.300s cannot be written", path);
     }
     tape_header(s, text, sizeof text);
-    bool good = fprintf(file, "%s\n", text) > 0;
-    for (int n = 0; n < s->tape.rows && good; n++) {
-        for (int column = 0; column < N_TAPE && good; column++) {
+    fprintf(file, "%s\n", text);
+    for (int n = 0; n < s->tape.rows; n++) {
+        for (int column = 0; column < N_TAPE; column++) {
             format_real(s->tape.committed[(size_t)n * N_TAPE + (size_t)column], text);
-            good = fprintf(file, "%s%c", text, column + 1 < N_TAPE ? ' ' : '\n') > 0;
+            fprintf(file, "%s%c", text, column + 1 < N_TAPE ? ' ' : '\n');
         }
     }
-    good = good && fprintf(file, "end\n") > 0;
-    good = fclose(file) == 0 && good;
+    fprintf(file, "end\n");
+    int wrong = ferror(file); /* which remembers what could not be written */
+    wrong |= fclose(file);
 #if defined(_WIN32)
     remove(path); /* rename does not replace there */
 #endif
-    if (!good || rename(part, path) != 0) {
+    if (wrong != 0 || rename(part, path) != 0) {
         remove(part);
         return fail(s, "tape_file: %.300s cannot be written", path);
     }

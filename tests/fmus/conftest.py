@@ -217,12 +217,18 @@ def instantiate(unpack, built):
         instance.free()
 
 
-@pytest.fixture
-def load(unpack):
-    """Instances of a component's native FMU behind the bare functions of the standard; freed at the end of the test."""
+@pytest.fixture(scope="session")
+def driver():
+    """The module `bare.py`."""
     spec = importlib.util.spec_from_file_location("bare", Path(__file__).with_name("bare.py"))
-    driver = importlib.util.module_from_spec(spec)
-    spec.loader.exec_module(driver)
+    module = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(module)
+    return module
+
+
+@pytest.fixture
+def load(unpack, driver):
+    """Instances of a component's native FMU behind the bare functions of the standard; freed at the end of the test."""
     made = []
 
     def make(reference, arguments=None, **options):

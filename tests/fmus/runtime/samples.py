@@ -1,6 +1,7 @@
-"""Components for the tests of the C runtime: one that fails on request, and integrators of its inputs."""
+"""Components for the tests of the C runtime: some that fail on request, integrators, starts that are computed."""
 
-from railcosim.components import Component, Input, Memory, Output, Parameter, State, Tape
+from railcosim.components import Component, Input, Memory, Noise, Output, Parameter, State, Tape
+from railcosim.components.maths import where
 
 
 class Breaks(Component):
@@ -62,3 +63,71 @@ class Spoils(Component):
 
     def update(self):
         return {"m": 1.0 / self.for_memory, "effort": 1.0 / self.for_tape, "x": 1.0 / self.for_state}
+
+
+class Begins(Component):
+    """A start that follows from an input, and is infinite where that is zero; a whole memory that is shown."""
+
+    u = Input("1", 0.5)
+    x = State("1", 0.0, output=True)
+    n = Memory("1", 0, type=int, output=True)
+    y = Output("1")
+
+    def initial(self):
+        return {"x": 1.0 / self.u}
+
+    def derivatives(self):
+        return {"x": -self.x}
+
+    def outputs(self):
+        return {"y": 3.0 * self.x}
+
+    def update(self):
+        return {"n": self.n + 1}
+
+
+class Misfits(Component):
+    """Outputs that their variables cannot hold: a whole number, and a truth value."""
+
+    u = Input("1", 1.0)
+    whole = Output("1", int)
+    door = Output("1", bool)
+
+    def outputs(self):
+        return {"whole": 1e9 * self.u, "door": where(self.u > 0.0, 1.0, 0.5 * self.u * self.u + self.u)}
+
+
+class Late(Component):
+    """Something that has no value at the end of its first step, and a hold of a random number that may be changed."""
+
+    hold = Parameter("s", 1.0, tunable=True)
+    m = Memory("1", 1.0)
+    r = Noise(hold)
+    u = Input("1", 0.0)
+    y = Output("1")
+    through = Output("1")
+
+    def outputs(self):
+        return {"y": 1.0 / self.m, "through": self.u + self.r}
+
+    def update(self):
+        return {"m": self.m - 1.0}
+
+
+class Bouncing(Component):
+    """What turns round at every standstill, wherever it is put: dry friction with the wrong sign, twice."""
+
+    v = State("m/s", (1e-3, -1e-3), shape=(2,), output=True, standstill=True)
+
+    def derivatives(self):
+        return {"v": where(self.v > 0.0, -1.0, where(self.v < 0.0, 1.0, where(self.v[::-1] > 0.0, 1.0, -1.0)))}
+
+
+class Pushed(Component):
+    """A block at rest that moves, and comes to rest, as an input does."""
+
+    force = Input("m/s2", 0.0)
+    v = State("m/s", 1.0, output=True, standstill=True)
+
+    def derivatives(self):
+        return {"v": where(self.v > 0.0, self.force, 0.0)}

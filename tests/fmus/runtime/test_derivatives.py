@@ -101,6 +101,18 @@ def test_in_initialization_a_computed_start_moves_with_what_it_follows_from(load
     assert fmu.directional(("v", "z"), ("v",), (1.0,)) == pytest.approx([1.0, slope], rel=1e-14)
 
 
+def test_a_start_that_is_computed_moves_until_it_stands_on_its_own(load):
+    """x = 1 / u and y = 3 x: dx = -du / u^2 in initialization mode, and 0 afterwards."""
+    fmu = load(f"{Path(__file__).parent / 'samples.py'}:Begins").enter()
+    assert fmu.directional(("x", "y", "der(x)"), ("u",), (2.0,)) == [-8.0, -24.0, 8.0]
+    assert fmu.get("x") == 2.0, "and stays as it was computed"
+    assert fmu.directional(("y",), ("x",), (1.0,)) == ERROR
+    assert fmu.ExitInitializationMode() == OK
+    assert fmu.directional(("x", "y"), ("u", "x"), (2.0, 1.0)) == [1.0, 3.0]
+    assert fmu.directional(("n",), ("u",), (1.0,)) == ERROR
+    assert "neither a real output nor a rate" in fmu.said
+
+
 def test_directional_derivatives_know_their_unknowns(load):
     fmu = load(COUNTER).initialize()
     assert fmu.directional(("total",), ("total",), (3.0,)) == [3.0]  # memory shown as an output, without any state
@@ -111,6 +123,7 @@ def test_directional_derivatives_know_their_unknowns(load):
     assert fmu.directional(("count",), ("u",), (1.0,)) == ERROR
     assert fmu.directional(("through",), ("through",), (1.0,)) == ERROR
     assert fmu.GetDirectionalDerivative(NULL, c_size_t(1), NULL, c_size_t(0), NULL, NULL) == ERROR
+    assert fmu.GetDirectionalDerivative((c_uint * 1)(), c_size_t(1), NULL, c_size_t(0), NULL, NULL) == ERROR
     for known, direction in ((NULL, (c_double * 1)()), ((c_uint * 1)(), NULL)):
         assert fmu.GetDirectionalDerivative(NULL, c_size_t(0), known, c_size_t(1), direction, NULL) == ERROR
         assert "NULL for an array" in fmu.said

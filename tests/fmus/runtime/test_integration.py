@@ -1,11 +1,17 @@
 """integration.c: native trains come to rest as in plain Python, to the bit, also under inputs that move in a step."""
 
+from pathlib import Path
+
 import numpy as np
 import pytest
+from railcosim.components import Simulation
+from railcosim.fmus.references import resolve
 from railcosim.orchestrator import System, run
 
 TRIP = {"trip": 1, "trip_time": 0.0}
 LONG = pytest.mark.long
+SAMPLES = Path(__file__).parent / "samples.py"
+Bouncing = resolve(f"{SAMPLES}:Bouncing")
 
 
 def signals(component, values, stop, step, kind):
@@ -34,6 +40,28 @@ def test_a_native_train_stops_as_in_plain_python(component, values, stop, step):
     plain, native = (signals(component, values, stop, step, kind) for kind in ("plain", "native"))
     assert (plain == native).all()
     assert (native[1:, -1] == 0.0).any()
+
+
+def test_states_that_keep_one_another_moving_come_to_an_end(load):
+    """After as many stops as in plain Python, and where it leaves them."""
+    fmu, plain = load(f"{SAMPLES}:Bouncing").initialize(max_step=1.0), Simulation(Bouncing(max_step=1.0))
+    plain.initialize()
+    plain.start()
+    for _ in range(3):
+        assert fmu.step(1.0) == 0
+        plain.step(1.0)
+        assert [fmu.get("v[1]"), fmu.get("v[2]")] == list(plain.get("v"))
+
+
+def test_a_block_stops_under_an_input_that_moves(load):
+    """Analytic: v = 1 - t^3 / 3 under a force of -t^2, at rest at 1.44 s."""
+    fmu = load(f"{SAMPLES}:Pushed").initialize(max_step=0.5)
+    assert fmu.set_derivatives("force", 0.0, -2.0) == 0
+    assert fmu.step(1.0) == 0
+    assert fmu.get("v") == pytest.approx(2.0 / 3.0, abs=1e-15)
+    assert fmu.set_derivatives("force", -2.0, -2.0) == 0
+    assert fmu.step(1.0) == 0
+    assert fmu.get("v") == 0.0
 
 
 @pytest.mark.long

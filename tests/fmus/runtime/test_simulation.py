@@ -2,14 +2,15 @@
 
 import itertools
 import math
-from ctypes import c_double
+from ctypes import c_double, c_int, c_size_t, c_uint
 from pathlib import Path
 
 import pytest
 
 SAMPLES = Path(__file__).parents[1] / "native_samples.py"
 MIXED = f"{SAMPLES}:Mixed"
-BREAKS, SPOILS = (f"{Path(__file__).parent / 'samples.py'}:{name}" for name in ("Breaks", "Spoils"))
+OWN = Path(__file__).parent / "samples.py"
+BREAKS, SPOILS = (f"{OWN}:{name}" for name in ("Breaks", "Spoils"))
 OTHERS = Path(__file__).parents[2] / "components" / "samples.py"
 COUNTER = f"{OTHERS}:Counter"
 OK = 0
@@ -80,9 +81,9 @@ def test_a_step_that_is_no_multiple_of_the_sample_time_is_refused(load):
     fmu = load(MIXED).initialize()
     assert fmu.step(0.3) == ERROR
     assert "multiple of sample_time" in fmu.said
-    for tiny in (1e-300, 1e-12):
+    for tiny, length in ((1e-300, 1.0), (1e-12, 1.0), (1e-3, 1e-4), (1.0, 1e10)):
         fmu = load(COUNTER).initialize(sample_time=tiny)
-        assert fmu.step(1.0) == ERROR
+        assert fmu.step(length) == ERROR
 
 
 def test_hopeless_step_limits_are_errors_not_hours(load):
@@ -157,3 +158,44 @@ def test_what_is_asked_after_a_bad_value_was_set_is_an_error(load):
         assert fmu.set("u", 0.0) == OK
         assert ask(fmu) == ERROR
         assert "'y' is inf" in fmu.said
+
+
+@pytest.mark.parametrize(
+    ("u", "said"),
+    [
+        (3.0, "'whole' is 3000000000 at t = 0 s, which is no 32-bit integer"),
+        (-3.0, "'whole' is -3000000000 at t = 0 s, which is no 32-bit integer"),
+        (-1.0, "'door' is -0.5 at t = 0 s, which is no boolean"),
+    ],
+)
+def test_what_a_variable_cannot_hold_is_an_error_that_names_it(load, u, said):
+    fmu = load(f"{OWN}:Misfits").initialize()
+    assert (fmu.get("whole"), fmu.get("door")) == (10**9, 1)
+    assert fmu.set("u", 0.0) == OK
+    assert (fmu.get("whole"), fmu.get("door")) == (0, 0)
+    assert fmu.set("u", u) == OK
+    assert fmu.GetInteger(*integer(fmu, "whole")) == ERROR
+    assert said in fmu.said
+
+
+def integer(fmu, name):
+    return (c_uint * 1)(fmu.references[name]), c_size_t(1), (c_int * 1)()
+
+
+def test_a_start_that_is_no_number_is_an_error_that_names_it(load):
+    fmu = load(f"{OWN}:Begins").enter()
+    assert fmu.set("u", 0.0) == OK
+    assert fmu.ExitInitializationMode() == ERROR
+    assert "initial: 'x' is inf at t = 0 s" in fmu.said
+
+
+def test_what_goes_wrong_after_the_last_sample_of_a_step_is_an_error(load):
+    """Outputs of the new memory; and a random number of a parameter that was changed on the way."""
+    fmu = load(f"{OWN}:Late").initialize()
+    assert fmu.get("y") == 1.0
+    assert fmu.step(1.0) == ERROR
+    assert "outputs: 'y' is inf at t = 1 s" in fmu.said
+    fmu = load(f"{OWN}:Late").initialize()
+    assert fmu.set("hold", 0.0) == OK
+    assert fmu.step(1.0) == ERROR
+    assert "hold must be positive" in fmu.said

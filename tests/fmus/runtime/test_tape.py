@@ -6,6 +6,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from railcosim.components.component import ComponentError
 from railcosim.components.tape import TapeDeck, smooth
 from railcosim.fmus.build import build
 from railcosim.fmus.references import resolve
@@ -95,6 +96,9 @@ def test_the_file_is_read_back(load, tmp_path, ends):
         (lambda t: t.replace("\n0.5 ", "\nnan ", 1), "corrupt"),
         (lambda t: t.replace("\n0.5 ", "\n", 1), "corrupt"),
         (lambda t: t.replace("\n0.5 ", "\n0.5x ", 1), "corrupt"),
+        (lambda t: t.replace("\n0.5 ", "\n ", 1), "corrupt"),
+        (lambda t: t[: t.index("\n0.5 ") + 3], "corrupt"),
+        (lambda t: t.replace("end\n", "End\n"), "corrupt"),
         (lambda t: t.replace("\n0.5 ", "\n0.5 1.0 ", 1), "corrupt"),
         (lambda t: t.replace("\n0.5 ", "\n" + "1" * 500 + " ", 1), "corrupt"),
     ],
@@ -212,6 +216,75 @@ def test_a_place_that_is_taken_is_told(load, tmp_path):
     assert fmu.Terminate() == ERROR
     assert "cannot be written" in fmu.said
     assert [path.name for path in tmp_path.iterdir()] == ["tape"]
+
+
+@pytest.mark.skipif(not Path("/dev/full").exists(), reason="needs a device that is full")
+def test_a_disk_that_is_full_before_the_end_is_told(load, tmp_path):
+    """Of a tape longer than what is buffered."""
+    fmu = load(LEARNER).initialize(sample_time=0.1, tape_duration=100.0, tape_file=str(tmp_path / "tape"))
+    (tmp_path / "tape.part").symlink_to("/dev/full")
+    assert fmu.Terminate() == ERROR
+    assert "cannot be written" in fmu.said
+    assert not list(tmp_path.iterdir())
+
+
+GREATEST = [1.7e308, -1.7e308] * 4
+
+
+def test_a_filter_that_goes_beyond_all_numbers_is_an_error_and_writes_nothing(load, tmp_path):
+    """At the next trip, and at the end; in Python too."""
+    for ends in (True, False):
+        fmu = learner(load, tmp_path / "tape", tape_cutoff=0.05)
+        ride(fmu, 1, GREATEST)
+        if not ends:
+            fmu.set("trip", 2)
+            fmu.set("trip_time", -0.1)
+        assert (fmu.Terminate() if ends else fmu.step(0.1)) == ERROR
+        assert "the filter takes what was recorded beyond all numbers" in fmu.said
+    assert not list(tmp_path.iterdir())
+    with pytest.raises(ComponentError, match="the filter takes what was recorded beyond all numbers"):
+        python_deck(GREATEST, 0.05)
+
+
+def test_a_trip_number_changes_only_while_waiting(load, tmp_path):
+    fmu = learner(load, tmp_path / "tape")
+    ride(fmu, 1, ERRORS[:2])
+    fmu.set("trip", 2)
+    assert fmu.step(0.1) == ERROR
+    assert "the trip number changed from 1 to 2 at trip_time = " in fmu.said
+
+
+def test_a_trip_may_be_told_backwards(load, tmp_path):
+    """What was recorded reaches from its first sample to its last, in whatever order they came."""
+    fmu = learner(load, tmp_path / "native", tape_cutoff=1.0)
+    told = [(0.5, 1.0), (0.4, 2.0), (0.3, -1.0), (0.6, 4.0)]
+    for trip_time, error in told:
+        fmu.set("trip_time", trip_time)
+        fmu.set("error", error)
+        assert fmu.step(0.1) == OK
+    assert fmu.Terminate() == OK
+    component = resolve(LEARNER)()
+    slots = tuple(component.slots[n] for n in ("learned", "pair"))
+    deck = TapeDeck("Learner", slots, component.present_values, sample_time=0.1, duration=1.0, cutoff=1.0)
+    for trip_time, error in told:
+        deck.record(trip_time, {"learned": 0.5 * error, "pair": np.full(2, 7.0 + 0.5 * abs(error))})
+    deck.commit(lambda: True)
+    deck.save(tmp_path / "python")
+    assert (tmp_path / "native").read_bytes() == (tmp_path / "python").read_bytes()
+
+
+def test_another_filter_before_the_first_step(load, tmp_path):
+    """What has been prepared for the one of before makes way, though the tape is as long."""
+    fmu = load(LEARNER).enter()
+    for name, value in {"sample_time": 0.1, "tape_duration": 1.0, "tape_file": str(tmp_path / "native")}.items():
+        fmu.set(name, value)
+    assert fmu.get("command") == 0.0
+    fmu.set("tape_cutoff", 0.05)
+    assert fmu.ExitInitializationMode() == OK
+    ride(fmu, 1, ERRORS)
+    assert fmu.Terminate() == OK
+    python_deck(ERRORS, 0.05).save(tmp_path / "python")
+    assert (tmp_path / "native").read_bytes() == (tmp_path / "python").read_bytes()
 
 
 def test_without_a_file_nothing_is_written(load, tmp_path, monkeypatch):
