@@ -3,6 +3,7 @@
 import ctypes
 import json
 import math
+import sys
 from ctypes import byref, c_size_t, c_void_p
 from pathlib import Path
 
@@ -153,7 +154,19 @@ def test_bytes_that_are_no_state_are_refused(load):
     state = fmu.save()
     content = fmu.to_bytes(state)
     assert fmu.SerializeFMUstate(state, (ctypes.c_char * len(content))(), c_size_t(len(content) - 1)) == ERROR
-    for bad in (b"", b"x", content[:-1], content[:50], b"x" * len(content), content[:64] + b"\xff" * 16 + content[80:]):
+    size = int.from_bytes(content[64:72], sys.byteorder)
+    heads = [content[:64] + number.to_bytes(8, sys.byteorder) + content[72:] for number in (size - 1, size + 1, 0)]
+    heads.append(content[:76] + b"\xff" * 4 + content[80:])  # a negative number of rows
+    heads.append(b"{" + b"0" * 36 + content[37:])
+    for bad in (
+        *heads,
+        b"",
+        b"x",
+        content[:-1],
+        content[:50],
+        b"x" * len(content),
+        content[:64] + b"\xff" * 16 + content[80:],
+    ):
         assert fmu.from_bytes(bad) == ERROR
     assert train.from_bytes(content) == ERROR
     assert train.SetFMUstate(state) == ERROR

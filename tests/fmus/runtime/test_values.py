@@ -194,3 +194,12 @@ def test_bounds_and_starts_are_those_of_the_component(load):
     for slot in train.of(Parameter):
         assert fmu.get(slot.name) == train.present_values[slot.name]
     assert fmu.get("speed") == 12.5
+
+
+def test_rates_are_read_with_others(load):
+    """Several at once, among values."""
+    fmu = load("PointMassTrain").initialize(speed=30.0)
+    names = ("der(speed)", "speed", "der(position)", "acceleration")
+    found = (c_double * len(names))()
+    assert fmu.GetReal((c_uint * len(names))(*(fmu.references[n] for n in names)), c_size_t(len(names)), found) == OK
+    assert list(found) == [fmu.get("acceleration"), 30.0, 30.0, fmu.get("acceleration")]

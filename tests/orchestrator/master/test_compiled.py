@@ -69,15 +69,16 @@ def test_types_that_change_on_the_way(both, odd, mine, algorithm, delay):
 
 
 @ALGORITHMS
-def test_a_number_that_no_whole_one_holds(both, odd, mine, algorithm):
+@pytest.mark.parametrize(("scale", "number"), [(1e9, 2250000000), (-1e9, -2250000000)])
+def test_a_number_that_no_whole_one_holds(both, odd, mine, algorithm, *, scale, number):
     """An error in both, by the input's name."""
     system = System(stop_time=4.0, step=0.25, algorithm=algorithm)
     system.add("course", mine("Course"), a=0.0, b=1.0)
     system.add("a", odd)
-    system.connect("course.y", "a.m", scale=1e9, threshold=0.5)
+    system.connect("course.y", "a.m", scale=scale, threshold=0.5)
     result = both(system)
     assert result.status == "failed"
-    assert "'m' cannot become 2250000000: its type Integer holds -2147483648 to 2147483647" in str(result.error)
+    assert f"'m' cannot become {number}: its type Integer holds -2147483648 to 2147483647" in str(result.error)
     assert result.error.instance == "a"
     assert result.time[-1] == 2.25
 

@@ -114,6 +114,7 @@ def doing(deeds):
     for k, deed in enumerate(deeds):
         system.add(f"odd[{k}]", "odd.fmu", mode=deed, u=0.1 * k, v=1.0)
         system.connect(f"odd[{k}].x", f"odd[{(k + 1) % len(deeds)}].v")
+        system.connect(f"odd[{k}].n", f"odd[{(k + 1) % len(deeds)}].m")
     return system
 
 
@@ -133,6 +134,8 @@ def test_discarded_steps_are_taken_in_parts(agree):
         ([40, 0, 40, 22], "odd[3]", "fmi2GetReal failed"),
         ([40, 0, 10, 22], "odd[2]", "output 'y' is nan"),
         ([3, 0, 0, 33], "odd[3]", "fmi2SetReal failed"),
+        ([40, 0, 62, 22], "odd[2]", "fmi2GetInteger failed"),
+        ([0, 3, 73, 33], "odd[2]", "fmi2SetInteger failed"),
         ([40, 42, 3, 0], "odd[1]", "asks for the end"),
         ([40, 3, 42, 0], "odd[1]", "fmi2DoStep failed"),
     ],
