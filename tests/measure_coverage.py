@@ -40,7 +40,8 @@ RUNTIME_TESTS = ["tests/fmus/runtime"]
 SCARCE = ROOT / "tests" / "scarce.h"
 MARK = re.compile(r"/\* uncovered: \w.*\*/")
 COMPILER = """#!/bin/sh
-exec gcc "$@" -O0 --coverage -fprofile-update=atomic -dumpdir "$(mktemp -d "$COVERAGE_NOTES/XXXXXXXX")/"
+exec gcc "$@" -O0 -DALWAYS_INLINE="static inline" --coverage -fprofile-update=atomic \\
+    -dumpdir "$(mktemp -d "$COVERAGE_NOTES/XXXXXXXX")/"
 """
 
 

@@ -48,8 +48,10 @@ typedef void Equations(const double *clock, const double *values, double *result
 /* Length of an array that may be empty: C has no arrays of length zero. */
 #define AT_LEAST_ONE(n) ((n) > 0 ? (n) : 1)
 
-/* For a function of which there is to be one copy for each constant argument: compilers rarely do it unasked. */
-#if defined(__GNUC__)
+/* For a function of which there is to be one copy for each constant argument: compilers rarely do it unasked. A build that
+   counts what is reached asks for none. */
+#if defined(ALWAYS_INLINE)
+#elif defined(__GNUC__)
 #define ALWAYS_INLINE static inline __attribute__((always_inline))
 #elif defined(_MSC_VER)
 #define ALWAYS_INLINE static __forceinline

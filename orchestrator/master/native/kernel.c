@@ -65,9 +65,10 @@ static int check_buffers(const Py_buffer *buffers)
     return 1;
 }
 
+/* Whether so many elements, which are not less than none, stand from one on. */
 static int is_within(int64_t begin, int64_t count, size_t length)
 {
-    return begin >= 0 && count >= 0 && (uint64_t)begin <= length && (uint64_t)count <= length - (uint64_t)begin;
+    return begin >= 0 && (uint64_t)begin <= length && (uint64_t)count <= length - (uint64_t)begin;
 }
 
 /* Whether a channel's entries can be read (or, written, stand side by side among the values). */

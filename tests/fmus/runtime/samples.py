@@ -1,7 +1,7 @@
 """Components for the tests of the C runtime: some that fail on request, integrators, starts that are computed."""
 
 from railcosim.components import Component, Input, Memory, Noise, Output, Parameter, State, Tape
-from railcosim.components.maths import where
+from railcosim.components.maths import sin, where
 
 
 class Breaks(Component):
@@ -114,13 +114,14 @@ class Late(Component):
         return {"m": self.m - 1.0}
 
 
-class Bouncing(Component):
-    """What turns round at every standstill, wherever it is put: dry friction with the wrong sign, twice."""
+class Swinging(Component):
+    """Two states that forces of time turn round, again and again within a step."""
 
-    v = State("m/s", (1e-3, -1e-3), shape=(2,), output=True, standstill=True)
+    v = State("m/s", 0.01, output=True, standstill=True)
+    w = State("m/s", 0.1, output=True, standstill=True)
 
     def derivatives(self):
-        return {"v": where(self.v > 0.0, -1.0, where(self.v < 0.0, 1.0, where(self.v[::-1] > 0.0, 1.0, -1.0)))}
+        return {"v": sin(16.0 * self.time + 4.3), "w": sin(5.0 * self.time + 3.5)}
 
 
 class Pushed(Component):

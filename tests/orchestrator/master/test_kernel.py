@@ -67,6 +67,8 @@ def test_a_block_ends_where_there_is_no_room_for_a_row(arguments):
     assert call(arguments, rows=arguments["rows"][:1], every=3, last=100)[:2] == (4, 1)
     assert call(arguments, rows=arguments["rows"][:1], every=3, last=100, count=9)[:2] == (5, 1)
     assert call(arguments, rows=arguments["rows"][:0], every=100, last=100)[:2] == (4, 0)
+    assert call(arguments, every=3)[:2] == (4, 2), "the last one, too"
+    assert list(arguments["rows"][:2, 0]) == [0.75, 1.0]
 
 
 def changed(array, field, value, at=0):

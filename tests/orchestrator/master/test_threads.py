@@ -162,6 +162,17 @@ def test_everyone_who_changes_how_numbers_are_rounded_is_told(agree):
     assert [note.partition(" ")[0] for note in notes] == ["odd[0]"]
 
 
+def test_like_calls_of_unwatched_instances_are_made_in_one(agree, monkeypatch):
+    """Also where one of them discards its step in the midst; what is due at other times, or of others, stands apart."""
+    monkeypatch.setattr(compiled, "is_watched", lambda slave: False)
+    system = doing([0, 40, 0, 40, 41, 0, 0, 0])
+    for k, step in enumerate([0.5, None, 0.5, 1.5]):
+        system.instances[f"odd[{4 + k}]"].step = step
+    system.connect("odd[1].x", "odd[0].u")
+    system.connections = [x for x in system.connections if x.target != "odd[0].v"]
+    assert agree(system)[0] == "completed"
+
+
 @settings(max_examples=5, deadline=None)
 @given(system=systems())
 def test_random_systems(agree, system):
