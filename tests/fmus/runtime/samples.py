@@ -117,11 +117,11 @@ class Late(Component):
 class Swinging(Component):
     """Two states that forces of time turn round, again and again within a step."""
 
-    v = State("m/s", 0.01, output=True, standstill=True)
-    w = State("m/s", 0.1, output=True, standstill=True)
+    v = State("m/s", -0.01, output=True, standstill=True)
+    w = State("m/s", 0.01, output=True, standstill=True)
 
     def derivatives(self):
-        return {"v": sin(16.0 * self.time + 4.3), "w": sin(5.0 * self.time + 3.5)}
+        return {"v": sin(19.0 * self.time + 1.2), "w": sin(55.0 * self.time + 0.9)}
 
 
 class Pushed(Component):

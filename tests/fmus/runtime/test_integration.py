@@ -43,7 +43,7 @@ def test_a_native_train_stops_as_in_plain_python(component, values, stop, step):
 
 
 def test_states_that_stop_again_and_again_come_to_an_end(load):
-    """After four stops in the first step, which are counted, where they are in plain Python."""
+    """In the first step there would be a fifth stop, which is the end of it: where they are in plain Python."""
     fmu, plain = load(f"{SAMPLES}:Swinging").initialize(max_step=1.0), Simulation(Swinging(max_step=1.0))
     plain.initialize()
     plain.start()
