@@ -1,11 +1,11 @@
 """A description is read in parts: the same comes out as of the whole, and it takes little memory."""
 
-import time
+import subprocess
+import sys
 import tracemalloc
 from pathlib import Path
 
 import pytest
-from lxml import etree
 from railcosim.orchestrator.errors import FmuFileError
 from railcosim.orchestrator.fmi import document
 from railcosim.orchestrator.fmi.reader import read_interface
@@ -128,19 +128,29 @@ def test_a_variable_takes_little_memory(reading):
     assert most / count < 1500
 
 
+READ = """
+import resource, sys, time
+from pathlib import Path
+from xml.parsers import expat
+from railcosim.orchestrator.fmi.reader import read_interface
+begin = time.process_time()
+with open(f"{sys.argv[1]}/modelDescription.xml", "rb") as stream:
+    parser = expat.ParserCreate()
+    parser.StartElementHandler = lambda name, attributes: None
+    parser.ParseFile(stream)
+bare, begin = time.process_time() - begin, time.process_time()
+it = read_interface(Path(sys.argv[1]), "their.fmu")
+print(len(it.variables), bare, time.process_time() - begin, resource.getrusage(resource.RUSAGE_SELF).ru_maxrss)
+"""
+
+
 @pytest.mark.long
+@pytest.mark.skipif(not sys.platform.startswith("linux"), reason="units of memory are Linux's")
 def test_a_million_variables(tmp_path):
-    """In six times what a bare parser takes, and not in its memory; once it was 15 times, and 8 GB."""
-    resource = pytest.importorskip("resource")
-    path = tmp_path / "modelDescription.xml"
-    path.write_text(text(UNITS, variables(1_000_000), structure(1_000_000)), encoding="utf-8")
-    begin = time.process_time()
-    for _, element in etree.iterparse(path, tag=("ScalarVariable", "Unknown")):
-        element.getparent().clear()
-    bare = time.process_time() - begin
-    before = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
-    begin = time.process_time()
-    it = read_interface(tmp_path, "their.fmu")
-    assert len(it.variables) == 1_000_000
-    assert time.process_time() - begin < 8.0 * bare
-    assert resource.getrusage(resource.RUSAGE_SELF).ru_maxrss - before < 1e6  # in kB
+    """In the time of few bare parses (4.6 of them) and 0.8 GB; once it took 8 GB."""
+    (tmp_path / "modelDescription.xml").write_text(text(UNITS, variables(10**6), structure(10**6)), encoding="utf-8")
+    ran = subprocess.run([sys.executable, "-c", READ, str(tmp_path)], capture_output=True, text=True, check=True)
+    count, bare, taken, kilobytes = map(float, ran.stdout.split())
+    assert count == 10**6
+    assert taken < 8.0 * bare
+    assert kilobytes < 1e6
