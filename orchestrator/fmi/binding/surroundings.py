@@ -192,7 +192,7 @@ def _locale_of_thread(new: int = 0) -> int:
     with suppress(Exception):
         _C.uselocale.restype, _C.uselocale.argtypes = ctypes.c_ssize_t, [ctypes.c_ssize_t]
         return int(_C.uselocale(new))
-    return 0
+    return 0  # pragma: no cover: Windows has none
 
 
 def _mask() -> int:
