@@ -55,7 +55,7 @@ class Interruption:
         # None is a handler that Python has not installed, and could not put back.
         before = {number: signal.getsignal(number) for number in _ASKING}
         before = {number: handler for number, handler in before.items() if handler not in (None, signal.SIG_IGN)}
-        near, far = world.socketpair()
+        near, far = socket.socketpair()  # from this process to itself
         near.setblocking(False)
         with near, far:
             woken = signal.set_wakeup_fd(near.fileno(), warn_on_full_buffer=False)
@@ -67,7 +67,7 @@ class Interruption:
                 yield
             finally:
                 self._is_over = True
-                world.send(near, b"\0")
+                near.send(b"\0")
                 watch.join()
                 for number, handler in before.items():
                     signal.signal(number, handler)
@@ -88,7 +88,7 @@ class Interruption:
 
     def _watch(self, far: socket.socket, woken: int) -> None:
         """In a thread of its own: hear signals as they come, also while the main thread is in an FMU."""
-        while (numbers := world.receive(far, 1)) not in (b"", b"\0"):
+        while (numbers := far.recv(1)) not in (b"", b"\0"):
             if woken >= 0:  # of an event loop, which hears of them after the run
                 with contextlib.suppress(OSError):
                     world.write(woken, numbers)
