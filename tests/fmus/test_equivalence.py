@@ -297,7 +297,7 @@ def test_plain_python_and_both_kinds_of_fmu_agree_to_the_last_bit(path, argument
 @pytest.mark.long
 @every_component
 def test_they_agree_on_many_more_runs(path, arguments):
-    @checked(150)
+    @checked(60, derandomize=False)  # others each time
     @given(scripts(resolve(path)(**arguments)))
     def agree(script):
         compare(path, arguments, script)

@@ -289,6 +289,11 @@ MISTAKES = [
     ),
     (
         '"cruise.alpha" = 0.01',
+        '"cruise.alpha" = 1979-05-27',
+        'two.toml:32: presets.gentle."cruise.alpha": takes numbers, texts, true or false, or lists of these, not ',
+    ),
+    (
+        '"cruise.alpha" = 0.01',
         '"target.count" = 2',
         "two.toml:32: presets.gentle.\"target.count\": 'target' has no count to change; "
         "give it one in [instances.target]",
