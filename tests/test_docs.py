@@ -94,7 +94,7 @@ def environment(folder: Path) -> dict[str, str]:
 def execute(arguments: list[str], folder: Path) -> tuple[int, str]:
     """Run a command; exit code, and what it prints on both streams."""
     both = {"stdout": subprocess.PIPE, "stderr": subprocess.STDOUT, "text": True}
-    done = subprocess.run(arguments, cwd=folder, env=environment(folder), timeout=120, check=False, **both)
+    done = subprocess.run(arguments, cwd=folder, env=environment(folder), timeout=300, check=False, **both)
     return done.returncode, done.stdout
 
 

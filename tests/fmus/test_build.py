@@ -16,6 +16,7 @@ from railcosim.components import ComponentError, simulate
 from railcosim.fmus import build as build_module
 from railcosim.fmus.build import build, build_component, cache_folder, plain, write_archive, write_whole
 from railcosim.fmus.references import resolve
+from railcosim.orchestrator import world
 from railcosim.orchestrator.errors import FmuFileError
 from railcosim.orchestrator.fmi.archive import Workspace
 from railcosim.orchestrator.fmi.models import load_fmu
@@ -327,14 +328,14 @@ def test_without_a_plain_folder_it_is_refused_before_anything_is_loaded(tmp_path
     odd = tmp_path / "größe"
     odd.mkdir()
     monkeypatch.setattr(tempfile, "tempdir", str(odd))
-    whole = tempfile.mkdtemp
+    whole = world.mkdtemp
 
     def mkdtemp(suffix=None, prefix=None, dir=None):
         if dir is not None:
             raise PermissionError(dir)
         return whole(suffix, prefix, dir)
 
-    monkeypatch.setattr(tempfile, "mkdtemp", mkdtemp)
+    monkeypatch.setattr(world, "mkdtemp", mkdtemp)
     with pytest.raises(FmuFileError) as caught:
         Workspace()
     message = str(caught.value)

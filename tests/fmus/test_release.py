@@ -50,7 +50,7 @@ class Needy(Base):
 
 def orchestrate(*arguments, folder):
     command = [*COMMAND, *map(str, arguments)]
-    return subprocess.run(command, cwd=folder, capture_output=True, text=True, timeout=300, check=False)
+    return subprocess.run(command, cwd=folder, capture_output=True, text=True, timeout=900, check=False)
 
 
 def kind_of(path):

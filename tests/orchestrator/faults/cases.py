@@ -248,7 +248,7 @@ def _await(pid):
 
 def _are_left():
     """Whether there are processes left that the case has started; this process is the parent of all orphans."""
-    until = time.monotonic() + 5.0
+    until = time.monotonic() + 30.0
     with contextlib.suppress(ChildProcessError):
         while time.monotonic() < until:
             if os.waitpid(-1, os.WNOHANG) == (0, 0):

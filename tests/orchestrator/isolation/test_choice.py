@@ -296,7 +296,7 @@ def test_an_interruption_ends_the_run_not_the_process_of_an_instance(scenario, t
 
 def session_of(master):
     """Processes of isolated instances whose parent was this one, or is nobody any more."""
-    until = time.monotonic() + 10.0
+    until = time.monotonic() + 60.0
     while time.monotonic() < until:
         found = []
         for place in os.listdir("/proc"):
