@@ -2,8 +2,6 @@
 
 import os
 import sys
-import tempfile
-from pathlib import Path
 
 import pytest
 from hypothesis import settings
@@ -12,22 +10,6 @@ from hypothesis import settings
 # installed package, and with what else was imported: the constants that are tried, which Hypothesis takes from modules.
 settings.register_profile("repeatable", derandomize=True, database=None, deadline=None)
 settings.load_profile("repeatable")
-
-_MEMORY = Path("/dev/shm")
-_NEEDED = 4 << 30  # bytes: the long tier leaves 1 GB
-
-
-def _in_memory():
-    """Whether there is a folder in memory that programs can be started from, and much room in it."""
-    if not _MEMORY.is_dir() or not os.access(_MEMORY, os.W_OK):
-        return False
-    place = os.statvfs(_MEMORY)
-    return not place.f_flag & os.ST_NOEXEC and place.f_bavail * place.f_frsize > _NEEDED
-
-
-# A run makes and removes dozens of folders and has files flushed: milliseconds of waiting for each, unless in memory.
-if "TMPDIR" not in os.environ and _in_memory():
-    os.environ["TMPDIR"] = tempfile.tempdir = str(_MEMORY)
 
 _HEAD = """from railcosim.components import Component, Data, Input, Memory, Noise, Output, Parameter, Size, State, maths
 
