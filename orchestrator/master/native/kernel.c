@@ -161,7 +161,7 @@ static int are_alike(const Group *a, const Group *b)
 {
     return !b->is_watched && a->kind == b->kind && a->function == b->function && a->count == b->count &&
            a->period == b->period && a->phase == b->phase &&
-           memcmp(a->references, b->references, a->count * sizeof *a->references) == 0;
+           (a->count == 0 || memcmp(a->references, b->references, a->count * sizeof *a->references) == 0);
 }
 
 static void free_plan(Plan *plan)

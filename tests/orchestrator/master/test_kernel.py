@@ -215,12 +215,12 @@ def test_the_compiler_has_nothing_to_say(tmp_path, flags):
     compile_kernel(tmp_path / "kernel.so", *flags)
 
 
-PARTS = ("test_compiled.py", "test_compiled_blocks.py", "test_kernel.py")
+PARTS = ("test_compiled.py", "test_compiled_blocks.py", "test_kernel.py", "test_threads.py")
 SANITIZERS = {
     ("address", "undefined"): (
         "not sanitized and not compiler and not ctrl_c and not without_the_extension and not short_in_time"
     ),
-    ("thread",): "threads_give or several_threads",
+    ("thread",): "threads_give or several_threads or discarded or first_is_told or rounded",
 }
 """Which of the tests of the compiled loop run under which sanitizers."""
 
