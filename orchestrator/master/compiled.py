@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 
 from .. import world
 from ..fmi.binding import FmuChannel, FmuSlave, is_watched
+from ..fmi.guard import GUARD, NOTE_SIZE, NOTES, own_note, said
 from .algorithms import Explicit, Operation
 from .coupling import Coupling
 from .exchange import Change
@@ -64,7 +65,7 @@ _SIZES = (_OWN[0], 8, *_OWN[1:4], 4, _OWN[4], 8, 8, 8, _OWN[5], 8)
 
 def _check_layout(found: int) -> None:
     """Raise unless the kernel was compiled from the sources that stand beside this file."""
-    if found != reduce(lambda total, size: 31 * total + size & 0x7FFFFFFF, _SIZES, 0):
+    if found != reduce(lambda total, size: 31 * total + size & 0x7FFFFFFF, _SIZES, NOTE_SIZE):
         raise RuntimeError(
             "the compiled step loop (orchestrator/master/kernel) is of another version than its Python files: install "
             "the package again (`pip install -e . --no-deps` in a checkout)"
@@ -73,6 +74,8 @@ def _check_layout(found: int) -> None:
 
 if HAS_KERNEL:
     _check_layout(getattr(kernel, "LAYOUT", 0))
+    if GUARD:
+        kernel.watch(GUARD)
 
 _Entry = tuple[int, int, int, float, float, int, float]
 
@@ -92,6 +95,8 @@ class CompiledLoop:
     def __init__(self, coupling: Coupling, algorithm: Explicit) -> None:
         self._coupling = coupling
         self._exchange = coupling.exchange
+        self._under_way: tuple[NDArray[np.float64], Observer, float, float] | None = None
+        self._note = 0
         self._channels: list[tuple[int, int, int, int, int]] = []
         self._entries: list[_Entry] = []
         self._references: list[int] = []
@@ -201,6 +206,7 @@ class CompiledLoop:
         """
         coupling, exchange = self._coupling, self._exchange
         done, stop, count = points
+        self._note = own_note()
         places = np.zeros(self.threads, _PLACE)
         places["failed"] = -1
         disturbed = np.zeros(len(self._operations), np.int64)
@@ -217,12 +223,14 @@ class CompiledLoop:
         while done < stop and goes_on:
             block = min(block, stop - done, max(1, _MOST_VALUES // width) * every)
             rows = np.empty((_rows_due(done, block, every, count), width))
+            self._under_way = rows, observe, start_time, step
             begin = world.perf_counter()
             taken, written, newest = kernel.run(
                 *(*self._plan, changes, values, history, newest, rows, places, disturbed),
                 *(every, start_time, step, done, block, count),
             )
             seconds = world.perf_counter() - begin
+            self._under_way = None
             done += taken
             self._tell_disturbers(disturbed, done, places)
             coupling.steps, coupling.time = done, start_time + done * step
@@ -238,6 +246,18 @@ class CompiledLoop:
         for slave in coupling.slaves.values():
             slave.time = start_time + done * step
         return goes_on
+
+    def rescue(self) -> None:
+        """Tell the observer of the rows that the block under way has written, which does not return any more."""
+        if self._under_way is None:
+            return
+        rows, observe, start_time, step = self._under_way
+        written = int(NOTES.note(self._note)[3])
+        if written:
+            time, *values = rows[written - 1].tolist()
+            self._coupling.steps, self._coupling.time = round((time - start_time) / step), time
+            self._exchange.values[:] = values
+            observe(self._coupling.steps, rows[:written])
 
     def _tell_disturbers(self, disturbed: NDArray[np.int64], done: int, places: NDArray[np.void]) -> None:
         """Note who did it, in a step that was left up to what failed first: without threads there is nothing after."""
@@ -280,6 +300,8 @@ class CompiledLoop:
             slave.time = time
             self._exchange.write(slave.name, time)
         slave.time = time + (period - phase) * step if call.startswith("fmi2Get") else time
+        if status >> 32 > 0:  # a call that was left, and how, and with which exit code
+            raise slave.lose(said(call, status >> 32, (status & 0x7FFFFFFF) - (status & 0x80000000)))
         slave.check(call, status)
         self._exchange.check_finite(slave)
 

@@ -3,6 +3,7 @@ from typing import Any
 HAS_THREADS: int
 LAYOUT: int
 
+def watch(address: int) -> None: ...
 def run(
     operations: Any,
     parts: Any,

@@ -256,6 +256,11 @@ class Master:
     def _tell(self, observe: Observer, is_due: bool) -> bool:
         return observe(self.steps, [[self.time, *self.values]] if is_due else ())
 
+    def rescue(self) -> None:
+        """Tell the observer what is known of steps that do not return any more; called in another thread."""
+        if self._compiled is not None:
+            self._compiled.rescue()
+
     def terminate(self) -> None:
         """End the run properly: every model may write what it keeps, also where another fails to.
 

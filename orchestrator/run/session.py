@@ -79,6 +79,7 @@ class Session:
         self._recording: Recording | None = None
         self._watching: Watching | None = None
         self._slaves: Mapping[str, Slave] = {}
+        self._master: Master | None = None
         self.interruption = Interruption(self._abandon)
         self._restoring: list[str] = []
         self._is_complete = False
@@ -109,7 +110,7 @@ class Session:
         """Run; False where it has to be begun anew, with an instance restored after steps that it discards."""
         try:
             with self._ending(), self._assembled() as master:
-                self._slaves = master.slaves
+                self._slaves, self._master = master.slaves, master
                 with self._ending():
                     self._simulate(master, begin)
                 complete()
@@ -139,7 +140,8 @@ class Session:
         """Bring to the disk what was recorded, and how the run has ended, unless all that is done."""
         if self._is_complete or self.job.place is None:
             return
-        if self._recording is not None:
+        if self._recording is not None and self._master is not None:
+            self._master.rescue()
             self._recording.flush()
         record_file.add(self.job.place.path, status=status, error=why)
 

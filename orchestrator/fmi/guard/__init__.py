@@ -1,6 +1,6 @@
 """Guarded calls of FMUs: which one is under way is noted, and none ends the process unnoticed or with code 0."""
 
-from .notes import NOTES, Seen, described
+from .notes import NOTE_SIZE, NOTES, Seen, described
 from .watching import (
     ENDED,
     GUARD,
@@ -10,6 +10,7 @@ from .watching import (
     introduce,
     loading,
     noted,
+    own_note,
     run_guarded,
     said,
     share_notes,
@@ -21,6 +22,7 @@ __all__ = [
     "ENDED",
     "GUARD",
     "NOTES",
+    "NOTE_SIZE",
     "Seen",
     "described",
     "dismiss",
@@ -29,6 +31,7 @@ __all__ = [
     "introduce",
     "loading",
     "noted",
+    "own_note",
     "run_guarded",
     "said",
     "share_notes",

@@ -15,8 +15,9 @@ from ...times import digits
 
 _HEAD = struct.Struct("=qq")
 """The exit code that was decided on, plus one; and how much of the table is filled."""
-_NOTE = struct.Struct("=QQdqqQ16x")
-"""As guard.h has it: instance, function, time, way, code, rows."""
+_NOTE = struct.Struct("=QQdQ32x")
+"""As guard.h has it: instance, function, time, rows."""
+NOTE_SIZE = _NOTE.size
 _NOTES_BEGIN, _COUNT = 64, 256
 _TABLE = _NOTES_BEGIN + _COUNT * _NOTE.size
 _RUN = 3
@@ -116,7 +117,7 @@ class Notes:
         return Seen(name, model, call, time if abs(time) < sys.float_info.max else None)
 
     def note(self, number: int) -> tuple[Any, ...]:
-        """A thread's note: instance, function, time, way, code, rows."""
+        """A thread's note: instance, function, time, rows."""
         return _NOTE.unpack_from(self.memory, _NOTES_BEGIN + number * _NOTE.size)
 
     @property

@@ -70,7 +70,7 @@ def _begin_anew() -> None:
 
 def _gone(instance: int, function: int, way: int, code: int) -> FmuError:
     """The error of a call that was left."""
-    what = said(function, way, code)
+    what = said(NOTES.seen(instance, function, 0.0).call or "it", way, code)
     owner = _LIVING.get(instance)
     return FmuError(what) if owner is None else owner.lose(what)
 
@@ -104,9 +104,8 @@ def stand_aside() -> None:
     calls = None  # type: ignore[assignment]
 
 
-def said(function: int, way: int, code: int) -> str:
+def said(call: str, way: int, code: int) -> str:
     """What happened in a call that was left."""
-    call = NOTES.seen(0, function, 0.0).call or "it"
     return f"{call} called {_WAYS[way].format(code)}, which would have ended the process"
 
 
@@ -197,6 +196,11 @@ def dismiss(owner: Owner) -> None:
 
 
 # -------------------------------------------------------------------- runs
+
+
+def own_note() -> int:
+    """The number of this thread's note."""
+    return 0 if calls is None else calls.own_note()
 
 
 @contextmanager

@@ -270,7 +270,7 @@ static Hand *make_hands(const Plan *plan)
         return NULL;
     }
     for (size_t n = 0; n < count; n++) {
-        hands[n] = (Hand){plan, reals + n * plan->largest, integers + n * plan->largest};
+        hands[n] = (Hand){plan, reals + n * plan->largest, integers + n * plan->largest, plan->note, NULL};
     }
     return hands;
 }
@@ -285,6 +285,8 @@ static void free_hands(Hand *hands)
 /* A block without the interpreter; 0 with an exception if its threads cannot be had. */
 static int take(Plan *plan, const Block *block, Outcome *outcome)
 {
+    plan->note = guard.note(0);
+    plan->note->rows = 0;
     Hand *hands = make_hands(plan);
     int is_fine = 1;
     if (hands == NULL) {
@@ -351,7 +353,22 @@ static PyObject *run(PyObject *module, PyObject *arguments)
     return result;
 }
 
-static PyMethodDef methods[] = {{"run", run, METH_VARARGS, run_doc}, {NULL, NULL, 0, NULL}};
+static PyObject *watch(PyObject *module, PyObject *arguments)
+{
+    unsigned long long address;
+    (void)module;
+    if (!PyArg_ParseTuple(arguments, "K:watch", &address)) {
+        return NULL;
+    }
+    guard = *(const Guard *)(uintptr_t)address;
+    Py_RETURN_NONE;
+}
+
+static PyMethodDef methods[] = {
+    {"run", run, METH_VARARGS, run_doc},
+    {"watch", watch, METH_VARARGS, "watch(address): call FMUs with the guard that stands there."},
+    {NULL, NULL, 0, NULL},
+};
 
 static struct PyModuleDef module = {
     PyModuleDef_HEAD_INIT, "kernel", "The compiled step loop of the master.", 0, methods, NULL, NULL, NULL, NULL,
@@ -360,7 +377,7 @@ static struct PyModuleDef module = {
 /* The sizes of what the buffers hold in one number, by which Python knows a kernel that other sources were compiled to. */
 static uint32_t layout(void)
 {
-    uint32_t sum = 0;
+    uint32_t sum = sizeof(Note);
     for (int n = 0; n < N_BUFFERS; n++) {
         sum = (31 * sum + (uint32_t)buffer_sizes[n]) & 0x7fffffffU;
     }

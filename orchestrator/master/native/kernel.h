@@ -9,6 +9,8 @@
 #define HAS_THREADS 1
 #endif
 
+#include "../../fmi/guard/native/guard.h"
+
 #include <fenv.h>
 #include <stddef.h>
 #include <stdint.h>
@@ -114,13 +116,16 @@ typedef struct {
     int64_t *disturbed; /* by operation, after which of its steps numbers were first rounded in another way, from 1 */
     unsigned control; /* how numbers are rounded when the block begins, as `float_control` has it, */
     fenv_t floats;    /* and all that belongs to it */
+    Note *note;       /* of the thread that began the block: how many rows there are */
 } Plan;
 
-/* A thread with room for the values of the largest channel. */
+/* A thread with room for the values of the largest channel, and what it is about. */
 typedef struct {
     const Plan *plan;
     double *reals;
     int *integers;
+    Note *note;         /* of the call that is under way, */
+    const Group *group; /* which is one of these */
 } Hand;
 
 /* When a communication step is. */
@@ -176,11 +181,20 @@ static inline unsigned float_control(void)
 #pragma GCC visibility push(hidden)
 #endif
 
+/* Notes calls, and leads back from those that are left: as the binding has it, or not at all. */
+extern Guard guard;
+
+/* Failed calls have an FMI status, or this with how they were left and the exit code (`said_by_status` in compiled.py). */
+#define LEFT(way, code) ((int64_t)(way) << 32 | (uint32_t)(code))
+
 /* That of a block of which nothing is done. */
 Outcome outcome_of(const Block *block);
 
 /* One part of a communication step, from its place on. */
-void take_part(const Hand *hand, int part, const Advance *it, Place *place);
+void take_part(Hand *hand, int part, const Advance *it, Place *place);
+
+/* The call that is under way was left, and how. */
+void note_failure(Hand *hand, Place *place, int way, int code);
 
 /* The block's next step; 0 if it is at its end, or has no room for the row that would be due. */
 int has_next(const Block *block, const Outcome *outcome, Advance *it);
@@ -188,7 +202,7 @@ int has_next(const Block *block, const Outcome *outcome, Advance *it);
 /* A step has been taken: remember its values, write its row if it is due, and let the next one begin at its begin. */
 void finish_step(Plan *plan, const Block *block, const Advance *it, Outcome *outcome);
 
-Outcome take_block(Plan *plan, const Hand *hand, const Block *block);
+Outcome take_block(Plan *plan, Hand *hand, const Block *block);
 
 #if HAS_THREADS
 /* As `take_block`, by as many threads as the plan has parts for, and with a hand for each; 0 if they cannot be had. */

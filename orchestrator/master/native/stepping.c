@@ -15,6 +15,23 @@ typedef int (*GetReal)(void *component, const unsigned int *references, size_t c
 typedef int (*SetInteger)(void *component, const unsigned int *references, size_t count, const int *values);
 typedef int (*GetInteger)(void *component, const unsigned int *references, size_t count, int *values);
 
+static Note note_of_all;
+
+static Note *find_note(int number)
+{
+    (void)number;
+    return &note_of_all;
+}
+
+static int do_unguarded(void (*work)(void *), void *context, int *code)
+{
+    (void)code;
+    work(context);
+    return 0;
+}
+
+Guard guard = {find_note, do_unguarded};
+
 enum { WARNING = 1 }; /* the last status of the standard that is no failure */
 
 static int is_failure(int status)
@@ -50,14 +67,20 @@ static double read_entry(const Plan *plan, const Entry *entry, double time)
     return entry->change < 0 ? value : changed(&plan->changes[entry->change], value, time);
 }
 
+static inline void note_call(const Hand *hand, const Call *call)
+{
+    hand->note->instance = (uint64_t)(uintptr_t)call->component;
+}
+
 /* Each of these takes a group's calls; it returns the one that failed, or the end. A failure with a status that is none is
    a value that is not finite, or none that C's int holds. */
 
-static const Call *take_steps(const Group *group, double time, double step, int *status)
+static const Call *take_steps(const Hand *hand, const Group *group, double time, double step, int *status)
 {
     DoStep do_step = (DoStep)group->function;
     const Call *end = group->end;
     for (const Call *call = group->begin; call < end; call++) {
+        note_call(hand, call);
         int found = do_step(call->component, time, step, 1);
         if (is_failure(found)) {
             *status = found;
@@ -67,13 +90,14 @@ static const Call *take_steps(const Group *group, double time, double step, int 
     return end;
 }
 
-static const Call *set_reals_in_place(const Group *group, int *status)
+static const Call *set_reals_in_place(const Hand *hand, const Group *group, int *status)
 {
     SetReal set = (SetReal)group->function;
     const unsigned int *references = group->references;
     size_t count = group->count;
     const Call *end = group->end;
     for (const Call *call = group->begin; call < end; call++) {
+        note_call(hand, call);
         int found = set(call->component, references, count, call->values);
         if (is_failure(found)) {
             *status = found;
@@ -90,6 +114,7 @@ static const Call *set_reals(const Hand *hand, const Group *group, double time, 
         for (size_t k = 0; k < group->count; k++) {
             hand->reals[k] = read_entry(hand->plan, &call->entries[k], time);
         }
+        note_call(hand, call);
         *status = set(call->component, group->references, group->count, hand->reals);
         if (is_failure(*status)) {
             return call;
@@ -110,6 +135,7 @@ static const Call *set_integers(const Hand *hand, const Group *group, double tim
             }
             hand->integers[k] = (int)value;
         }
+        note_call(hand, call);
         *status = set(call->component, group->references, group->count, hand->integers);
         if (is_failure(*status)) {
             return call;
@@ -118,13 +144,14 @@ static const Call *set_integers(const Hand *hand, const Group *group, double tim
     return group->end;
 }
 
-static const Call *get_reals(const Group *group, int *status)
+static const Call *get_reals(const Hand *hand, const Group *group, int *status)
 {
     GetReal get = (GetReal)group->function;
     const unsigned int *references = group->references;
     size_t count = group->count;
     const Call *end = group->end;
     for (const Call *call = group->begin; call < end; call++) {
+        note_call(hand, call);
         int found = get(call->component, references, count, call->values);
         int finite = 1;
         for (size_t k = 0; k < count; k++) {
@@ -142,6 +169,7 @@ static const Call *get_integers(const Hand *hand, const Group *group, int *statu
 {
     GetInteger get = (GetInteger)group->function;
     for (const Call *call = group->begin; call < group->end; call++) {
+        note_call(hand, call);
         *status = get(call->component, group->references, group->count, hand->integers);
         if (is_failure(*status)) {
             return call;
@@ -165,21 +193,22 @@ static const Call *change_values(const Group *group, double time)
 static const Call *take_group(const Hand *hand, const Group *group, double time, double step, int *status)
 {
     switch (group->kind) {
-    case STEP: return take_steps(group, time, (double)group->period * step, status);
-    case SET_REALS_IN_PLACE: return set_reals_in_place(group, status);
+    case STEP: return take_steps(hand, group, time, (double)group->period * step, status);
+    case SET_REALS_IN_PLACE: return set_reals_in_place(hand, group, status);
     case SET_REALS: return set_reals(hand, group, time, status);
     case SET_INTEGERS: return set_integers(hand, group, time, status);
-    case GET_REALS: return get_reals(group, status);
+    case GET_REALS: return get_reals(hand, group, status);
     case GET_INTEGERS: return get_integers(hand, group, status);
     default: return change_values(group, time + step);
     }
 }
 
-void take_part(const Hand *hand, int part, const Advance *it, Place *place)
+void take_part(Hand *hand, int part, const Advance *it, Place *place)
 {
     const Plan *plan = hand->plan;
     const Group *end = plan->groups + plan->bounds[part + 1];
     Call *from = plan->calls + place->begin;
+    hand->note->time = it->time;
     for (const Group *group = plan->groups + plan->bounds[part]; group < end; group++) {
         if (group->end <= from || (group->period > 1 && it->number % group->period != group->phase)) {
             continue;
@@ -191,6 +220,8 @@ void take_part(const Hand *hand, int part, const Advance *it, Place *place)
             rest.begin = from;
             taken = &rest;
         }
+        hand->group = group;
+        hand->note->function = group->function;
         int status = 0;
         const Call *call = take_group(hand, taken, it->time, it->step, &status);
         if (group->is_watched && float_control() != plan->control) { /* an FMU must not change the numbers of others */
@@ -201,8 +232,12 @@ void take_part(const Hand *hand, int part, const Advance *it, Place *place)
         if (call < group->end) {
             place->failed = call - plan->calls;
             place->status = status;
-            return;
+            break;
         }
+    }
+    hand->note->instance = 0;
+    if (place->failed >= 0) {
+        return;
     }
     place->begin = place->begin < plan->ends[part] ? plan->ends[part] : place->begin;
 }
@@ -246,20 +281,47 @@ void finish_step(Plan *plan, const Block *block, const Advance *it, Outcome *out
         double *row = block->rows + outcome->written * (plan->value_count + 1);
         row[0] = block->start + (double)(it->number + 1) * block->step;
         memcpy(row + 1, plan->values, plan->value_count * sizeof(double));
-        outcome->written++;
+        plan->note->rows = ++outcome->written;
     }
 }
 
-Outcome take_block(Plan *plan, const Hand *hand, const Block *block)
+void note_failure(Hand *hand, Place *place, int way, int code)
 {
-    Outcome outcome = outcome_of(block);
-    Advance it;
-    while (block->places->failed < 0 && has_next(block, &outcome, &it)) {
-        take_part(hand, 0, &it, block->places);
+    const Call *call = hand->group->begin;
+    while ((uint64_t)(uintptr_t)call->component != hand->note->instance && call + 1 < hand->group->end) {
+        call++;
+    }
+    hand->note->instance = 0;
+    place->failed = call - hand->plan->calls;
+    place->status = LEFT(way, code);
+}
+
+typedef struct {
+    Plan *plan;
+    Hand *hand;
+    const Block *block;
+    Outcome outcome;
+    Advance step;
+} Run;
+
+static void take_all(void *context)
+{
+    Run *run = context;
+    const Block *block = run->block;
+    while (block->places->failed < 0 && has_next(block, &run->outcome, &run->step)) {
+        take_part(run->hand, 0, &run->step, block->places);
         if (block->places->failed < 0) {
-            finish_step(plan, block, &it, &outcome);
+            finish_step(run->plan, block, &run->step, &run->outcome);
         }
     }
-    return outcome;
 }
 
+Outcome take_block(Plan *plan, Hand *hand, const Block *block)
+{
+    Run run = {.plan = plan, .hand = hand, .block = block, .outcome = outcome_of(block)};
+    int code = 0, way = guard.safely(take_all, &run, &code);
+    if (way != 0) {
+        note_failure(hand, block->places, way, code);
+    }
+    return run.outcome;
+}

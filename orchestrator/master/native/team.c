@@ -33,6 +33,7 @@ typedef struct {
     Team *team;
     Hand hand;
     int number;
+    int part; /* of the step that it takes */
     pthread_t thread;
 } Member;
 
@@ -68,11 +69,28 @@ static int turn_over(Team *team)
     return has_next(team->block, &team->outcome, &team->step);
 }
 
+static void take_guarded(void *context)
+{
+    Member *me = context;
+    take_part(&me->hand, me->part, &me->team->step, &me->team->block->places[me->number]);
+}
+
+/* A part of the step; one that an FMU leaves has failed. */
+static void take_safely(Member *me, int part)
+{
+    me->part = part;
+    int code = 0, way = guard.safely(take_guarded, me, &code);
+    if (way != 0) {
+        note_failure(&me->hand, &me->team->block->places[me->number], way, code);
+    }
+}
+
 static void *work(void *argument)
 {
     Member *me = argument;
     Team *team = me->team;
     Place *mine = &team->block->places[me->number];
+    me->hand.note = guard.note(me->number);
     while (atomic_load_explicit(&team->gate, memory_order_acquire) == 0) {
         sched_yield();
     }
@@ -85,14 +103,14 @@ static void *work(void *argument)
             return NULL;
         }
         if (mine->failed < 0) {
-            take_part(&me->hand, me->number, &team->step, mine);
+            take_safely(me, me->number);
         }
         if (mine->failed >= 0) { /* nobody is read before this has been helped */
             atomic_store_explicit(&team->is_left, 1, memory_order_relaxed);
         }
         meet(team);
         if (!atomic_load_explicit(&team->is_left, memory_order_relaxed)) {
-            take_part(&me->hand, team->count + me->number, &team->step, mine);
+            take_safely(me, team->count + me->number);
         }
         meet(team);
     }

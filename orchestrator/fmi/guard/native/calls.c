@@ -24,6 +24,8 @@
 typedef struct Landing {
     jmp_buf where;
     struct Landing *outer;
+    Way way;
+    int code;
 } Landing;
 
 static THREAD_LOCAL Landing *landing;
@@ -35,15 +37,18 @@ static size_t note_count = 1;
 static atomic_size_t given;
 static PyObject *will, *gone;
 
-Note *guard_note(void)
+Note *guard_note(int number)
 {
-    if (mine == NULL) {
-        mine = notes + atomic_fetch_add(&given, 1) % note_count;
+    if (mine == NULL) { /* the first half is for threads of their own, the second for those of teams */
+        size_t half = note_count / 2;
+        mine = half == 0    ? notes
+               : number > 0 ? notes + half + (size_t)(number - 1) % half
+                            : notes + atomic_fetch_add(&given, 1) % half;
     }
     return mine;
 }
 
-int guard_safely(void (*work)(void *), void *context)
+int guard_safely(void (*work)(void *), void *context, int *code)
 {
     Landing here;
     here.outer = landing;
@@ -51,10 +56,12 @@ int guard_safely(void (*work)(void *), void *context)
         landing = &here;
         work(context);
         landing = here.outer;
-        return 1;
+        return RETURNED;
     }
+    int way = landing->way;
+    *code = landing->code;
     landing = landing->outer;
-    return 0;
+    return way;
 }
 
 int guard_is_in_run(void)
@@ -64,10 +71,9 @@ int guard_is_in_run(void)
 
 void guard_leave(Way way, int code)
 {
-    Note *note = guard_note();
-    note->way = way;
-    note->code = code;
     if (landing != NULL) {
+        landing->way = way;
+        landing->code = code;
         longjmp(landing->where, 1);
     }
 }
@@ -83,7 +89,7 @@ int guard_say(Way way, int code)
         return 0;
     }
     PyGILState_STATE state = PyGILState_Ensure();
-    Note *note = guard_note();
+    Note *note = guard_note(0);
     PyObject *said = PyObject_CallFunction(will, "KKdii", (unsigned long long)note->instance,
                                            (unsigned long long)note->function, note->time, (int)way, code);
     if (said == NULL) {
@@ -113,12 +119,11 @@ static void do_work(void *context)
     work->result = PyObject_CallObject(work->function, work->arguments);
 }
 
-static PyObject *raise_gone(const Note *note)
+static PyObject *raise_gone(const Note *note, int way, int code)
 {
     PyObject *error = gone == NULL ? NULL
                                    : PyObject_CallFunction(gone, "KKii", (unsigned long long)note->instance,
-                                                           (unsigned long long)note->function, (int)note->way,
-                                                           (int)note->code);
+                                                           (unsigned long long)note->function, way, code);
     if (error != NULL) {
         PyErr_SetObject((PyObject *)Py_TYPE(error), error);
         Py_DECREF(error);
@@ -132,7 +137,7 @@ static PyObject *call(PyObject *self, PyObject *arguments, PyObject *names)
 {
     Call *it = (Call *)self;
     (void)names;
-    Note *note = guard_note();
+    Note *note = guard_note(0);
     uint64_t instance = note->instance, function = note->function;
     PyObject *first = PyTuple_Size(arguments) > 0 ? PyTuple_GetItem(arguments, 0) : NULL;
     if (first != NULL && PyLong_Check(first)) {
@@ -145,9 +150,10 @@ static PyObject *call(PyObject *self, PyObject *arguments, PyObject *names)
     note->function = it->address;
     Work work = {it->function, arguments, NULL};
     PyThreadState *state = PyThreadState_Get();
-    if (!guard_safely(do_work, &work)) {
+    int code = 0, way = guard_safely(do_work, &work, &code);
+    if (way != RETURNED) {
         PyEval_RestoreThread(state);
-        raise_gone(note);
+        raise_gone(note, way, code);
     }
     note->instance = instance;
     note->function = function;
@@ -224,7 +230,7 @@ static PyObject *begin(PyObject *module, PyObject *arguments)
     if (!PyArg_ParseTuple(arguments, "KK:begin", &instance, &function)) {
         return NULL;
     }
-    Note *note = guard_note();
+    Note *note = guard_note(0);
     PyObject *before = Py_BuildValue("(KK)", (unsigned long long)note->instance, (unsigned long long)note->function);
     note->instance = instance;
     note->function = function;
@@ -236,7 +242,7 @@ static PyObject *enter_run(PyObject *module, PyObject *nothing)
     (void)module;
     (void)nothing;
     runs++;
-    guard_note()->time = -HUGE_VAL;
+    guard_note(0)->time = -HUGE_VAL;
     Py_RETURN_NONE;
 }
 
@@ -272,7 +278,7 @@ static PyObject *own_note(PyObject *module, PyObject *nothing)
 {
     (void)module;
     (void)nothing;
-    return PyLong_FromSsize_t(guard_note() - notes);
+    return PyLong_FromSsize_t(guard_note(0) - notes);
 }
 
 static PyMethodDef methods[] = {

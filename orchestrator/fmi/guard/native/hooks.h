@@ -15,8 +15,8 @@
 /* How an FMU leaves; `WAYS` in notes.py has the words. */
 typedef enum { RETURNED, BY_EXIT, BY_EXIT_AT_ONCE, BY_QUICK_EXIT, BY_ABORT, BY_THREAD_EXIT } Way;
 
-Note *guard_note(void);
-int guard_safely(void (*work)(void *), void *context);
+Note *guard_note(int number);
+int guard_safely(void (*work)(void *), void *context, int *code);
 
 /* Whether this thread is in a run. */
 int guard_is_in_run(void);
