@@ -9,12 +9,14 @@ import importlib.metadata
 import json
 import math
 import platform
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from pathlib import Path
 from typing import Any
 
+import orjson
+
 from .. import world
-from ..errors import ScenarioError, naming
+from ..errors import ScenarioError
 from ..evaluation import count_values
 from ..figures import remove_drawn
 from ..isolation import is_isolated
@@ -214,21 +216,38 @@ def _texts(checked: Checked) -> list[str]:
 
 def _dump(path: Path, content: dict[str, Any]) -> None:
     part = path.with_name(path.name + ".part")
-    text = json.dumps(_plain(content), indent=1, ensure_ascii=False) + "\n"
-    # What stands for the bytes of a file name that is not UTF-8 becomes the escape that JSON has for it.
+    text = _text_of(_plain(content))
     with naming(part):
-        world.write_text(part, text, encoding="utf-8", errors="backslashreplace")
+        world.write_bytes(part, text)
     world.replace(part, path)
+
+
+def _text_of(content: Any) -> bytes:
+    try:
+        return orjson.dumps(content, option=orjson.OPT_INDENT_2 | orjson.OPT_APPEND_NEWLINE)
+    except TypeError:  # numbers of more than 64 bits, and what stands for the bytes of a file name that is not UTF-8
+        return f"{json.dumps(content, indent=2, ensure_ascii=False)}\n".encode(errors="backslashreplace")
 
 
 def _plain(value: Any) -> Any:
     """JSON has no infinity, no NaN and no dates: they become text."""
     if isinstance(value, dict):
-        return {str(k): _plain(v) for k, v in value.items()}
+        return value if _is_plain(value.values()) else {str(k): _plain(v) for k, v in value.items()}
     if isinstance(value, list | tuple | set | frozenset):
-        return [_plain(v) for v in value]
+        return value if _is_plain(value) else [_plain(v) for v in value]
     if hasattr(value, "item") and not isinstance(value, str):
         value = value.item()
     if isinstance(value, float) and not math.isfinite(value):
         return repr(value)
     return value if value is None or isinstance(value, str | int | float) else str(value)
+
+
+def _is_plain(values: Collection[Any]) -> bool:
+    """Whether JSON has all of them: of a million variables each is not looked at again."""
+    kinds = set(map(type, values))
+    if not kinds <= _KINDS or isinstance(values, set | frozenset):
+        return False
+    return float not in kinds or all(math.isfinite(value) for value in values if type(value) is float)
+
+
+_KINDS = {str, int, float, bool, type(None)}
