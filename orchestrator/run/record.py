@@ -16,7 +16,7 @@ from typing import Any
 import orjson
 
 from .. import world
-from ..errors import ScenarioError
+from ..errors import ScenarioError, naming
 from ..evaluation import count_values
 from ..figures import remove_drawn
 from ..isolation import is_isolated
