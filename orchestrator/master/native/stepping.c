@@ -17,17 +17,17 @@ typedef int (*GetInteger)(void *component, const unsigned int *references, size_
 
 static Note note_of_all;
 
-static Note *find_note(int number)
+static Note *find_note(int number) /* uncovered: there is a guard */
 {
     (void)number;
-    return &note_of_all;
+    return &note_of_all; /* uncovered: there is a guard */
 }
 
-static int do_unguarded(void (*work)(void *), void *context, int *code)
+static int do_unguarded(void (*work)(void *), void *context, int *code) /* uncovered: there is a guard */
 {
     (void)code;
-    work(context);
-    return 0;
+    work(context); /* uncovered: there is a guard */
+    return 0;      /* uncovered: there is a guard */
 }
 
 Guard guard = {find_note, do_unguarded};

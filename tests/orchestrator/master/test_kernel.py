@@ -28,6 +28,12 @@ pytestmark = [
 
 # -------------------------------------------------------------------- what the kernel is given
 
+
+def test_a_guard_is_an_address():
+    with pytest.raises(TypeError):
+        compiled.kernel.watch("there")
+
+
 NAMES = (
     "operations parts channels instances entries references changes values history newest rows places disturbed every "
     "start step first count last"

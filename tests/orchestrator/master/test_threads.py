@@ -1,11 +1,13 @@
 """team.c: several threads give what one gives, whatever FMUs do."""
 
+import itertools
 import shutil
 import sys
 
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from railcosim.orchestrator.fmi.guard import watching
 from railcosim.orchestrator.master import compiled
 from railcosim.orchestrator.run.execution import execute, run
 from railcosim.orchestrator.system import Event, System
@@ -45,6 +47,19 @@ def test_of_several_threads_that_fail_the_first_is_told(both, odd, mode, ring):
     assert both(system, threads=3).error.instance == "odd[2]"
     system.instances["odd[5]"].start["mode"] = 33  # it is set before anyone is stepped, a step after others are read
     assert both(system, threads=3).error.instance == ("odd[5]" if mode in (3, 4) else "odd[2]")
+
+
+@pytest.mark.skipif(watching.calls is None, reason="FMUs are not guarded here")
+@pytest.mark.parametrize(("algorithm", "threads"), [("gauss-seidel", 1), ("jacobi", 1), ("jacobi", 3)])
+def test_who_would_end_the_process_is_told(both, lag, algorithm, threads):
+    """As if it had failed: the way back from its call leads into the loop, compiled or not, whoever takes the step."""
+    system = System(step=0.1, stop_time=1.0, algorithm=algorithm)
+    for name, code in {"a": "", "b": "if (t > 0.45) exit(7);", "c": "", "d": "if (t > 0.45) exit(8);"}.items():
+        system.add(name, str(lag(name=f"{name}.fmu", on_step=code)))
+    for source, target in itertools.pairwise("abcda"):
+        system.connect(f"{source}.y", f"{target}.u")
+    error = both(system, threads=threads).error
+    assert str(error).startswith("b, t = 0.5 s: fmi2DoStep called exit(7), which would have")
 
 
 # -------------------------------------------------------------------- whatever FMUs do
