@@ -89,7 +89,7 @@ class RowsWriter:
             self._tell_words()
         try:
             self._write(np.ascontiguousarray(block, _FLOAT).data.cast("B"))
-        except OSError:  # half a row would shift all that follow
+        except BaseException:  # half a row would shift all that follow, also after an interruption
             size = os.fstat(self._file.fileno()).st_size
             self.rows = max(0, size - self._begin) // self._row
             self._file.truncate(self._begin + self.rows * self._row)
