@@ -67,11 +67,11 @@ class Interruption:
                 yield
             finally:
                 self._is_over = True
-                near.send(b"\0")
-                watch.join()
                 for number, handler in before.items():
                     signal.signal(number, handler)
                 signal.set_wakeup_fd(woken)
+                near.send(b"\0")
+                watch.join()
 
     def pass_on(self) -> None:
         """Tell a handler of the application's, which the run has kept from the signal that ended it."""
