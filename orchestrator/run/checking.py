@@ -6,6 +6,7 @@ import math
 from collections import Counter
 from collections.abc import Mapping
 from dataclasses import dataclass
+from functools import cached_property
 
 from ..errors import ScenarioError
 from ..evaluation import check_metrics, check_requirements, check_values, metric_indices, split_metric
@@ -43,6 +44,17 @@ class Checked:
     order: Order
     notes: tuple[str, ...]
     large: str = ""
+
+    @cached_property
+    def units(self) -> dict[str, str]:
+        """Units by full name, of signals and parameters that have one."""
+        sources = {link.source for link in self.wiring.links}
+        return {
+            f"{name}.{v.name}": v.unit
+            for name, model in self.models.items()
+            for v in model.interface.variables.values()
+            if v.unit is not None and (v.causality in ("output", "parameter") or (name, v.name) in sources)
+        }
 
 
 def check(system: System, workspace: Workspace, kind: Kind = "auto", *, trusted: bool = True) -> Checked:

@@ -50,7 +50,7 @@ def write(place: RunDirectory, checked: Checked, kind: str, *, anew: bool = True
         for name in (ROWS_FILE, SEEN_FILE):
             remove_rows(directory / name)
     _dump(directory / "run.json", place.marks | _describe(checked.system, checked, kind) | {"status": "running"})
-    _dump(directory / "units.json", {"time": "s"} | _units(checked))
+    _dump(directory / "units.json", {"time": "s"} | checked.units)
 
 
 def identity_of(checked: Checked, kind: str) -> str:
@@ -178,7 +178,7 @@ def _describe(system: System, checked: Checked, kind: str) -> dict[str, Any]:
             for name, model in checked.models.items()
         },
         "connections": [dataclasses.asdict(connection) for connection in system.connections],
-        "units": _units(checked),
+        "units": checked.units,
         "texts": _texts(checked),
         "parameters": checked.wiring.left
         | {
@@ -192,15 +192,6 @@ def _describe(system: System, checked: Checked, kind: str) -> dict[str, Any]:
         "references": system.judged.references,
         "figures_wanted": system.judged.figures,
         "scenario_text": system.provenance.text,
-    }
-
-
-def _units(checked: Checked) -> dict[str, str]:
-    return {
-        f"{name}.{v.name}": v.unit
-        for name, model in checked.models.items()
-        for v in model.interface.of("output", "parameter")
-        if v.unit is not None
     }
 
 

@@ -320,20 +320,15 @@ class Session:
         """What was recorded."""
         recording = self._recording
         columns: Mapping[str, Any] = {"time": np.empty(0)} if recording is None else recording.columns()
-        units: dict[str, str] = {}
         parameters: dict[str, Any] = dict(self.checked.wiring.left)
         for instance, model in self.checked.models.items():
             starts = self.checked.wiring.starts[instance]
-            for variable in model.interface.variables.values():
-                name = f"{instance}.{variable.name}"
-                if variable.unit is not None:
-                    units[name] = variable.unit
-                if variable.causality == "parameter":
-                    parameters[name] = starts.get(variable.name, variable.start)
+            for variable in model.interface.of("parameter"):
+                parameters[f"{instance}.{variable.name}"] = starts.get(variable.name, variable.start)
         return Results(
             columns,
             None,
-            units=units,
+            units=self.checked.units,
             parameters=parameters,
             step=self.system.stepping.step,
             stop_time=self.system.stepping.stop_time,
