@@ -201,7 +201,7 @@ def _check_folders(path: Path, files: dict[str, zipfile.ZipInfo]) -> None:
     """No file stands where others need a folder; one that is empty was meant as one."""
     folders = {str(parent) for name in files for parent in PurePosixPath(name).parents}
     for name in folders & files.keys():
-        if files[name].file_size:
+        if files[name].file_size or name == _DESCRIPTION:
             raise FmuFileError(f"{path} is refused: {name!r} in it is a file, and a folder of others as well")
         files[f"{name}/"] = files.pop(name)
 

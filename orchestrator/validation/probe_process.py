@@ -11,6 +11,7 @@ from pathlib import Path
 
 from .. import world
 from ..errors import FmuError
+from ..fmi.guard import stand_aside
 from . import claims, probes, probes_fmi2
 from .probes import DoubtfulError, NotedError, Task
 
@@ -21,6 +22,7 @@ _KEPT = 5
 
 def main(path: str) -> None:
     """Run the probe that the file asks for, and write its verdict."""
+    stand_aside()  # this process may end as it likes: who has started it tells how
     task = Task.read(Path(path))
     printed = io.StringIO()
     try:

@@ -3,7 +3,6 @@
 import shutil
 from pathlib import Path
 
-import click
 import pytest
 import typer
 from railcosim.fmus import build
@@ -14,6 +13,8 @@ from railcosim.orchestrator.run.execution import run
 COMMANDS = typer.main.get_command(app).commands
 EXECUTING = {"run", "compare", "linearize"}
 """Those that run a scenario: they execute what it names, and say so."""
+PATHS = {"path", "file", "directory"}
+"""What typer calls the types of options that are paths."""
 NEEDED = {"pack": ["-o", "packed.fmu"], "linearize": ["--at", "0.1"], "build": ["-o", "built"]}
 """Options without which a command does nothing; one with another required option belongs here."""
 COMPONENT = """from pathlib import Path
@@ -80,7 +81,7 @@ def ways(command: str, scenario: Path, out: Path) -> list[list[str]]:
     options = [
         [one.opts[0], str(out)]
         for one in COMMANDS[command].params
-        if isinstance(one, click.Option) and isinstance(one.type, click.Path) and one.name != "output"
+        if one.param_type_name == "option" and one.type.name in PATHS and one.name != "output"
     ]
     arguments = [] if command in EXECUTING else [[str(scenario)]]
     return [[command, *NEEDED.get(command, []), *way] for way in (*arguments, [str(out)], *options)]

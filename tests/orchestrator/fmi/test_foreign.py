@@ -179,7 +179,9 @@ cli.main()
 """
 
 
-@pytest.mark.parametrize(("mode", "what"), [(30, "crashed (SIGSEGV)"), (31, "ended the process (exit code 7)")])
+@pytest.mark.parametrize(
+    ("mode", "what"), [(30, "crashed (SIGSEGV)"), (31, "called exit(7), which would have ended the process")]
+)
 def test_an_fmu_that_ends_the_process(fmu, go, tmp_path, mode, what):
     """Without isolation the watching parent tells; what was on the disk by then can be used."""
     start = {"it": {"mode": mode, "u": 1.0}, "slow": {"mode": 40, "at": 0.0}}

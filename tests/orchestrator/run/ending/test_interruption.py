@@ -134,10 +134,10 @@ def test_one_that_finds_no_way_back_to_python_ends_the_process(quick, monkeypatc
 
 
 def hang(it):
-    """Be in C for a third of a second, whatever signals come."""
+    """Be in C for a second or so, whatever signals come: more of them than two, lest two are taken for one."""
     with it.listening():
-        send(0.05, 0.05, number=signal.SIGTERM)
-        hashlib.pbkdf2_hmac("sha256", b"", b"", 700_000)
+        send(0.05, 0.1, 0.1, 0.1, number=signal.SIGTERM)
+        hashlib.pbkdf2_hmac("sha256", b"", b"", 2_500_000)
 
 
 def test_in_another_thread_it_does_nothing():
