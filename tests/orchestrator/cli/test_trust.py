@@ -1,6 +1,8 @@
 """What commands that only look execute: nothing outside of the scenario's folder, unless somebody trusts it."""
 
+import inspect
 import shutil
+import typing
 from pathlib import Path
 
 import pytest
@@ -13,8 +15,6 @@ from railcosim.orchestrator.run.execution import run
 COMMANDS = typer.main.get_command(app).commands
 EXECUTING = {"run", "compare", "linearize"}
 """Those that run a scenario: they execute what it names, and say so."""
-PATHS = {"path", "file", "directory"}
-"""What typer calls the types of options that are paths."""
 NEEDED = {"pack": ["-o", "packed.fmu"], "linearize": ["--at", "0.1"], "build": ["-o", "built"]}
 """Options without which a command does nothing; one with another required option belongs here."""
 COMPONENT = """from pathlib import Path
@@ -78,10 +78,12 @@ def interrupted(strange):
 
 def ways(command: str, scenario: Path, out: Path) -> list[list[str]]:
     """Every way to give a command the two: as its argument, and by each option that takes a path to read."""
+    hints = typing.get_type_hints(inspect.unwrap(COMMANDS[command].callback))
+    paths = {name for name, hint in hints.items() if Path in (hint, *typing.get_args(hint))}
     options = [
         [one.opts[0], str(out)]
         for one in COMMANDS[command].params
-        if one.param_type_name == "option" and one.type.name in PATHS and one.name != "output"
+        if one.param_type_name == "option" and one.name in paths and one.name != "output"
     ]
     arguments = [] if command in EXECUTING else [[str(scenario)]]
     return [[command, *NEEDED.get(command, []), *way] for way in (*arguments, [str(out)], *options)]
@@ -213,3 +215,7 @@ def test_a_swap_speaks_for_its_code(strange, capsys):
     capsys.readouterr()
     assert call(["run", *swap, *resume]) == 2
     assert "and the scenario of the run with the --swap it had" in capsys.readouterr().err
+
+
+def test_options_that_take_a_directory_are_among_the_ways():
+    assert ["run", "--resume", "out"] in ways("run", Path("s.toml"), Path("out"))
