@@ -288,9 +288,10 @@ void finish_step(Plan *plan, const Block *block, const Advance *it, Outcome *out
 void note_failure(Hand *hand, Place *place, int way, int code)
 {
     const Call *call = hand->group->begin;
-    /* uncovered: only FMUs of our own stand in groups of several, and none of them leaves */
-    while ((uint64_t)(uintptr_t)call->component != hand->note->instance && call + 1 < hand->group->end) { /* uncovered: as said */
-        call++; /* uncovered: as said */
+    uint64_t left = hand->note->instance;
+    /* Only FMUs of our own stand in groups of several, and none of them leaves. */
+    while ((uint64_t)(uintptr_t)call->component != left && call + 1 < hand->group->end) { /* uncovered: see above */
+        call++;                                                                           /* uncovered: see above */
     }
     hand->note->instance = 0;
     place->failed = call - hand->plan->calls;
