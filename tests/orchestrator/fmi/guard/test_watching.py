@@ -3,6 +3,7 @@
 import logging
 import os
 import signal
+import subprocess
 import sys
 
 import pytest
@@ -114,12 +115,26 @@ def test_a_library_that_ends_the_process_as_it_is_unloaded(system, forked, way):
     assert said.startswith(f"bad (Lag) in unloading its library at t = 0.9 s called {way}")
 
 
-def test_an_end_that_no_table_shows(system, forked):
-    """``err`` ends the process inside the C library."""
+ALONE = """
+import sys
+from railcosim.orchestrator import System, run
+made = System(step=0.1, stop_time=1.0, algorithm="iterative")
+made.add("good", sys.argv[1])
+made.add("bad", sys.argv[2])
+made.connect("good.y", "bad.u")
+run(made)
+"""
+
+
+def test_an_end_that_no_table_shows(system):
+    """``err`` ends the process inside the C library; a new process, in which no other library ends in its own way."""
     bad = system(on_step='if (t > 0.45) err(0, "no more");', options=["-include", "err.h"])
-    code, said = forked(lambda: run(bad))
-    assert code == 3
-    assert "bad (Lag) in fmi2DoStep at t = 0.5 s called exit(0), which ended the process" in said
+    paths = [bad.instances[name].model for name in ("good", "bad")]
+    done = subprocess.run(
+        [sys.executable, "-c", ALONE, *paths], capture_output=True, text=True, check=False, timeout=60
+    )
+    assert done.returncode == 3
+    assert "bad (Lag) in fmi2DoStep at t = 0.5 s called exit(0), which ended the process" in done.stderr
 
 
 def test_python_that_ends_the_process_within_a_run(system, forked):
