@@ -107,6 +107,8 @@ def high(descriptor: int) -> int:
 
 _line = 1
 _line_identity: tuple[int, int] = (0, 0)
+_EXITING = 0x4
+"""PF_EXITING of Linux."""
 _ADOPT = 36
 """PR_SET_CHILD_SUBREAPER of Linux's prctl."""
 
@@ -182,7 +184,7 @@ class _Guard:
             inside: a path in the workspace of the master, which is removed if the master could not do it.
         """
         is_wanted = self._watch()
-        is_alone = os.getppid() != self._master
+        is_alone = self._is_alone()
         self._end_all()
         while self._hear():
             pass
@@ -191,6 +193,15 @@ class _Guard:
         if is_alone:
             remove_where_abandoned(inside)
         _end_as(os.waitstatus_to_exitcode(self._status or 0) if is_wanted else -signal.SIGTERM)
+
+    def _is_alone(self) -> bool:
+        """Whether the master is gone. One that is going has given up its line to the child, but not yet its place."""
+        until = world.monotonic() + _GRACE
+        while os.getppid() == self._master:
+            if not _is_going(self._master) or world.monotonic() > until:
+                return False
+            world.sleep(0.01)
+        return True
 
     def _watch(self) -> bool:
         """Wait for the child's end, or that of the master; False where it was the master's wish."""
@@ -241,6 +252,15 @@ class _Guard:
                 with contextlib.suppress(psutil.Error):
                     one.kill()
             world.sleep(0.01)
+
+
+def _is_going(process: int) -> bool:
+    """Whether Linux is about to end a process."""
+    try:
+        told = world.read_text(Path(f"/proc/{process}/stat")).rpartition(")")[2].split()
+        return bool(int(told[6]) & _EXITING)
+    except (OSError, LookupError, ValueError):  # gone by now, or another system
+        return False
 
 
 def _end_as(code: int) -> NoReturn:
