@@ -176,10 +176,13 @@ print(next(line.split()[1] for line in open("/proc/self/status") if line.startsw
 @pytest.mark.skipif(sys.platform != "linux", reason="/proc")
 @pytest.mark.parametrize("record", [0.01, 0.1])
 def test_memory_does_not_grow_with_the_number_of_steps(mine, tmp_path, record):
-    """With a file: 0.4 and 4 million steps, of which the larger run's rows would take 96 MB."""
+    """With a file: 0.4 and 4 million steps, of which the larger run's rows would take 96 MB, and at its end twice that.
+
+    Results of less than 16 MB are read back into memory, where parts of them stand three times for a while.
+    """
     model, peaks = mine("Lag"), []
     for stop in (4e3, 4e4):
         command = [sys.executable, "-c", MEMORY, str(stop), model, str(tmp_path / "out"), str(record)]
         done = subprocess.run(command, capture_output=True, text=True, check=True)
         peaks.append(int(done.stdout.split()[-1]) / 1024)
-    assert peaks[1] - peaks[0] < 30.0, peaks
+    assert peaks[1] - peaks[0] < 64.0, peaks
