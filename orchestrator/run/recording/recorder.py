@@ -149,9 +149,8 @@ class Recorder:
     def _give_back(self) -> None:
         writer, self._writer = self._writer, None
         if writer is not None:
-            with suppress(OSError):
+            with suppress(OSError):  # what is there of before has more rows, and stays
                 writer.close()
-                writer.take_place()
 
     def columns(self) -> Columns:
         """What was recorded, the time among it: out of memory, or of the closed file."""
