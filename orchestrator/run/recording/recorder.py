@@ -146,7 +146,8 @@ class Recorder:
             self._writer.take_place()
         self._writer = None
 
-    def _give_back(self) -> None:
+    def give_back(self) -> None:
+        """Let go of the file, whatever it holds."""
         writer, self._writer = self._writer, None
         if writer is not None:
             with suppress(OSError):  # what is there of before has more rows, and stays
@@ -178,7 +179,7 @@ class Recorder:
             assert self._path is not None
             if self._writer is not None:  # what comes now would leave a gap
                 self.count = self._writer.rows
-                self._give_back()
+                self.give_back()
             size = world.stat(self._path).st_size if self._path.exists() else 0
             raise RecordError(
                 f"{self._path.name} in {self._path.parent} cannot be written beyond {size / 1e6:.3g} MB: "

@@ -68,9 +68,14 @@ class Recording:
             record: its run.json.
             marks: of the checkpoint.
         """
-        for recorder, name, (rows, _) in zip(self._recorders, _FILES, marks, strict=False):
-            stored = open_stored(directory, record, name)
-            recorder.go_on(stored.blocks, stored.words, rows)
+        try:
+            for recorder, name, (rows, _) in zip(self._recorders, _FILES, marks, strict=False):
+                stored = open_stored(directory, record, name)
+                recorder.go_on(stored.blocks, stored.words, rows)
+        except BaseException:  # the other one would stay open
+            for recorder in self._recorders:
+                recorder.give_back()
+            raise
 
     @property
     def marks(self) -> list[list[int]]:
