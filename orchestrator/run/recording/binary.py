@@ -116,6 +116,11 @@ class RowsWriter:
         self._file = world.open(self._part, "ab", buffering=0)
         return True
 
+    @property
+    def standing(self) -> int:
+        """How many of the rows stand under its name: none until they take the place of those of before."""
+        return self.rows if self._part == self.path else 0
+
     def close(self) -> None:
         """Give the file back; what was written stays."""
         self._file.close()

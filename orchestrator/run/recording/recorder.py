@@ -155,7 +155,7 @@ class Recorder:
 
     def columns(self) -> Columns:
         """What was recorded, the time among it: out of memory, or of the closed file."""
-        if self._path is None:
+        if self._path is None or not self.count:  # in its place may be rows of before
             self._seal()
             table = np.empty((len(self._columns), self.count))
             begin = 0
@@ -178,7 +178,7 @@ class Recorder:
         except OSError as error:
             assert self._path is not None
             if self._writer is not None:  # what comes now would leave a gap
-                self.count = self._writer.rows
+                self.count = self._writer.standing
                 self.give_back()
             size = world.stat(self._path).st_size if self._path.exists() else 0
             raise RecordError(

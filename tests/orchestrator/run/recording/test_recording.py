@@ -10,7 +10,7 @@ import pytest
 from railcosim.orchestrator import Results, System, world
 from railcosim.orchestrator.cli import app as cli
 from railcosim.orchestrator.errors import RecordError
-from railcosim.orchestrator.run.execution import execute, run
+from railcosim.orchestrator.run.execution import execute, resume, run
 from railcosim.orchestrator.run.recording import recorder
 
 
@@ -150,6 +150,22 @@ def test_a_disk_that_has_no_room_for_the_text(mine, tmp_path, monkeypatch):
     assert sorted(path.name for path in out.glob("results*")) == ["results.bin"]
     assert cli.call(["plot", str(out)]) == 0
     assert len((out / "results.csv").read_text().splitlines()) == 202
+
+
+@pytest.mark.parametrize("room", [1000, 2300])
+def test_a_disk_that_is_full_when_a_run_goes_on(mine, tmp_path, monkeypatch, large, room):
+    """Before the rows of the checkpoint are there again, or after: what there was can be read, and nothing is open."""
+    run(swinging(mine, record=0.2), kind="plain", output=tmp_path, checkpoint_every=15.0)
+    before = Results.load(tmp_path)
+    with monkeypatch.context() as full:
+        no_room(full, "results.bin", room)
+        with pytest.raises(RecordError, match="cannot be written beyond"):
+            resume(tmp_path)
+    after = Results.load(tmp_path)
+    assert after.time[-1] == before.time[-1]
+    assert all(np.array_equal(after[name], before[name]) for name in before.names())
+    assert cli.call(["plot", str(tmp_path)]) == 0
+    assert resume(tmp_path).status == "completed"
 
 
 def test_how_far_the_text_is_written_is_told(mine, tmp_path):
