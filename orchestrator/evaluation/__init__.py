@@ -2,16 +2,14 @@
 
 from .calculation import Scope, evaluate
 from .expressions import Expression, evaluate_constant, parse
+from .judge import Judge
 from .metrics import (
     COMFORT_TITLE,
     FUNCTIONS,
     Metric,
     MetricChange,
-    check_metrics,
     comfort_levels,
     compare_metrics,
-    evaluate_metrics,
-    metric_indices,
     unit_of,
 )
 from .published import (
@@ -28,7 +26,7 @@ from .published import (
     judge_values,
     split_metric,
 )
-from .requirements import Verdict, check_requirements, judge_requirements, needed_signals, parse_requirement
+from .requirements import Verdict, parse_requirement
 from .signals import Part, Signals, parts_of
 from .syntax import Call, Node, Number, Operation, Reference
 
@@ -44,6 +42,7 @@ __all__ = [
     "Call",
     "ComparedValue",
     "Expression",
+    "Judge",
     "Metric",
     "MetricChange",
     "Node",
@@ -55,19 +54,13 @@ __all__ = [
     "Signals",
     "Verdict",
     "check_entry",
-    "check_metrics",
-    "check_requirements",
     "check_values",
     "comfort_levels",
     "compare_metrics",
     "count_values",
     "evaluate",
     "evaluate_constant",
-    "evaluate_metrics",
-    "judge_requirements",
     "judge_values",
-    "metric_indices",
-    "needed_signals",
     "parse",
     "parse_requirement",
     "parts_of",

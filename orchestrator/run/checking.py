@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from functools import cached_property
 
 from ..errors import ScenarioError
-from ..evaluation import check_metrics, check_requirements, check_values, metric_indices, split_metric
+from ..evaluation import Judge, check_values, split_metric
 from ..figures import check_figures, remarked
 from ..fmi import Interface, Kind, Model, Workspace, load_models
 from ..isolation import check_isolation, check_once_per_process, isolation_notes
@@ -35,7 +35,8 @@ class Checked:
         system: as it will run: after a swap, without the tables that speak of what the new model does not have.
         models: by instance name. wiring: start values and scalar connections. order: how a sweep steps.
         notes: what a user should know though it is not an error.
-        large: the one of them that says how large results will be, where they will be large.
+        judge: what judges its runs.
+        large: the one of the notes that says how large results will be, where they will be large.
     """
 
     system: System
@@ -43,6 +44,7 @@ class Checked:
     wiring: Wiring
     order: Order
     notes: tuple[str, ...]
+    judge: Judge
     large: str = ""
 
     @cached_property
@@ -94,20 +96,18 @@ def check(system: System, workspace: Workspace, kind: Kind = "auto", *, trusted:
     problems += check_coupling(system, interfaces, wiring)
     parameters = {f"{name}.{v.name}" for name, interface in interfaces.items() for v in interface.of("parameter")}
     parameters |= wiring.left.keys()
-    problems += check_requirements(system.judged.requirements, names, steady, parameters)
-    found = check_metrics(system.judged.metrics, names, steady)
-    problems += found
-    if not found:
-        indices = metric_indices(system.judged.metrics, names)
-        judged = system.judged
-        problems += check_values(judged.published, judged.references, indices, system.provenance.presets)
+    judged = system.judged
+    judge = Judge(judged.metrics, judged.requirements, names, parameters, steady=steady)
+    problems += judge.requirement_problems + judge.metric_problems
+    if not judge.metric_problems:
+        problems += check_values(judged.published, judged.references, judge.indices, system.provenance.presets)
     problems += check_figures(system.judged.figures, names, every_step)
     if problems:
         raise ScenarioError(problems)
     order = derive_order(list(system.instances), wiring.links, system.stepping.order)
     large = tell_size(system, sum(name not in parameters for name in names))
     notes = [*left_out, *([large] if large else []), *_notes(system, models, wiring, order)]
-    return Checked(system, models, wiring, order, tuple(notes), large)
+    return Checked(system, models, wiring, order, tuple(notes), judge, large)
 
 
 def _without_the_missing(
@@ -120,9 +120,13 @@ def _without_the_missing(
     if not any(instance.swapped for instance in system.instances.values()):
         return system, []
     requirements = {
-        k: v for k, v in system.judged.requirements.items() if not check_requirements({k: v}, names, steady)
+        k: v
+        for k, v in system.judged.requirements.items()
+        if not Judge({}, {k: v}, names, steady=steady).requirement_problems
     }
-    metrics = {k: v for k, v in system.judged.metrics.items() if not check_metrics({k: v}, names, steady)}
+    metrics = {
+        k: v for k, v in system.judged.metrics.items() if not Judge({k: v}, {}, names, steady=steady).metric_problems
+    }
     figures = [figure for figure in system.judged.figures if not check_figures([figure], names, every_step)]
     published, references = (
         [entry for entry in entries if split_metric(str(entry.get("metric")))[0] in metrics]

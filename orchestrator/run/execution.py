@@ -11,7 +11,7 @@ from typing import Any
 
 from .. import world
 from ..errors import FigureError, RailcosimError, RecordError, ScenarioError
-from ..evaluation import Signals, evaluate_metrics, judge_requirements, judge_values
+from ..evaluation import Signals, judge_values
 from ..figures import draw
 from ..fmi import Kind, Workspace
 from ..fmi.binding import forget_paths
@@ -286,8 +286,8 @@ def evaluate(outcome: Run, seen: Signals) -> None:
     system = outcome.system
     if not seen.points:
         return
-    outcome.metrics = evaluate_metrics(system.judged.metrics, seen)
-    outcome.requirements = judge_requirements(system.judged.requirements, seen)
+    judge = outcome.checked.judge
+    outcome.metrics, outcome.requirements = judge.metrics(seen), judge.verdicts(seen)
     came = system.provenance
     outcome.published, outcome.references = (
         judge_values(

@@ -12,14 +12,14 @@ import numpy as np
 
 from .. import world
 from ..errors import RollbackError, RunError, StoppedError
-from ..evaluation import Signals, needed_signals
+from ..evaluation import Signals
 from ..fmi import Interface, Kind, Slave
 from ..fmi.guard import run_guarded
 from ..master import ALGORITHMS, Master, Rows
 from ..times import slack
 from . import record as record_file
 from .assembly import assembled
-from .checking import Checked, signal_names
+from .checking import Checked
 from .checkpoint import Checkpoint
 from .directory import RunDirectory
 from .ending import Interruption
@@ -216,12 +216,11 @@ class Session:
         return every if varies else float(round(every))
 
     @property
-    def _judged(self) -> set[str] | None:
+    def _judged(self) -> frozenset[str] | None:
         """The signals that metrics and requirements look at; None where every point is a result."""
         if self._row_every == (0.0 if ALGORITHMS[self.system.stepping.algorithm].varies_step else 1.0):
             return None
-        judged, names = self.system.judged, signal_names(self._interfaces, self.checked.wiring)
-        return needed_signals(judged.metrics, judged.requirements, names)
+        return self.checked.judge.needed_signals
 
     def _step(self, master: Master) -> bool:
         """The communication steps, with checkpoints between them; True unless they were interrupted."""

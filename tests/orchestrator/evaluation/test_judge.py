@@ -1,0 +1,54 @@
+"""`Judge`: one that is made once says of every run what the run alone says."""
+
+import math
+
+import numpy as np
+import pytest
+from railcosim.orchestrator.evaluation import Judge
+from railcosim.orchestrator.run.recording import Results
+
+pytestmark = pytest.mark.usefixtures("parts")
+
+METRICS = {"top": "max(s.x)", "gap_min": "min(a[i-1].x - a[i].x)"}
+NAMES = ["s.x", "a[1].x", "a[2].x", "a[3].x", "s.limit"]
+
+
+def run(x, limit=5.0, completed=True):
+    columns = {"s.x": np.asarray(x, float), **{f"a[{i}].x": -float(i * i) + np.asarray(x, float) for i in (1, 2, 3)}}
+    parameters = {"s.limit": limit}
+    time = 0.5 * np.arange(len(x))
+    return Results(
+        columns, time, units={"s.x": "m"}, parameters=parameters, step=0.5, stop_time=time[-1], completed=completed
+    )
+
+
+def test_one_judge_judges_many_runs():
+    judge = Judge(METRICS, {"low": "always s.x < s.limit"}, NAMES, {"s.limit"})
+    assert judge.metric_problems == judge.requirement_problems == []
+    assert judge.value_names == ("top", "gap_min[2]", "gap_min[3]")
+    assert judge.requirement_names == ("low",)
+    assert judge.needed_signals == set(NAMES)
+    for top in (1.0, 2.0, 6.0):
+        signals = run([0.0, 1.0, top])
+        metric, gap = judge.metrics(signals)
+        assert metric.values == {None: top}
+        assert metric.unit == "m"
+        assert gap.values == {2: 3.0, 3: 5.0}
+        assert judge.values(signals) == {"top": top, "gap_min[2]": 3.0, "gap_min[3]": 5.0}
+        (verdict,) = judge.verdicts(signals)
+        assert (verdict.verdict, verdict.margin) == ("pass" if top < 5.0 else "fail", 5.0 - top)
+    (verdict,) = judge.verdicts(run([0.0, 1.0, 2.0], limit=1.5))
+    assert verdict.margin == -0.5
+
+
+def test_a_run_that_lacks_a_value_has_nan_by_its_name():
+    judge = Judge({"late": "max(s.x, until = 9)", **METRICS}, {}, NAMES)
+    values = judge.values(run([1.0, 2.0, 3.0]))
+    assert math.isnan(values.pop("late"))
+    assert values == {"top": 3.0, "gap_min[2]": 3.0, "gap_min[3]": 5.0}
+
+
+def test_problems_are_told_apart():
+    judge = Judge({"top": "max(s.y)"}, {"low": "s.x < 1"}, NAMES)
+    assert [problem.place for problem in judge.metric_problems] == ["metric 'top': 'max(s.y)', column 5"]
+    assert [problem.place for problem in judge.requirement_problems] == ["requirement 'low'"]
