@@ -10,6 +10,7 @@ from typing import Any
 
 from ..errors import ScenarioError
 from ..problems import Problem, suggestion
+from .events import EVENT_KEYS
 from .groups import OPTION_KEYS, Draft, Entry, Group, Member, build_argument, is_plain, resolve_model, shown
 from .patterns import check_instance, read_reference
 from .reader import check_count, flatten, place_of
@@ -18,6 +19,7 @@ from .toml_source import Source, parse_value
 
 _NAME = re.compile(r"(?:'(?:[^'\\]|\\.)*'|[^=])*+", re.DOTALL)
 """What stands before the sign of an assignment; a quoted name may hold one itself."""
+_EVENT = re.compile(r"events\s*+(?:\[\s*+(\d{1,9})\s*+\]\s*+)?(?:\.(.*))?", re.DOTALL)
 _BUILD = re.compile(r"[A-Za-z_]\w*(?:\[[^\[\]]*\])?\.build\.[^.]+")
 
 
@@ -53,7 +55,7 @@ def change(draft: Draft, key: str, entry: Entry, folder: str, problems: list[Pro
     Args:
         draft: what is changed.
         key: `simulation.step`, `cruise.alpha`, `train[4].speed`, `cruise.component`, `train.build.carriages`,
-            `cruise.isolate`, ...
+            `cruise.isolate`, `events[1].at`, ...
         entry: the new value.
         folder: what relative paths are relative to.
         problems: where problems go.
@@ -62,9 +64,12 @@ def change(draft: Draft, key: str, entry: Entry, folder: str, problems: list[Pro
         the model that it puts in; empty where it changes something else.
     """
     try:
-        if not key.startswith("simulation."):
+        if event := _EVENT.fullmatch(key):
+            _change_event(draft, event[1], (event[2] or "").strip(), entry)
+        elif key.startswith("simulation."):
+            _change_simulation(draft, key.removeprefix("simulation."), entry)
+        else:
             return _change_instance(read_target(key, draft), entry, folder, problems)
-        _change_simulation(draft, key.removeprefix("simulation."), entry)
     except ScenarioError as error:
         problems += error.at(entry.where)
     return ""
@@ -90,6 +95,26 @@ def _change_tolerances(draft: Draft, signal: str, entry: Entry) -> None:
     else:
         remedy = "write simulation.tolerances.INSTANCE.VARIABLE = [relative, absolute]"
         raise ScenarioError(Problem("", f"is a table, not {shown(entry.value)}", remedy))
+
+
+def _change_event(draft: Draft, index: str | None, key: str, entry: Entry) -> None:
+    """Give one event, by its place among `[[events]]`, another value; what it then is, is checked as a whole."""
+    count = len(draft.events)
+    if not count:
+        raise ScenarioError(Problem("", "the scenario has no events", "write one as [[events]]"))
+    if index is None:
+        raise ScenarioError(Problem("", "does not say which event", f"write events[1].{key or 'at'} for the first"))
+    if not 1 <= int(index) <= count:
+        there = "there is events[1]" if count == 1 else f"there are events[1] to events[{count}]"
+        raise ScenarioError(Problem("", f"there is no events[{index}]", there))
+    if key not in EVENT_KEYS:
+        near = suggestion(key, EVENT_KEYS) or f"valid here: {', '.join(EVENT_KEYS)}"
+        raise ScenarioError(
+            Problem("", f"an event has no '{key}'" if key else "names an event but not what to change", near)
+        )
+    event = draft.events[int(index) - 1]
+    event.entries[key] = entry
+    event.whole = entry
 
 
 def _change_instance(target: Target, entry: Entry, folder: str, problems: list[Problem]) -> str:

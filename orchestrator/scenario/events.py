@@ -11,7 +11,7 @@ from ..names import SignalName
 from ..problems import Problem
 from ..system import ACTIONS, Event
 from ..times import digits
-from .groups import Entry, choice, number, positive, shown
+from .groups import Entry, EventDraft, choice, number, positive, shown
 from .patterns import Counts, members, read_signal
 from .reader import Reader
 
@@ -38,13 +38,21 @@ class EventRule:
     event: Event
 
 
-def read_events(reader: Reader) -> list[EventRule]:
-    """The entries in the order they are written; what is wrong with them goes to the reader's problems."""
-    rules = []
+def draft_events(reader: Reader) -> list[EventDraft]:
+    """The entries in the order they are written; keys that do not belong there go to the reader's problems."""
+    drafts = []
     for k, table in enumerate(reader.tables("events")):
         reader.check_keys(table, EVENT_KEYS, "events", k)
         entries = {key: reader.entry(table[key], "events", k, key) for key in EVENT_KEYS if key in table}
-        whole, problems = reader.entry(None, "events", k), reader.problems
+        drafts.append(EventDraft(reader.entry(None, "events", k), entries))
+    return drafts
+
+
+def read_events(drafts: Sequence[EventDraft], problems: list[Problem]) -> list[EventRule]:
+    """What the entries mean; what is wrong with them is added to `problems`."""
+    rules = []
+    for draft in drafts:
+        entries, whole = draft.entries, draft.whole
         event = Event("", _action(entries, whole, problems), _begin(entries, whole, problems), origin=whole.origin)
         if event.action:
             problems += _misfits(event.action, entries, whole)
@@ -55,21 +63,20 @@ def read_events(reader: Reader) -> list[EventRule]:
         event.every = positive(entries["every"], problems) if "every" in entries else None
         if len(problems) == before:
             problems += _repetition(event, entries)
-        rules.append(EventRule(tuple(_signals(table, reader, k)), event))
+        rules.append(EventRule(tuple(_signals(entries, whole, problems)), event))
     return rules
 
 
-def _signals(table: Mapping[str, Any], reader: Reader, k: int) -> list[Entry]:
-    if "signal" not in table:
-        remedy = 'name what it happens to: signal = "instance.variable"'
-        reader.problem("signal is missing", "events", k, remedy=remedy)
+def _signals(entries: Mapping[str, Entry], whole: Entry, problems: list[Problem]) -> list[Entry]:
+    if "signal" not in entries:
+        problems.append(whole.problem("signal is missing", 'name what it happens to: signal = "instance.variable"'))
         return []
-    texts = table["signal"]
-    if isinstance(texts, str):
-        return [reader.entry(texts, "events", k, "signal")]
-    if isinstance(texts, list) and texts and all(isinstance(text, str) for text in texts):
-        return [reader.entry(text, "events", k, "signal", j) for j, text in enumerate(texts)]
-    reader.problem(f'takes "instance.variable", or a list of such texts, not {shown(texts)}', "events", k, "signal")
+    entry = entries["signal"]
+    if isinstance(entry.value, str):
+        return [entry]
+    if isinstance(entry.value, list) and entry.value and all(isinstance(text, str) for text in entry.value):
+        return [Entry(text, entry.origin, f"{entry.place}[{j}]") for j, text in enumerate(entry.value, 1)]
+    problems.append(entry.problem(f'takes "instance.variable", or a list of such texts, not {shown(entry.value)}'))
     return []
 
 

@@ -114,11 +114,20 @@ class Group:
 
 
 @dataclass
+class EventDraft:
+    """One entry of `[[events]]` as written: where it stands, or what changed it last, and its keys."""
+
+    whole: Entry
+    entries: dict[str, Entry]
+
+
+@dataclass
 class Draft:
     """A scenario before expansion; `named` are the models that options put in."""
 
     simulation: dict[str, Entry] = field(default_factory=dict)
     groups: dict[str, Group] = field(default_factory=dict)
+    events: list[EventDraft] = field(default_factory=list)
     rules: list[Rule] = field(default_factory=list)
     named: list[str] = field(default_factory=list)
 

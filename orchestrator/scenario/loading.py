@@ -24,7 +24,7 @@ from ..fmi import is_fmu_name
 from ..problems import Problem, suggestion
 from ..system import Instance, System
 from .changes import apply_preset, apply_settings, apply_step, apply_swaps, preset_descriptions
-from .events import expand_events, read_events
+from .events import draft_events, expand_events, read_events
 from .groups import Draft, Entry, expand_group
 from .patterns import connect
 from .reader import Reader
@@ -193,7 +193,7 @@ class _Scenario:
         self.names = tuple(dict.fromkeys([*([self.default] if self.default else []), *presets]))
         self.preset: str | None = self.default
         self.descriptions = preset_descriptions(source, self.problems)
-        self.events = read_events(self.reader)
+        self.draft.events = draft_events(self.reader)
         self.metrics = self.reader.texts("metrics")
         self.requirements = self.reader.texts("require")
         self.published = self.reader.values("published", self.metrics, self.names)
@@ -219,6 +219,7 @@ class _Scenario:
 
     def _check(self, draft: Draft) -> None:
         read_simulation(draft.simulation, self.source.label, self.problems)
+        read_events(draft.events, self.problems)
         for group in draft.groups.values():
             expand_group(group, self.problems)
 
@@ -237,7 +238,7 @@ class _Scenario:
                 instances[instance.name] = instance
                 origins |= {instance.name: instance.origin, **starts}
         connections = connect(draft.rules, draft.counts, problems)
-        events = expand_events(self.events, draft.counts, problems)
+        events = expand_events(read_events(draft.events, problems), draft.counts, problems)
         if "tolerances" in simulation:
             keys = spread_tolerances(draft.simulation, draft.counts, problems)
             written = simulation["tolerances"]
@@ -279,7 +280,7 @@ class _Scenario:
         for section, texts in (("require", self.requirements), ("metrics", self.metrics)):
             origins |= {f"{section}.{name}": self.source.origin(section, name) for name in texts}
         known = (("published", self.published), ("references", self.references))
-        for section, entries in (("events", self.events), *known, ("figures", self.figures)):
+        for section, entries in (("events", self.draft.events), *known, ("figures", self.figures)):
             origins |= {f"{section}[{k + 1}]": self.source.origin(section, k) for k in range(len(entries))}
         return origins
 

@@ -271,3 +271,55 @@ def test_a_preset_says_what_it_is():
 )
 def test_names_of_other_makers(text, name, value):
     assert loads(EXAMPLE, settings=[text]).instances["target"].start[name] == value
+
+
+def test_an_event_is_changed_by_its_place():
+    settings = ["events[1].at=25.0", "events[1].value=-1", "events[1].every=15", "events[ 2 ].signal=train[2].force"]
+    *biases, second = loads(EXAMPLE, settings=settings).events
+    assert {(e.at, e.value, e.duration, e.every) for e in biases} == {(25.0, -1.0, 10.0, 15.0)}
+    assert [e.signal for e in biases] == ["cruise[1].ahead_speed", "cruise[2].ahead_speed", "target.value"]
+    assert (second.signal, second.at, second.origin) == (
+        "train[2].force",
+        60.0,
+        "--set events[ 2 ].signal=train[2].force",
+    )
+    preset = edited(("[presets.gentle]", '[presets.gentle]\n"events[2].value" = 5'))
+    assert loads(preset, preset="gentle").events[-1].value == 5
+    assert loads(preset).events == loads(EXAMPLE).events
+    assert loads(EXAMPLE, settings=["events[1].at=25"]).provenance.modified
+    assert not loads(EXAMPLE, settings=["events[1].at=30"]).provenance.modified
+
+
+@pytest.mark.parametrize(
+    ("setting", "message"),
+    [
+        ("events[3].at=1", "there is no events[3]; there are events[1] to events[2]"),
+        ("events[0].at=1", "there is no events[0]; there are events[1] to events[2]"),
+        ("events.at=1", "does not say which event; write events[1].at for the first"),
+        ("events=1", "does not say which event; write events[1].at for the first"),
+        ("events[1]=1", "names an event but not what to change; valid here: signal, action, at, value, rate, "),
+        ("events[1].valeu=1", "an event has no 'valeu'; did you mean 'value'?"),
+        ("events[1].at=soon", "takes a finite number, not 'soon'"),
+        ("events[1].duration=-1", "takes a number greater than 0, in s, not -1"),
+        ("events[1].duration=30", "the period, 20 s, must not be shorter than the duration, 30 s"),
+        ("events[1].action=ramp", "rate is missing; say what is added in each second: rate = 0.1"),
+        ("events[2].duration=1", "'set' takes no duration; what is set stays; take 'override' for a value that lasts"),
+        ("events[1].signal=trian.speed", "there is no instance 'trian'; did you mean 'train'?"),
+        ("events[1].signal=[]", 'takes "instance.variable", or a list of such texts, not []'),
+    ],
+)
+def test_what_is_said_about_a_change_of_an_event(setting, message):
+    found = problems(EXAMPLE, settings=[setting])
+    assert any(message in problem for problem in found), found
+    assert any(f"--set {setting}" in problem or "two.toml:" in problem for problem in found), found
+
+
+def test_there_must_be_events_to_change():
+    text = EXAMPLE[: EXAMPLE.index("[[events]]")]
+    assert problems(text, settings=["events[1].at=3"]) == [
+        "--set events[1].at=3: the scenario has no events; write one as [[events]]"
+    ]
+    one = text + '[[events]]\nsignal = "target.value"\naction = "freeze"\nat = 5.0\n'
+    assert problems(one, settings=["events[2].at=3"]) == [
+        "--set events[2].at=3: there is no events[2]; there is events[1]"
+    ]
