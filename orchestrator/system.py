@@ -168,7 +168,8 @@ class Provenance:
             ``"instances.train[1].step"`` (an option of an instance), ``"instances.train[1].build.carriages"`` (a build
             argument that a preset or an option gave), ``"simulation.step"``,
             ``"simulation.tolerances.train[1].speed"``, ``"events[1]"``, ``"require.comfort"``, ``"metrics.settling"``,
-            ``"published[1]"``, ``"references[1]"``, ``"figures[1]"``.
+            ``"published[1]"``, ``"references[1]"``, ``"figures[1]"``, ``"study"``, ``"study.runs"``,
+            ``"study.vary.cruise.alpha"``.
     """
 
     title: str = ""
@@ -196,6 +197,7 @@ class System:
         connections: between them.
         events: what happens on the way.
         seed: of all noise.
+        study: what `[study]` says: `runs`, `seed`, `design`, and `vary` by key.
         stepping: how it is stepped.
         judged: what is made of the results.
         provenance: where it came from.
@@ -203,7 +205,7 @@ class System:
             ``System(step=0.1, stop_time=60.0, metrics={"peak": "max(train.speed)"})``.
 
     Attributes:
-        instances, connections, events, seed, stepping, judged, provenance: as above.
+        instances, connections, events, seed, study, stepping, judged, provenance: as above.
 
     Raises:
         TypeError: there is no such field.
@@ -213,6 +215,7 @@ class System:
     connections: list[Connection]
     events: list[Event]
     seed: int
+    study: dict[str, Any]
     stepping: Stepping
     judged: Judged
     provenance: Provenance
@@ -224,6 +227,7 @@ class System:
         connections: list[Connection] | None = None,
         events: list[Event] | None = None,
         seed: int = 0,
+        study: dict[str, Any] | None = None,
         stepping: Stepping | None = None,
         judged: Judged | None = None,
         provenance: Provenance | None = None,
@@ -233,6 +237,7 @@ class System:
         self.connections = [] if connections is None else connections
         self.events = [] if events is None else events
         self.seed = seed
+        self.study = {} if study is None else study
         self.stepping = _changed(stepping or Stepping(), values)
         self.judged = _changed(judged or Judged(), values)
         self.provenance = _changed(provenance or Provenance(), values)

@@ -5,6 +5,7 @@ applies presets and options, and `loading` makes the draft a `System`.
 `trust` tells which Python files a scenario imports.
 """
 
+from .changes import split_assignment
 from .loading import load, shipped
 from .patterns import NAME
 from .toml_source import parse_value
@@ -16,5 +17,6 @@ __all__ = [
     "load",
     "parse_value",
     "shipped",
+    "split_assignment",
     "untrusted_code",
 ]

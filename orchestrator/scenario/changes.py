@@ -190,7 +190,7 @@ def _preset_lines(table: Mapping[str, Any], path: tuple[str, ...] = ()) -> Itera
 def apply_settings(draft: Draft, settings: Sequence[str], problems: list[Problem], option: str = "--set") -> None:
     """Apply `--set train[4].speed=10` (or `--with train.carriages=8`); values are TOML, or the text as it is."""
     for text in settings:
-        key, equals, value = _assignment(text)
+        key, equals, value = split_assignment(text)
         entry = Entry(parse_value(value.strip()), f"{option} {text}")
         if not equals or not key.strip() or not value.strip():
             example = "train[4].speed=10" if option == "--set" else "train.carriages=8"
@@ -202,8 +202,8 @@ def apply_settings(draft: Draft, settings: Sequence[str], problems: list[Problem
         draft.named.append(change(draft, name, entry, os.getcwd(), problems))
 
 
-def _assignment(text: str) -> tuple[str, str, str]:
-    """``a.'x = y' = 3`` taken apart at the right sign."""
+def split_assignment(text: str) -> tuple[str, str, str]:
+    """Key, sign and value of ``a.'x = y' = 3``, taken apart at the right sign; without one, all is key."""
     match = _NAME.match(text)
     if match is None or match.end() == len(text):  # all of it, where a quote is just a letter
         return text.partition("=")

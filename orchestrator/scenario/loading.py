@@ -30,6 +30,7 @@ from .patterns import connect
 from .reader import Reader
 from .simulation import TOLERANCES, read_simulation, spread_tolerances
 from .toml_source import Source, parse_value
+from .varied import read_study
 from .writer import dump
 
 __all__ = ["dump", "find", "load", "loads", "preset_names", "shipped"]
@@ -199,6 +200,7 @@ class _Scenario:
         self.published = self.reader.values("published", self.metrics, self.names)
         self.references = self.reader.values("references", self.metrics, self.names)
         self.figures = self.reader.figures()
+        self.study, self.study_origins = read_study(self.reader)
 
     def base(self, preset: str | None) -> Draft:
         """The draft under a preset. All presets are applied once, so that a mistake in any of them is told."""
@@ -264,6 +266,7 @@ class _Scenario:
             published=copy.deepcopy(self.published),
             references=copy.deepcopy(self.references),
             figures=copy.deepcopy(self.figures),
+            study=copy.deepcopy(self.study),
             preset=self.preset,
             presets=self.names,
             preset_descriptions=self.descriptions,
@@ -276,7 +279,7 @@ class _Scenario:
         )
 
     def _origins(self) -> dict[str, str]:
-        origins: dict[str, str] = {}
+        origins = dict(self.study_origins)
         for section, texts in (("require", self.requirements), ("metrics", self.metrics)):
             origins |= {f"{section}.{name}": self.source.origin(section, name) for name in texts}
         known = (("published", self.published), ("references", self.references))

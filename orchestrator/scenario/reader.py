@@ -45,6 +45,7 @@ TOP_KEYS = (
     "published",
     "references",
     "figures",
+    "study",
 )
 INSTANCE_KEYS = ("component", "fmu", "count", *OPTION_KEYS, "swapped", "build", "start")
 CONNECTION_KEYS = ("from", "delay", "scale", "offset", "threshold", "optional")

@@ -53,6 +53,11 @@ def _lines(system: System) -> Iterator[str]:
     ):
         if table:
             yield from ("", f"[{section}]", *_assignments(table))
+    study = {**system.study}
+    varied = study.pop("vary", {})
+    for section, table in (("study", study), ("study.vary", varied)):
+        if table:
+            yield from ("", f"[{section}]", *_assignments(table))
     for event in system.events:
         yield from ("", "[[events]]", *_assignments({key: getattr(event, key) for key in EVENT_KEYS}))
     owed, own = (
