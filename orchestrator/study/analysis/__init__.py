@@ -1,0 +1,18 @@
+"""What a study says: summary, sensitivity and figures, of its table and its plan."""
+
+from .intervals import Estimate
+from .sensitivity import Influence, Sensitivity, outputs_of, sensitivity
+from .summary import SHARES, Kept, Spread, Summary, summarize
+
+__all__ = [
+    "SHARES",
+    "Estimate",
+    "Influence",
+    "Kept",
+    "Sensitivity",
+    "Spread",
+    "Summary",
+    "outputs_of",
+    "sensitivity",
+    "summarize",
+]
