@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import NamedTuple
 
 from ..component import Component, Values
-from ..declarations import Data, Input, Output, Parameter
+from ..declarations import Data, Input, Output, Parameter, Size
 from ..maths import piecewise_constant
 from ..tables import Column, Table
 
@@ -61,7 +61,7 @@ class Line(Component):
 
     Specific resistance g (gradient + 0.6 m / radius) + resistance; the gradient is rise over run, uphill positive,
     the curve formula 600/R N/kN, a tunnel of length L adds 0.00013 L N/kN. The train is a point; before the first
-    section it has the first one's resistance.
+    section it has the first one's resistance. ``gradients`` are added to those of the sections.
 
     ``line_resistance`` is all of it for a train that runs forwards. ``curve_resistance`` is what of it opposes motion,
     whichever way: curve, tunnel and further resistance. A train that is not told takes all for the slope's, and a
@@ -70,14 +70,21 @@ class Line(Component):
 
     source = "gradient: weight along the slope; curves: 600/R N/kN, usual in Chinese traction calculation (TB/T 1407)"
     equations = (
-        r"$r = g\,i + r_\mathrm{c}, \qquad r_\mathrm{c} = g \left( 0.6\,/\,R + 1.3 \cdot 10^{-7} L \right) + r_0$ with"
-        r" a section's gradient $i$, radius $R$ and tunnel $L$ in m, further resistance $r_0$; line_resistance $r$ and"
+        r"$r = g\,(i + \Delta i) + r_\mathrm{c}, \qquad"
+        r" r_\mathrm{c} = g \left( 0.6\,/\,R + 1.3 \cdot 10^{-7} L \right) + r_0$ with a section's gradient $i$, radius"
+        r" $R$ and tunnel $L$ in m, further gradient $\Delta i$, further resistance $r_0$; line_resistance $r$ and"
         r" curve_resistance $r_\mathrm{c}$",
     )
 
     profile = Data([{"position": 0.0, "gradient": 0.0}], convert=SECTIONS.read, description=SECTIONS.description)
 
+    points = Size(1, description="number of further gradients")
+
     position = Input("m", description="position of the train")
+    positions = Parameter("m", 0.0, shape=(points,), rising=True, description="begins of further gradients, rising")
+    gradients = Parameter(
+        "1", 0.0, shape=(points,), description="rise over run added from each on, to vary without building anew"
+    )
     factor = Parameter("1", 1.0, description="factor on the whole profile, to know it wrongly on purpose")
 
     line_resistance = Output("N/kg", description="resistance of slope, curve and tunnel per mass")
@@ -85,7 +92,8 @@ class Line(Component):
 
     def outputs(self) -> Values:
         resistance, opposing = (
-            self.factor * piecewise_constant(self.position, self.profile.positions, values)
+            piecewise_constant(self.position, self.profile.positions, values)
             for values in (self.profile.resistances, self.profile.opposing)
         )
-        return {"line_resistance": resistance, "curve_resistance": opposing}
+        further = _GRAVITY * piecewise_constant(self.position, self.positions, self.gradients)
+        return {"line_resistance": self.factor * (resistance + further), "curve_resistance": self.factor * opposing}

@@ -26,8 +26,9 @@ class RadioLink(Component):
     lost with probability ``loss`` while the channel is good, ``burst_loss`` while it is bad; before each message the
     channel goes bad with probability ``burst_begin`` and good with ``burst_end`` (Gilbert 1960, Elliott 1963), so that
     bursts last 1 / burst_end messages on average and the channel is bad for burst_begin / (burst_begin + burst_end) of
-    the time. Messages that leave during an outage (begin included, end not), or while ``sending`` is false, are lost as
-    well. A message overtaken by a newer one is dropped. What was true at the start is known at the start.
+    the time. ``interference`` loses as large a share of the others. Messages that leave during an outage (begin
+    included, end not), or while ``sending`` is false, are lost as well. A message overtaken by a newer one is dropped.
+    What was true at the start is known at the start.
 
     Without delay, jitter and losses, and refreshed at every step, the link is a wire. ``overrun`` says that more
     messages were under way than ``messages``, so that one was forgotten before it arrived.
@@ -38,7 +39,8 @@ class RadioLink(Component):
         r"Of the messages that have arrived, $t_k + \mathrm{delay} + \mathrm{jitter}\; u_k \leq t$, the one sent last"
         r" is heard; $\mathrm{age} = t - t_k$.",
         r"Losses: probability loss in the good state, burst_loss in the bad one; good $\rightarrow$ bad with"
-        r" burst_begin, bad $\rightarrow$ good with burst_end, once a message.",
+        r" burst_begin, bad $\rightarrow$ good with burst_end, once a message. With interference $q$, $p + q\,(1 - p)$"
+        r" takes the place of either probability $p$.",
     )
 
     messages = Size(16, description="how many messages can be under way")
@@ -47,6 +49,7 @@ class RadioLink(Component):
     sent_position = Input("m", description="position the sender reports")
     sent_speed = Input("m/s", description="speed the sender reports")
     sending = Input("1", True, optional=True, description="whether the sender transmits")
+    interference = Input("1", 0.0, optional=True, description="further probability of a loss, in either state")
 
     refresh = Parameter("s", 0.1, minimum=1e-6, description="period of the messages; longer than a step, or one a step")
     offset = Parameter("s", 0.0, minimum=0.0, description="time of the first message")
@@ -115,7 +118,8 @@ class RadioLink(Component):
 
     def _arrival(self) -> Any:
         """When the message that is due arrives."""
-        lost = self.luck < where(self._turns_bad(), self.burst_loss, self.loss)
+        loss = where(self._turns_bad(), self.burst_loss, self.loss)
+        lost = self.luck < loss + self.interference * (1.0 - loss)
         silent = logical_not(self.sending)
         now = self.time + _ROUNDING
         for begin, end in [*self.outages, (self.outage_begin, self.outage_end)]:

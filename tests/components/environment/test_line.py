@@ -54,3 +54,12 @@ def test_without_data_the_line_is_level():
 def test_unusable_lines_are_refused(profile):
     with pytest.raises(ComponentError, match="profile"):
         Line(profile=profile)
+
+
+def test_further_gradients_are_added_to_those_of_the_profile():
+    line = Line(points=2, position=150.0, positions=[0.0, 100.0], gradients=[0.01, -0.02], factor=0.5)
+    assert line.outputs() == {"line_resistance": 0.5 * 9.81 * -0.02, "curve_resistance": 0.0}
+    section = [{"position": 0.0, "gradient": 0.03, "resistance": 0.1}]
+    steep = Line(profile=section, points=2, position=50.0, positions=[0.0, 100.0], gradients=[0.01, -0.02])
+    assert steep.outputs()["line_resistance"] == 9.81 * 0.03 + 0.1 + 9.81 * 0.01
+    assert steep.outputs()["curve_resistance"] == 0.1

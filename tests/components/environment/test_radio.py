@@ -163,3 +163,11 @@ def test_position_speed_and_age_belong_together():
 def test_unusable_outages_are_refused(outages):
     with pytest.raises(ComponentError, match="outages"):
         RadioLink(outages=outages)
+
+
+def test_interference_loses_a_share_of_what_would_arrive():
+    """With loss p and interference q, p + q (1 - p) of the messages: here those whose luck is below 0.6."""
+    rows, _ = listen(RadioLink(loss=0.2, interference=0.5))
+    assert rows == pytest.approx(by_hand(200, loss=0.6))
+    rows, _ = listen(RadioLink(interference=1.0))
+    assert (rows[:, 0] == sender(0.0)[0]).all()
