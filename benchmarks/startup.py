@@ -17,7 +17,6 @@ import subprocess
 import sys
 import tempfile
 import time
-from pathlib import Path
 
 ORCHESTRATE = "from railcosim.orchestrator.cli import main; main()"
 BARE = ("-c", "import numpy")
@@ -34,9 +33,7 @@ COMMANDS = {
 def cost(arguments: tuple[str, ...], folder: str) -> tuple[float, float]:
     """CPU and wall time in s of one process of Python and all that it waits for."""
     begin = time.perf_counter()
-    process = subprocess.Popen(
-        (sys.executable, *arguments), cwd=folder, env=os.environ, stdout=subprocess.DEVNULL
-    )
+    process = subprocess.Popen((sys.executable, *arguments), cwd=folder, env=os.environ, stdout=subprocess.DEVNULL)
     _, status, usage = os.wait4(process.pid, 0)
     wall = time.perf_counter() - begin
     process.returncode = os.waitstatus_to_exitcode(status)

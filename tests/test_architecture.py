@@ -58,7 +58,7 @@ MODULES = {
     for package in PACKAGES
     for path in code(package, "py", "pyi")
 }
-FOLDERS = {name for name, path in MODULES.items() if path.name == "__init__.py"}
+FOLDERS = {name for name, path in MODULES.items() if path.stem == "__init__"}
 
 
 @cache

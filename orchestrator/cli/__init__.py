@@ -1,7 +1,5 @@
 """``orchestrate``: the command line."""
 
-from .app import main
+from ...components.doors import hang_door
 
-__all__ = [
-    "main",
-]
+hang_door(__name__)

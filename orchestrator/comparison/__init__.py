@@ -1,14 +1,5 @@
 """Runs side by side: variants of a scenario, and measured beside published values."""
 
-from .preference import read_directions
-from .reproduce import published_cases
-from .variants import Comparison, Row, compare, variants
+from ...components.doors import hang_door
 
-__all__ = [
-    "Comparison",
-    "Row",
-    "compare",
-    "published_cases",
-    "read_directions",
-    "variants",
-]
+hang_door(__name__)

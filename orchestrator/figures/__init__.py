@@ -1,37 +1,5 @@
 """Pictures of recorded signals, as a scenario's `[[figures]]` ask for them; and the style of every other picture."""
 
-from .checking import check_figures
-from .curves import Curve, bracketed, curves_of
-from .drawing import draw, draw_curves, file_name, remove_drawn
-from .palette import Palette, member_colour, ranks
-from .panels import FIGURE_KEYS, FORMATS, PANEL_KEYS, heading, panels_of, remarked, share_x, texts_of, written_as
-from .style import COLOURS, DASHES, colour, colour_and_dashes, legend, page
+from ...components.doors import hang_door
 
-__all__ = [
-    "COLOURS",
-    "DASHES",
-    "FIGURE_KEYS",
-    "FORMATS",
-    "PANEL_KEYS",
-    "Curve",
-    "Palette",
-    "bracketed",
-    "check_figures",
-    "colour",
-    "colour_and_dashes",
-    "curves_of",
-    "draw",
-    "draw_curves",
-    "file_name",
-    "heading",
-    "legend",
-    "member_colour",
-    "page",
-    "panels_of",
-    "ranks",
-    "remarked",
-    "remove_drawn",
-    "share_x",
-    "texts_of",
-    "written_as",
-]
+hang_door(__name__)

@@ -6,32 +6,6 @@ wrong and `translation` for other versions), and what can be instantiated is a `
 component as Python objects (`plain`).
 """
 
-from ...fmus.kinds import Kind
-from .archive import Workspace
-from .interface import Interface, Sort, Type, Unit, Variable
-from .models import Model, load_fmu, load_models
-from .reading import read as read_as_written
-from .recognition import is_fmu_name
-from .slave import Channel, Slave
-from .snapshot import state_names, take_snapshot
-from .translation import is_pedantry
+from ...components.doors import hang_door
 
-__all__ = [
-    "Channel",
-    "Interface",
-    "Kind",
-    "Model",
-    "Slave",
-    "Sort",
-    "Type",
-    "Unit",
-    "Variable",
-    "Workspace",
-    "is_fmu_name",
-    "is_pedantry",
-    "load_fmu",
-    "load_models",
-    "read_as_written",
-    "state_names",
-    "take_snapshot",
-]
+hang_door(__name__)

@@ -1,20 +1,5 @@
 """An FMU in a process of its own: its crash, hang or leak is an error of that instance, not our end."""
 
-from .choice import check_isolation, check_once_per_process, instantiate, is_isolated, isolate, isolation_notes
-from .launch import CRASHES, end_process, end_with_parent, signal_name, starting
-from .proxy import IsolatedSlave
+from ...components.doors import hang_door
 
-__all__ = [
-    "CRASHES",
-    "IsolatedSlave",
-    "check_isolation",
-    "check_once_per_process",
-    "end_process",
-    "end_with_parent",
-    "instantiate",
-    "is_isolated",
-    "isolate",
-    "isolation_notes",
-    "signal_name",
-    "starting",
-]
+hang_door(__name__)

@@ -1,20 +1,5 @@
 """The closed loop of a scenario as a linear model, and what that says: modes, responses, string stability."""
 
-from .closed_loop import Linearization, linearize
-from .figures import draw_linear
-from .modes import Mode, Stability, stability
-from .record import write_linear
-from .responses import Passing, default_input, string_stability
+from ...components.doors import hang_door
 
-__all__ = [
-    "Linearization",
-    "Mode",
-    "Passing",
-    "Stability",
-    "default_input",
-    "draw_linear",
-    "linearize",
-    "stability",
-    "string_stability",
-    "write_linear",
-]
+hang_door(__name__)

@@ -1,7 +1,5 @@
 """A whole scenario as one FMU."""
 
-from .container import pack
+from ...components.doors import hang_door
 
-__all__ = [
-    "pack",
-]
+hang_door(__name__)

@@ -1,41 +1,5 @@
 """One run: checked, simulated, recorded, judged, and written to a directory from which it can go on."""
 
-from .assembly import assembled
-from .checking import Checked, check, describe_stepping, swaps
-from .checkpoint import CHECKPOINT_FILE, read_checkpoint
-from .ending import conclude
-from .execution import at_half_the_step, execute, go_on, resume, run
-from .outcome import Run
-from .record import add_step_check
-from .recording import CSV_FILE, ROWS_FILE, Results, Telling, recover_rows
-from .session import Progress
-from .step_check import StepChange, StepCheck, check_step
-from .watching import Finding
+from ...components.doors import hang_door
 
-__all__ = [
-    "CHECKPOINT_FILE",
-    "CSV_FILE",
-    "ROWS_FILE",
-    "Checked",
-    "Finding",
-    "Progress",
-    "Results",
-    "Run",
-    "StepChange",
-    "StepCheck",
-    "Telling",
-    "add_step_check",
-    "assembled",
-    "at_half_the_step",
-    "check",
-    "check_step",
-    "conclude",
-    "describe_stepping",
-    "execute",
-    "go_on",
-    "read_checkpoint",
-    "recover_rows",
-    "resume",
-    "run",
-    "swaps",
-]
+hang_door(__name__)

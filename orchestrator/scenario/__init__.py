@@ -5,18 +5,6 @@ applies presets and options, and `loading` makes the draft a `System`.
 `trust` tells which Python files a scenario imports.
 """
 
-from .changes import split_assignment
-from .loading import load, shipped
-from .patterns import NAME
-from .toml_source import parse_value
-from .trust import import_notes, untrusted_code
+from ...components.doors import hang_door
 
-__all__ = [
-    "NAME",
-    "import_notes",
-    "load",
-    "parse_value",
-    "shipped",
-    "split_assignment",
-    "untrusted_code",
-]
+hang_door(__name__)

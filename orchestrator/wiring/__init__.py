@@ -1,27 +1,5 @@
 """A system against the interfaces of its FMUs: connections resolved to scalars, converted and ordered."""
 
-from .links import Link, Wiring, described, is_direct
-from .order import Order, derive_order
-from .resolution import wire
-from .starts import bounded
-from .topology import describe_topology
-from .trains import Control, Following, Quantity, Train, find_controls, find_followings, find_trains
+from ...components.doors import hang_door
 
-__all__ = [
-    "Control",
-    "Following",
-    "Link",
-    "Order",
-    "Quantity",
-    "Train",
-    "Wiring",
-    "bounded",
-    "derive_order",
-    "describe_topology",
-    "described",
-    "find_controls",
-    "find_followings",
-    "find_trains",
-    "is_direct",
-    "wire",
-]
+hang_door(__name__)

@@ -3,25 +3,6 @@
 Light to import: the process of an isolated FMU needs this and little else.
 """
 
-from .channel import FmuChannel
-from .fmi2 import FmuSlave
-from .interfaces import plain_interface, read_interface
-from .libraries import forget_paths, library, names_of_platform
-from .loaded import LoadedSlave
-from .versions import SLAVES, call_name
-from .watch import Watch, is_watched
+from ....components.doors import hang_door
 
-__all__ = [
-    "SLAVES",
-    "FmuChannel",
-    "FmuSlave",
-    "LoadedSlave",
-    "Watch",
-    "call_name",
-    "forget_paths",
-    "is_watched",
-    "library",
-    "names_of_platform",
-    "plain_interface",
-    "read_interface",
-]
+hang_door(__name__)

@@ -1,6 +1,5 @@
 """How a run ends before its time: signals that ask for it, and processes that are gone."""
 
-from .conclusion import conclude
-from .interruption import Interruption
+from ....components.doors import hang_door
 
-__all__ = ["Interruption", "conclude"]
+hang_door(__name__)

@@ -1,26 +1,5 @@
 """The rows of a run: taken while it goes, kept in memory or in files, read back."""
 
-from .binary import remove_rows
-from .recorder import ROWS_FILE, SEEN_FILE, Due, Recorder
-from .recording import Recording, check_stored
-from .results import Results
-from .stored import Telling, finish_rows, recover_rows
-from .text import CSV_FILE
-from .told import check_size, read_json
+from ....components.doors import hang_door
 
-__all__ = [
-    "CSV_FILE",
-    "ROWS_FILE",
-    "SEEN_FILE",
-    "Due",
-    "Recorder",
-    "Recording",
-    "Results",
-    "Telling",
-    "check_size",
-    "check_stored",
-    "finish_rows",
-    "read_json",
-    "recover_rows",
-    "remove_rows",
-]
+hang_door(__name__)

@@ -1,7 +1,5 @@
 """What a run finds without being asked, at every communication point: collisions, reversing, refusals, divergence."""
 
-from .divergence import explain_divergence
-from .finding import Finding, Kind
-from .watching import Watching
+from ....components.doors import hang_door
 
-__all__ = ["Finding", "Kind", "Watching", "explain_divergence"]
+hang_door(__name__)

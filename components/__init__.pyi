@@ -1,0 +1,92 @@
+from .ato.adaptive import AdaptiveAto
+from .ato.ailc import Ailc
+from .ato.cailc import Cailc
+from .ato.force_distribution import ForceDistribution
+from .ato.learning_energy import LearningEnergy
+from .ato.pd_ilc import PdIlc
+from .ato.pid import PidAto
+from .ato.port import AtoController
+from .catalogue import CATALOGUE
+from .component import Component, ComponentError
+from .cruise.comfort import ComfortCruise
+from .cruise.fault_tolerant import BacksteppingCruise, FaultTolerantCruise, FaultTolerantCruiseIntermediate
+from .cruise.fixed_distance import FixedDistanceCruise
+from .cruise.guarded import GuardedCruise
+from .cruise.monitors import IntermediateEstimator, StateFaultObserver
+from .cruise.port import CruiseController
+from .cruise.range_potential import RangePotentialCruise
+from .cruise.tunable_potential import TunablePotentialCruise
+from .declarations import Data, Input, Memory, Noise, Output, Parameter, Size, State, Tape
+from .environment.actuator_faults import ActuatorFaults
+from .environment.gaussian_disturbance import GaussianDisturbance
+from .environment.gust import Gust
+from .environment.line import Line
+from .environment.radio import RadioLink
+from .environment.reference_profile import ReferenceProfile
+from .environment.schedule import Schedule
+from .environment.sensor import Sensor
+from .environment.sinusoid import Sinusoid
+from .simulate import Simulation, simulate
+from .supervision.protection import Protection
+from .supervision.timetable import Timetable
+from .supervision.trip_monitor import TripMonitor
+from .trains.consist import Carriages, Consist
+from .trains.coupled_subway import CoupledSubwayTrain
+from .trains.point_mass import PointMassTrain
+from .trains.port import DavisResistance, Train
+from .trains.subway import SubwayTrain
+
+__all__ = [
+    "CATALOGUE",
+    "ActuatorFaults",
+    "AdaptiveAto",
+    "Ailc",
+    "AtoController",
+    "BacksteppingCruise",
+    "Cailc",
+    "Carriages",
+    "ComfortCruise",
+    "Component",
+    "ComponentError",
+    "Consist",
+    "CoupledSubwayTrain",
+    "CruiseController",
+    "Data",
+    "DavisResistance",
+    "FaultTolerantCruise",
+    "FaultTolerantCruiseIntermediate",
+    "FixedDistanceCruise",
+    "ForceDistribution",
+    "GaussianDisturbance",
+    "GuardedCruise",
+    "Gust",
+    "Input",
+    "IntermediateEstimator",
+    "LearningEnergy",
+    "Line",
+    "Memory",
+    "Noise",
+    "Output",
+    "Parameter",
+    "PdIlc",
+    "PidAto",
+    "PointMassTrain",
+    "Protection",
+    "RadioLink",
+    "RangePotentialCruise",
+    "ReferenceProfile",
+    "Schedule",
+    "Sensor",
+    "Simulation",
+    "Sinusoid",
+    "Size",
+    "State",
+    "StateFaultObserver",
+    "SubwayTrain",
+    "Tape",
+    "Timetable",
+    "Train",
+    "TripMonitor",
+    "TunablePotentialCruise",
+    "simulate",
+]

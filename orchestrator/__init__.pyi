@@ -1,0 +1,22 @@
+from .errors import CouplingError, FmuError, FmuFileError, RailcosimError, RunError, ScenarioError
+from .run import Results, Run, resume, run
+from .scenario import load
+from .system import Connection, Event, Instance, System
+
+__all__ = [
+    "Connection",
+    "CouplingError",
+    "Event",
+    "FmuError",
+    "FmuFileError",
+    "Instance",
+    "RailcosimError",
+    "Results",
+    "Run",
+    "RunError",
+    "ScenarioError",
+    "System",
+    "load",
+    "resume",
+    "run",
+]

@@ -1,0 +1,32 @@
+from .comparison import show_comparison
+from .console import Log, and_figures, counted, folded, open_console, say, show_notes, tell
+from .findings import show_findings
+from .interface import show_interface
+from .outcome import show_run
+from .progress import show_cases, show_compilations, show_progress
+from .scenario import show_system
+from .validation import show_report
+from .verdicts import in_one_line, show_values, summary
+
+__all__ = [
+    "Log",
+    "and_figures",
+    "counted",
+    "folded",
+    "in_one_line",
+    "open_console",
+    "say",
+    "show_cases",
+    "show_comparison",
+    "show_compilations",
+    "show_findings",
+    "show_interface",
+    "show_notes",
+    "show_progress",
+    "show_report",
+    "show_run",
+    "show_system",
+    "show_values",
+    "summary",
+    "tell",
+]

@@ -1,0 +1,12 @@
+from .preference import read_directions
+from .reproduce import published_cases
+from .variants import Comparison, Row, compare, variants
+
+__all__ = [
+    "Comparison",
+    "Row",
+    "compare",
+    "published_cases",
+    "read_directions",
+    "variants",
+]

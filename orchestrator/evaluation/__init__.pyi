@@ -1,0 +1,67 @@
+from .calculation import Scope, evaluate
+from .expressions import Expression, evaluate_constant, parse
+from .judge import Judge
+from .metrics import (
+    COMFORT_TITLE,
+    FUNCTIONS,
+    Metric,
+    MetricChange,
+    comfort_levels,
+    compare_metrics,
+    unit_of,
+)
+from .published import (
+    BAD,
+    ORIGINS,
+    PUBLISHED_KEYS,
+    REFERENCE,
+    REFERENCE_KEYS,
+    UNJUDGED_RUN,
+    ComparedValue,
+    check_entry,
+    check_values,
+    count_values,
+    judge_values,
+    split_metric,
+)
+from .requirements import Verdict, parse_requirement
+from .signals import Part, Signals, parts_of
+from .syntax import Call, Node, Number, Operation, Reference
+
+__all__ = [
+    "BAD",
+    "COMFORT_TITLE",
+    "FUNCTIONS",
+    "ORIGINS",
+    "PUBLISHED_KEYS",
+    "REFERENCE",
+    "REFERENCE_KEYS",
+    "UNJUDGED_RUN",
+    "Call",
+    "ComparedValue",
+    "Expression",
+    "Judge",
+    "Metric",
+    "MetricChange",
+    "Node",
+    "Number",
+    "Operation",
+    "Part",
+    "Reference",
+    "Scope",
+    "Signals",
+    "Verdict",
+    "check_entry",
+    "check_values",
+    "comfort_levels",
+    "compare_metrics",
+    "count_values",
+    "evaluate",
+    "evaluate_constant",
+    "judge_values",
+    "parse",
+    "parse_requirement",
+    "parts_of",
+    "split_metric",
+    "unit_of",
+]

@@ -1,0 +1,22 @@
+from .channel import FmuChannel
+from .fmi2 import FmuSlave
+from .interfaces import plain_interface, read_interface
+from .libraries import forget_paths, library, names_of_platform
+from .loaded import LoadedSlave
+from .versions import SLAVES, call_name
+from .watch import Watch, is_watched
+
+__all__ = [
+    "SLAVES",
+    "FmuChannel",
+    "FmuSlave",
+    "LoadedSlave",
+    "Watch",
+    "call_name",
+    "forget_paths",
+    "is_watched",
+    "library",
+    "names_of_platform",
+    "plain_interface",
+    "read_interface",
+]

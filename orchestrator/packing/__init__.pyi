@@ -1,0 +1,5 @@
+from .container import pack
+
+__all__ = [
+    "pack",
+]

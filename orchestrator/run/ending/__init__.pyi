@@ -1,0 +1,4 @@
+from .conclusion import conclude
+from .interruption import Interruption
+
+__all__ = ["Interruption", "conclude"]

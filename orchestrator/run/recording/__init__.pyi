@@ -1,0 +1,24 @@
+from .binary import remove_rows
+from .recorder import ROWS_FILE, SEEN_FILE, Due, Recorder
+from .recording import Recording, check_stored
+from .results import Results
+from .stored import Telling, finish_rows, recover_rows
+from .text import CSV_FILE
+from .told import check_size, read_json
+
+__all__ = [
+    "CSV_FILE",
+    "ROWS_FILE",
+    "SEEN_FILE",
+    "Due",
+    "Recorder",
+    "Recording",
+    "Results",
+    "Telling",
+    "check_size",
+    "check_stored",
+    "finish_rows",
+    "read_json",
+    "recover_rows",
+    "remove_rows",
+]
