@@ -7,7 +7,7 @@ from .ato.pd_ilc import PdIlc
 from .ato.pid import PidAto
 from .ato.port import AtoController
 from .catalogue import CATALOGUE
-from .component import Component, ComponentError
+from .component import Component
 from .cruise.comfort import ComfortCruise
 from .cruise.fault_tolerant import BacksteppingCruise, FaultTolerantCruise, FaultTolerantCruiseIntermediate
 from .cruise.fixed_distance import FixedDistanceCruise
@@ -26,6 +26,7 @@ from .environment.reference_profile import ReferenceProfile
 from .environment.schedule import Schedule
 from .environment.sensor import Sensor
 from .environment.sinusoid import Sinusoid
+from .errors import ComponentError
 from .simulate import Simulation, simulate
 from .supervision.protection import Protection
 from .supervision.timetable import Timetable

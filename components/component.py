@@ -28,29 +28,13 @@ from .declarations import (
     Tape,
     Variable,
 )
-from .spelling import did_you_mean, nearest
+from .errors import BuildArgumentError, ComponentError, UnknownNameError, did_you_mean, nearest
 
 Values = dict[str, Any]
 Method = Literal["initial", "derivatives", "outputs", "update", "keep"]
 """The methods in which a component's equations stand."""
 MAX_LENGTH = 10_000
 """Longest axis of an array: each element becomes a variable of the FMU, and a slip of the pen would take for ever."""
-
-
-class ComponentError(ValueError):
-    """A component was declared, built or used wrongly; the message names it, the variable and the remedy."""
-
-
-class BuildArgumentError(ComponentError):
-    """A build argument is unusable; ``argument`` is its name."""
-
-    def __init__(self, argument: str, message: str) -> None:
-        super().__init__(message)
-        self.argument = argument
-
-
-class UnknownNameError(ComponentError, AttributeError):
-    """Equations read something that their component does not have."""
 
 
 @dataclass(frozen=True)

@@ -13,8 +13,9 @@ from typing import Any
 import numpy as np
 
 from . import noise
-from .component import Component, ComponentError, Method, Slot, Values, evaluated, pack
+from .component import Component, Method, Slot, Values, evaluated, pack
 from .declarations import Memory, Output, State, Tape
+from .errors import ComponentError
 from .maths import where
 from .returned import check_returned, due
 

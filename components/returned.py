@@ -7,8 +7,9 @@ from dataclasses import dataclass
 from typing import Any
 
 from .authors import place_of
-from .component import Component, ComponentError, Method, Slot
+from .component import Component, Method, Slot
 from .declarations import Memory, Output, State, Tape
+from .errors import ComponentError
 
 
 @dataclass(frozen=True)

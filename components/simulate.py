@@ -20,10 +20,10 @@ from typing import Any, Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from .component import Component, ComponentError, Slot, convert, evaluated, pack
+from .component import Component, Slot, convert, evaluated, pack
 from .declarations import Input, Memory, Output, Parameter, State, Tape
+from .errors import ComponentError, nearest
 from .methods import Methods
-from .spelling import nearest
 from .tape import TapeDeck
 from .tracing import TracingError, feedthrough, initial_dependencies
 

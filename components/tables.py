@@ -7,7 +7,7 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, Literal
 
-from .spelling import nearest
+from .errors import nearest
 
 FASTEST = 170.0
 """m/s: faster than any train on wheels (574.8 km/h, 159.7 m/s); more is meant as km/h."""

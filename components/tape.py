@@ -16,7 +16,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from .component import ComponentError, Slot, pack
+from .component import Slot, pack
+from .errors import ComponentError
 
 Rows = NDArray[np.float64]
 _HEADER = "railcosim tape 1"

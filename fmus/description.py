@@ -11,8 +11,9 @@ from typing import Any
 import numpy as np
 from lxml import etree
 
-from ..components.component import Component, ComponentError, evaluated
+from ..components.component import Component, evaluated
 from ..components.declarations import Input, Memory, Parameter, State
+from ..components.errors import ComponentError
 from ..components.tracing import (
     Names,
     TracingError,

@@ -15,7 +15,8 @@ from collections.abc import Iterable
 from pathlib import Path
 
 from .. import components
-from ..components.component import Component, ComponentError
+from ..components.component import Component
+from ..components.errors import ComponentError
 
 _PROJECT = components.__name__.rpartition(".")[0]
 _COMPONENTS = Path(inspect.getfile(components)).parent

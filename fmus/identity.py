@@ -11,7 +11,8 @@ from pathlib import Path
 
 import numpy as np
 
-from ..components.component import Component, ComponentError
+from ..components.component import Component
+from ..components.errors import ComponentError
 from .annotation import TOOL
 from .description import arguments
 from .embed import embedded_files

@@ -5,7 +5,8 @@ from __future__ import annotations
 import tempfile
 from pathlib import Path
 
-from ..components.component import Component, ComponentError
+from ..components.component import Component
+from ..components.errors import ComponentError
 from .description import SOURCE, write
 from .documentation import files as documentation
 from .toolchain import PLATFORMS, compile_library, folders

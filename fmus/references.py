@@ -18,8 +18,7 @@ from types import CodeType, ModuleType
 from typing import Any
 
 from ..components import CATALOGUE, Component, ComponentError
-from ..components.component import BuildArgumentError
-from ..components.spelling import did_you_mean
+from ..components.errors import BuildArgumentError, did_you_mean
 
 _PRESENT = sys.stdlib_module_names | {"numpy", __package__.partition(".")[0]}
 """What every component file may import."""

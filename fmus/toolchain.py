@@ -30,8 +30,7 @@ from pathlib import Path
 
 import fmpy
 
-from ..components.component import ComponentError
-from ..components.spelling import nearest
+from ..components.errors import ComponentError, nearest
 
 FLAGS = (
     *("-std=c11", "-O2", "-ffp-contract=off", "-fno-builtin-pow", "-fvisibility=hidden", "-g0"),

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable
 from dataclasses import dataclass, field, replace
 
-from ..components.spelling import did_you_mean
+from ..components.errors import did_you_mean
 from .names import SignalName
 
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass, field, fields, replace
 from typing import Any, Literal, TypeVar
 
-from ..components.spelling import did_you_mean
+from ..components.errors import did_you_mean
 
 Loops = Literal["delay", "solve"]
 LOOPS: tuple[Loops, ...] = ("delay", "solve")

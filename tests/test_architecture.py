@@ -133,6 +133,14 @@ def test_rooms_are_entered_by_the_door():
     assert not wrong, "\n".join(wrong)
 
 
+def test_doors_offer_what_they_import():
+    for package in (name for name in FOLDERS if MODULES[name].suffix == ".pyi"):
+        body = ast.parse(MODULES[package].read_text(encoding="utf-8")).body
+        names = [x.asname or x.name for node in body if isinstance(node, ast.ImportFrom) for x in node.names]
+        assert sorted(names) == sorted(offered(package)), f"{package}: __all__ and the imports differ"
+        assert MODULES[package].with_suffix(".py").read_text(encoding="utf-8").endswith("\nhang_door(__name__)\n")
+
+
 def test_nothing_is_read_that_can_execute_something_by_being_read():
     wrong = []
     for package in PACKAGES:

@@ -5,8 +5,9 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Any
 
-from ..component import Component, ComponentError, Values
+from ..component import Component, Values
 from ..declarations import Data, Memory, Output, Parameter, Size
+from ..errors import ComponentError
 from ..maths import logical_and, maximum, minimum, sin, where
 from ..tables import Column, Table
 

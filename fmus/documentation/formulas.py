@@ -11,7 +11,7 @@ import functools
 import html
 from typing import Any
 
-from ...components.component import ComponentError
+from ...components.errors import ComponentError
 
 _SIZE = 15.0
 """Font size in px."""

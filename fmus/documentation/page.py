@@ -10,8 +10,9 @@ from pathlib import Path
 import numpy as np
 
 from ...components import __name__ as _shipped
-from ...components.component import Component, ComponentError
+from ...components.component import Component
 from ...components.declarations import State
+from ...components.errors import ComponentError
 from ...components.tracing import TracingError, feedthrough
 from ..description import arguments, summary
 from ..kinds import NOTE_OF_KIND, FmuKind

@@ -7,8 +7,9 @@ from typing import Any
 
 import numpy as np
 
-from ...components.component import Component, ComponentError
+from ...components.component import Component
 from ...components.declarations import Input, Output, Parameter, State, Tape
+from ...components.errors import ComponentError
 from ...components.tracing import feedthrough
 from ..variables import ScalarVariable, scalar_variables
 from .ccode import number

@@ -9,7 +9,7 @@ from typing import Annotated
 
 import typer
 
-from ...components.component import ComponentError
+from ...components.errors import ComponentError
 from .. import world
 from ..errors import FmuError, RailcosimError, RunError, ScenarioError
 from . import analysis, models, runs, scenarios

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from railcosim.components.component import ComponentError
+from railcosim.components.errors import ComponentError
 from railcosim.components.tape import TapeDeck, smooth
 from railcosim.fmus.build import build
 from railcosim.fmus.references import resolve

@@ -1,6 +1,6 @@
 """What is suggested for a misspelt name."""
 
-from railcosim.components.spelling import did_you_mean, nearest
+from railcosim.components.errors import did_you_mean, nearest
 
 
 def test_the_nearest_name_is_suggested_or_nothing():

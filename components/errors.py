@@ -1,9 +1,25 @@
-"""The nearest name to a misspelt one, for every message that has one to suggest. Imports nothing of this project."""
+"""The errors of a component's declaration, building and use; and the nearest name to a misspelt one, for messages."""
 
 from __future__ import annotations
 
 import difflib
 from collections.abc import Iterable
+
+
+class ComponentError(ValueError):
+    """A component was declared, built or used wrongly; the message names it, the variable and the remedy."""
+
+
+class BuildArgumentError(ComponentError):
+    """A build argument is unusable; ``argument`` is its name."""
+
+    def __init__(self, argument: str, message: str) -> None:
+        super().__init__(message)
+        self.argument = argument
+
+
+class UnknownNameError(ComponentError, AttributeError):
+    """Equations read something that their component does not have."""
 
 
 def did_you_mean(word: str, valid: Iterable[str], *, cutoff: float = 0.6) -> str:
