@@ -1,9 +1,11 @@
 from .errors import CouplingError, FmuError, FmuFileError, RailcosimError, RunError, ScenarioError
 from .run import Results, Run, resume, run
 from .scenario import load
+from .study import Batch
 from .system import Connection, Event, Instance, System
 
 __all__ = [
+    "Batch",
     "Connection",
     "CouplingError",
     "Event",

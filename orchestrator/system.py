@@ -86,6 +86,7 @@ class Event:
             a tunable parameter.
         action: ``"set"`` (a new value from now on), ``"override"`` (another value while it lasts), ``"freeze"`` (the
             value of the beginning), ``"bias"`` (an added value) or ``"ramp"`` (an added value that grows).
+        number: which entry of the scenario it belongs to, from 1; 0 where it is its place in the system that counts.
         at: when it begins, s. duration: how long it lasts, s; None for ever. every: period of repetition, s.
         value: of set, override and bias, in the signal's unit. rate: of a ramp, in the signal's unit per second.
         origin: where it was written, for messages.
@@ -98,6 +99,7 @@ class Event:
     rate: float | None = None
     duration: float | None = None
     every: float | None = None
+    number: int = field(default=0, compare=False)
     origin: str = field(default="", compare=False)
 
 

@@ -1,6 +1,6 @@
 from .calculation import Scope, evaluate
 from .expressions import Expression, evaluate_constant, parse
-from .judge import Judge
+from .judge import Judge, value_name
 from .metrics import (
     COMFORT_TITLE,
     FUNCTIONS,
@@ -64,4 +64,5 @@ __all__ = [
     "parts_of",
     "split_metric",
     "unit_of",
+    "value_name",
 ]

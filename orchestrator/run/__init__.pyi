@@ -1,5 +1,5 @@
 from .assembly import assembled
-from .checking import Checked, check, describe_stepping, swaps
+from .checking import Checked, check, describe_stepping, signal_names, swaps
 from .checkpoint import CHECKPOINT_FILE, read_checkpoint
 from .ending import conclude
 from .execution import at_half_the_step, execute, go_on, resume, run
@@ -35,5 +35,6 @@ __all__ = [
     "recover_rows",
     "resume",
     "run",
+    "signal_names",
     "swaps",
 ]

@@ -3,10 +3,15 @@ from .loading import load, shipped
 from .patterns import NAME
 from .toml_source import parse_value
 from .trust import import_notes, untrusted_code
+from .values import SEED, assignment, changed, is_structural
 
 __all__ = [
     "NAME",
+    "SEED",
+    "assignment",
+    "changed",
     "import_notes",
+    "is_structural",
     "load",
     "parse_value",
     "shipped",

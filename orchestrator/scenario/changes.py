@@ -19,7 +19,7 @@ from .toml_source import Source, parse_value
 
 _NAME = re.compile(r"(?:'(?:[^'\\]|\\.)*'|[^=])*+", re.DOTALL)
 """What stands before the sign of an assignment; a quoted name may hold one itself."""
-_EVENT = re.compile(r"events\s*+(?:\[\s*+(\d{1,9})\s*+\]\s*+)?(?:\.(.*))?", re.DOTALL)
+EVENT = re.compile(r"events\s*+(?:\[\s*+(\d{1,9})\s*+\]\s*+)?(?:\.(.*))?", re.DOTALL)
 _BUILD = re.compile(r"[A-Za-z_]\w*(?:\[[^\[\]]*\])?\.build\.[^.]+")
 
 
@@ -64,7 +64,7 @@ def change(draft: Draft, key: str, entry: Entry, folder: str, problems: list[Pro
         the model that it puts in; empty where it changes something else.
     """
     try:
-        if event := _EVENT.fullmatch(key):
+        if event := EVENT.fullmatch(key):
             _change_event(draft, event[1], (event[2] or "").strip(), entry)
         elif key.startswith("simulation."):
             _change_simulation(draft, key.removeprefix("simulation."), entry)

@@ -143,7 +143,7 @@ def _repetition(event: Event, entries: Mapping[str, Entry]) -> list[Problem]:
 def expand_events(rules: Sequence[EventRule], counts: Counts, problems: list[Problem]) -> list[Event]:
     """The events of every single signal, in the order they are written."""
     events = []
-    for rule in rules:
+    for k, rule in enumerate(rules, 1):
         names: dict[SignalName, None] = {}
         for entry in rule.signals:
             try:
@@ -157,5 +157,5 @@ def expand_events(rules: Sequence[EventRule], counts: Counts, problems: list[Pro
                 if name in names
             ]
             names |= dict.fromkeys(found)
-        events += [replace(rule.event, signal=str(name)) for name in names]
+        events += [replace(rule.event, signal=str(name), number=k) for name in names]
     return events

@@ -59,11 +59,15 @@ def read_simulation(entries: Mapping[str, Entry], origin: str, problems: list[Pr
         if key in entries:
             values[key] = choice(entries[key], problems, valid, what)
     if "seed" in entries:
-        fits = "a whole number from 0 to 2**63 - 1"
-        values["seed"] = whole(entries["seed"], problems, lambda value: 0 <= value < 2**63, fits)
+        values["seed"] = read_seed(entries["seed"], problems)
     if len(problems) == before:
         problems += _grid(entries, values)
     return values | _numerics(entries, problems)
+
+
+def read_seed(entry: Entry, problems: list[Problem]) -> int:
+    """The seed of all noise."""
+    return whole(entry, problems, lambda value: 0 <= value < 2**63, "a whole number from 0 to 2**63 - 1")
 
 
 def _numerics(entries: Mapping[str, Entry], problems: list[Problem]) -> dict[str, Any]:

@@ -70,7 +70,7 @@ def _lines(system: System) -> Iterator[str]:
 
 
 def _assignments(table: Mapping[str, Any]) -> Iterator[str]:
-    return (f"{_key(key)} = {_value(value)}" for key, value in table.items() if value is not None)
+    return (f"{_key(key)} = {toml_value(value)}" for key, value in table.items() if value is not None)
 
 
 def _applies(entry: Mapping[str, Any], system: System) -> bool:
@@ -80,7 +80,7 @@ def _applies(entry: Mapping[str, Any], system: System) -> bool:
 
 def _instance(instance: Instance) -> Iterator[str]:
     yield from ("", f"[instances.{_key(instance.name)}]")
-    yield f"{'fmu' if is_fmu_name(instance.model) else 'component'} = {_value(instance.model)}"
+    yield f"{'fmu' if is_fmu_name(instance.model) else 'component'} = {toml_value(instance.model)}"
     keys = (*OPTION_KEYS, "swapped")
     yield from _assignments({key: value for key in keys if (value := getattr(instance, key)) != getattr(Instance, key)})
     yield from _assignments({"build": instance.build or None})
@@ -102,7 +102,12 @@ def _text(text: str) -> str:
     return json.dumps(text, ensure_ascii=False).replace("\x7f", "\\u007f")
 
 
-def _value(value: Any) -> str:
+def toml_value(value: Any) -> str:
+    """A value as TOML writes it.
+
+    Raises:
+        TypeError: a value that TOML cannot hold.
+    """
     if isinstance(value, np.ndarray | np.generic):
         value = value.tolist()
     match value:
@@ -113,9 +118,11 @@ def _value(value: Any) -> str:
         case str():
             return _text(value)
         case list() | tuple():
-            return f"[{', '.join(_value(item) for item in value)}]"
+            return f"[{', '.join(toml_value(item) for item in value)}]"
         case dict():
             return (
-                f"{{ {', '.join(f'{_key(key)} = {_value(item)}' for key, item in value.items())} }}" if value else "{}"
+                f"{{ {', '.join(f'{_key(key)} = {toml_value(item)}' for key, item in value.items())} }}"
+                if value
+                else "{}"
             )
     raise TypeError(f"a scenario cannot hold {value!r}")

@@ -1,0 +1,55 @@
+"""A small system of toys that batches run."""
+
+import pytest
+from railcosim.orchestrator.scenario.loading import load
+
+TEXT = """
+[simulation]
+stop_time = 1.0
+step = 0.1
+seed = 5
+
+[instances.lag]
+component = "{toys}:Lag"
+count = 2
+start.rate = "0.5 * i"
+
+[instances.ramp]
+component = "{toys}:Ramp"
+
+[instances.noise]
+component = "{toys}:Noisy"
+
+[connections]
+"lag[i].u" = "ramp.x"
+
+[[events]]
+signal = "lag[1].rate"
+action = "set"
+at = 0.5
+value = 2.0
+
+[metrics]
+end = "final(lag[i].x)"
+most = "max(noise.y)"
+
+[require]
+low = "always lag[i].x <= 1.5"
+
+[presets.steep]
+"lag.rate" = 4.0
+"""
+
+
+@pytest.fixture
+def scenario(tmp_path, mine):
+    """The path of the scenario."""
+    path = tmp_path / "small.toml"
+    path.write_text(TEXT.replace("{toys}", mine("Lag").rpartition(":")[0]), encoding="utf-8")
+    return path
+
+
+@pytest.fixture
+def system(scenario):
+    """The system of the scenario."""
+    return load(scenario)

@@ -1,0 +1,76 @@
+"""Runs of a batch are single runs: the same numbers, to the bit, and the same messages."""
+
+import numpy as np
+import pytest
+from railcosim.orchestrator import Batch
+from railcosim.orchestrator.errors import ScenarioError
+from railcosim.orchestrator.run import execute
+from railcosim.orchestrator.scenario import changed
+
+CHANGES = [
+    {},
+    {"lag.rate": 2.0},
+    {"simulation.seed": 6},
+    {"events[1].at": 0.2, "events[1].value": 3.0},
+    {"lag[2].rate": "i * 3", "lag.gain": [1.0, -2.0]},
+    {"lag.u": 3.0},
+    {},
+]
+
+
+def single(system, changes, **options):
+    return execute(changed(system, changes), **options)
+
+
+def agree(row, run):
+    """Whether a row is that of a single run."""
+    assert (row.status, row.error) == (run.status, str(run.error or ""))
+    values = {(m.name if k is None else f"{m.name}[{k}]"): x for m in run.metrics for k, x in m.values.items()}
+    np.testing.assert_array_equal(list(row.metrics.values()), list(values.values()))
+    assert list(row.metrics) == list(values)
+    assert row.verdicts == {one.name: one.verdict for one in run.requirements}
+    margins = [np.nan if one.margin is None else one.margin for one in run.requirements]
+    np.testing.assert_array_equal(list(row.margins.values()), margins)
+    assert row.steps == run.seconds["steps"]
+    for name, values in (row.series or {}).items():
+        np.testing.assert_array_equal(values, run.time if name == "time" else run[name])
+
+
+@pytest.mark.parametrize("kind", ["plain", "native"])
+def test_a_row_is_a_single_run_in_any_order(system, kind):
+    singles = [single(system, changes, kind=kind) for changes in CHANGES]
+    with Batch(system, kind=kind, record=["lag.x", "ramp.x"]) as batch:
+        assert batch.metrics == ("end[1]", "end[2]", "most")
+        assert batch.requirements == ("low",)
+        for k in (*range(len(CHANGES)), *reversed(range(len(CHANGES)))):
+            row = batch.run(CHANGES[k])
+            assert list(row.series) == ["time", "lag[1].x", "lag[2].x", "ramp.x"]
+            agree(row, singles[k])
+
+
+def test_changes_that_cannot_be_run_are_rows_that_say_why(system):
+    with Batch(system, kind="plain") as batch:
+        found = batch.run_all([{"lag.rate": 1.0}, {"lag.rate": "no"}, {"lag.rte": 1.0}, {"lag.count": 3}, {}])
+    assert list(found.status) == ["completed", "refused", "refused", "refused", "completed"]
+    for k, changes in ((1, {"lag.rate": "no"}), (2, {"lag.rte": 1.0}), (3, {"lag.count": 3})):
+        with pytest.raises(ScenarioError) as caught:
+            single(system, changes, kind="plain")
+        assert found.error[k] == str(caught.value)
+    assert len(found) == 5
+    np.testing.assert_array_equal(np.isnan(found.metrics["end[1]"]), [False, True, True, True, False])
+    assert list(found.verdicts["low"]) == ["pass", "", "", "", "pass"]
+    np.testing.assert_array_equal(np.isnan(found.margins["low"]), [False, True, True, True, False])
+    assert [row.passed for row in found.rows] == [True, False, False, False, True]
+
+
+def test_nothing_is_evaluated_or_recorded_that_is_not_asked_for(system):
+    with Batch(system, kind="plain", evaluate=False) as batch:
+        row = batch.run()
+    assert (batch.metrics, batch.requirements) == ((), ())
+    assert (row.status, row.metrics, row.verdicts, row.margins, row.series) == ("completed", {}, {}, {}, None)
+    assert row.passed
+
+
+def test_a_signal_to_be_recorded_has_to_be_there(system):
+    with pytest.raises(ScenarioError, match=r"^record: there is no signal 'lag\[3\].x'; did you mean"):
+        Batch(system, kind="plain", record=["lag[3].x"])
