@@ -3,21 +3,22 @@
 The syntax stands in `syntax`, what the parts mean in `functions` and `calculation`.
 """
 
-import re
-from collections.abc import Callable, Collection, Iterable, Iterator, Mapping
+from collections.abc import Callable, Collection, Mapping
 from dataclasses import dataclass, field
-from functools import cached_property
+from functools import cached_property, lru_cache
 from typing import Any, TypeVar
 
 import numpy as np
 
 from ..errors import ExpressionError, WindowError
-from ..names import INDEX, SignalName
+from ..names import SignalName
 from ..problems import Problem, suggestion
-from .calculation import Scope, evaluate, reach, unknown_signal
+from .calculation import Binding, Scope, evaluate, names_of, reach
 from .functions import CONSTANTS, ELEMENTWISE, Function, Value, call_problem
 from .signals import Rehearsal, Signals
 from .syntax import Call, Group, Name, Node, Number, Operation, Reference, read, walk
+from .terms import Plan, Prepared
+from .vocabulary import Names, numbers_of, unknown_signal
 
 _MAX_INDEX = 20_000
 """How far `i` is counted, beyond the number of names: a lone `x[999999999]` of somebody's FMU is not worth the time."""
@@ -30,7 +31,11 @@ def parse(text: str, functions: Mapping[str, Function] = ELEMENTWISE) -> "Expres
     Raises:
         ExpressionError: for anything that is not an expression of this language, with the column and the remedy.
     """
-    return Expression(*read(text), functions)
+    return Expression(*_read(text), functions)
+
+
+_read = lru_cache(maxsize=1024)(read)
+"""Texts are read again and again: by the scenario, the check, the run and the figures."""
 
 
 @dataclass(frozen=True)
@@ -64,8 +69,7 @@ class Expression:
     def count(self, names: Collection[str]) -> int:
         """The number of the last instance, or element, of the first array it mentions: what `count` stands for."""
         array = next((reference.array for reference in self.references if reference.array), "")
-        matches = (re.match(rf"{re.escape(array)}\[ *{INDEX}", name) for name in names)
-        return max((int(match[1]) for match in matches if match), default=0)
+        return Names.of(names).count(array)
 
     def indices(self, names: Collection[str]) -> tuple[int, ...]:
         """Every i for which all references exist; () when the expression has no free index.
@@ -74,14 +78,20 @@ class Expression:
         """
         if not self.uses_index or not any(reference.uses_index for reference in self.references):
             return ()
-        last = min(2 * max(_numbers(names), default=0) + 1, _MAX_INDEX + len(names))
+        names, key = Names.of(names), tuple(reference.key for reference in self.references)
+        if key not in names.instances:
+            names.instances[key] = self._indices(names)
+        return names.instances[key]
+
+    def _indices(self, names: Names) -> tuple[int, ...]:
+        last = min(2 * names.largest + 1, _MAX_INDEX + len(names))
         first = 1
         if not any(reference.counts_instances for reference in self.references):
             begins = tuple(f"{reference.array}[" for reference in self.references if reference.uses_index)
-            first = max(min(_numbers(name for name in names if name.startswith(begins)), default=1), -_MAX_INDEX)
-        rehearsal, count = Rehearsal(names), self.count(names)
-        scopes = ((i, self._scope(rehearsal, {"i": i, "count": count})) for i in range(min(first, 1), last + 1))
-        return tuple(i for i, scope in scopes if all(scope.resolve(reference) for reference in self.references))
+            first = max(min(numbers_of(name for name in names if name.startswith(begins)), default=1), -_MAX_INDEX)
+        plan, count = Plan(names), self.count(names)
+        bindings = ((i, self._bound(plan, {"i": i, "count": count})) for i in range(min(first, 1), last + 1))
+        return tuple(i for i, binding in bindings if all(binding.found(reference) for reference in self.references))
 
     def instances(self, names: Collection[str]) -> tuple[int | None, ...]:
         """The indices to evaluate it for: `indices`, or (None,) when it has no free index."""
@@ -89,14 +99,15 @@ class Expression:
 
     def resolve(self, names: Collection[str], index: int | None = None) -> list[list[str]]:
         """For each reference the full names it stands for."""
-        scope = self._scope(Rehearsal(names), {} if index is None else {"i": index})
-        return [scope.resolve(reference) for reference in self.references]
+        binding = self.bound(Plan(names), index)
+        return [binding.found(reference) for reference in self.references]
 
     def check(self, names: Collection[str], constants: Collection[str] = ()) -> list[Problem]:
         """Every problem that can be found before a run, each with the column and the nearest valid name.
 
         `constants` are further bare names the expression may use, such as the variable of a function plot.
         """
+        names = Names.of(names)
         known = {*CONSTANTS, *constants, "time", "count", *(["i"] if self.references else [])}
         try:
             problems = [
@@ -137,19 +148,27 @@ class Expression:
         alone = Expression(reference.text, reference)
         return any(any(alone.resolve(names, index)) for index in alone.instances(names))
 
-    def _scope(self, signals: Signals, constants: Mapping[str, Any]) -> Scope:
+    def _bound(self, plan: Plan, constants: Mapping[str, Any]) -> Binding:
         every = {**CONSTANTS, **constants}
-        if re.search(r"\btime\b", self.text):
-            every["time"] = signals.time
         if "count" in self.text and "count" not in every:
-            every["count"] = self.count([*signals.names(), *signals.parameters])
-        return Scope(self.text, signals, self.functions, every)
+            every["count"] = self.count(plan.names)
+        return Binding(self.text, self.functions, every, plan)
+
+    def bound(self, plan: Plan, index: int | None = None) -> Binding:
+        """What it stands for among the names of a plan, which keeps it."""
+        bindings, key = plan.bindings, (self.text, id(self.functions), index)
+        if key not in bindings:
+            bindings[key] = self._bound(plan, {} if index is None else {"i": index})
+        binding: Binding = bindings[key]
+        return binding
 
     def apply(
         self, rule: Callable[[Node, Scope], R], signals: Signals, index: int | None = None, **constants: Any
     ) -> R:
         """Evaluate under another rule than the usual one (a requirement asks for slack instead of truth)."""
-        scope = self._scope(signals, constants if index is None else {**constants, "i": index})
+        run = signals if isinstance(signals, Prepared) else Prepared(Plan(names_of(signals)), signals)
+        constants = constants if index is None or not constants else {**constants, "i": index}
+        scope = Scope(self._bound(run.plan, constants) if constants else self.bound(run.plan, index), run.whole)
         try:
             with np.errstate(all="ignore"):
                 return rule(self.tree, scope)
@@ -174,11 +193,6 @@ class Expression:
         """
         value = self.apply(evaluate, signals, index, **constants)
         return value.item() if value.ndim == 0 else value
-
-
-def _numbers(names: Iterable[str]) -> Iterator[int]:
-    """The numbers in brackets."""
-    return (int(number) for name in names for number in re.findall(rf"[\[,] *{INDEX}", name))
 
 
 def evaluate_constant(text: str, **constants: float | bool) -> float | bool:

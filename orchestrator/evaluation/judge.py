@@ -1,12 +1,19 @@
 """`Judge`: the metrics and requirements of a scenario, made ready once and applied to any number of runs."""
 
-from collections.abc import Collection, Mapping
+from collections.abc import Callable, Collection, Mapping
 from functools import cached_property
+from typing import Any, TypeVar
 
+import numpy as np
+
+from ..errors import ExpressionError
 from ..problems import Problem
-from .metrics import Metric, check_metrics, evaluate_metrics, metric_indices
-from .requirements import Verdict, check_requirements, judge_requirements, needed_signals
+from .expressions import parse
+from .metrics import FUNCTIONS, Metric, check_metric, measure
+from .requirements import Verdict, parse_requirement
 from .signals import Signals
+from .terms import Plan, Prepared
+from .vocabulary import Names
 
 
 class Judge:
@@ -29,23 +36,42 @@ class Judge:
         *,
         steady: bool = True,
     ) -> None:
-        self._metrics, self._requirements = dict(metrics), dict(requirements)
-        self._names, self._parameters, self._steady = names, parameters, steady
+        self._names, self._parameters, self._steady = Names.of(names), parameters, steady
+        self._plan = Plan(self._names)
+        self._texts = dict(metrics)
+        self._metrics = {name: _read(parse, text, FUNCTIONS) for name, text in metrics.items()}
+        self._requirements = {name: _read(parse_requirement, name, text) for name, text in requirements.items()}
 
     @cached_property
     def metric_problems(self) -> list[Problem]:
         """Every problem of the metrics that can be found before a run."""
-        return check_metrics(self._metrics, self._names, self._steady, self._parameters)
+        return [
+            problem.at(f"metric '{name}'")
+            for name, metric in self._metrics.items()
+            for problem in (
+                metric.problems
+                if isinstance(metric, ExpressionError)
+                else check_metric(metric, self._names, self._steady, self._parameters)
+            )
+        ]
 
     @cached_property
     def requirement_problems(self) -> list[Problem]:
         """Every problem of the requirements that can be found before a run."""
-        return check_requirements(self._requirements, self._names, self._steady, self._parameters)
+        return [
+            problem.at(f"requirement '{name}'")
+            for name, requirement in self._requirements.items()
+            for problem in (
+                requirement.problems
+                if isinstance(requirement, ExpressionError)
+                else requirement.check(self._names, self._steady, self._parameters)
+            )
+        ]
 
     @cached_property
     def indices(self) -> dict[str, tuple[int | None, ...]]:
         """The values that each metric has: its i's, or (None,) for a single one. For tables without a problem."""
-        return metric_indices(self._metrics, self._names)
+        return {name: _known(metric).instances(self._names) for name, metric in self._metrics.items()}
 
     @cached_property
     def value_names(self) -> tuple[str, ...]:
@@ -60,15 +86,31 @@ class Judge:
     @cached_property
     def needed_signals(self) -> frozenset[str]:
         """The signals and parameters that are looked at. For tables without a problem."""
-        return frozenset(needed_signals(self._metrics, self._requirements, self._names))
+        looks = [_known(metric) for metric in self._metrics.values()]
+        looks += [look for requirement in self._requirements.values() for look in _known(requirement).looks]
+        bindings = ((look, look.bound(self._plan, index)) for look in looks for index in look.instances(self._names))
+        found = (binding.found(reference) for look, binding in bindings for reference in look.references)
+        return frozenset(name for names in found for name in names)
 
     def metrics(self, signals: Signals) -> list[Metric]:
         """The metrics of a run. One that cannot be evaluated is NaN and says why: the others are still wanted."""
-        return evaluate_metrics(self._metrics, signals)
+        run = Prepared(self._plan, signals)
+        with np.errstate(all="ignore"):
+            return [
+                Metric(name, self._texts[name], {None: np.nan}, problem=str(metric))
+                if isinstance(metric, ExpressionError)
+                else measure(name, self._texts[name], metric, run)
+                for name, metric in self._metrics.items()
+            ]
 
     def verdicts(self, signals: Signals) -> list[Verdict]:
-        """How a run keeps the requirements."""
-        return judge_requirements(self._requirements, signals)
+        """How a run keeps the requirements.
+
+        Raises:
+            ExpressionError: for what was told before the run.
+        """
+        run = Prepared(self._plan, signals)
+        return [_known(requirement).evaluate(run) for requirement in self._requirements.values()]
 
     def values(self, signals: Signals) -> dict[str, float]:
         """The values of the metrics of a run by `value_names`; NaN where one cannot be evaluated."""
@@ -83,3 +125,20 @@ class Judge:
 def value_name(metric: str, index: int | None) -> str:
     """`gap_min[2]`, or `settling` for a metric with a single value."""
     return metric if index is None else f"{metric}[{index}]"
+
+
+R = TypeVar("R")
+
+
+def _read(read: Callable[..., R], *text: Any) -> R | ExpressionError:
+    """What was read, or why it cannot be."""
+    try:
+        return read(*text)
+    except ExpressionError as error:
+        return error
+
+
+def _known(read: R | ExpressionError) -> R:
+    if isinstance(read, ExpressionError):
+        raise read
+    return read

@@ -4,7 +4,7 @@ Every reducer is defined in `docs/metrics.md`. Over several rows (`train[:].spee
 NaN in the window gives NaN; a window the run does not cover is an error (`WindowError`), never a number.
 """
 
-from collections.abc import Callable, Collection, Mapping, Sequence
+from collections.abc import Callable, Collection, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -13,14 +13,13 @@ from numpy.typing import NDArray
 
 from ..errors import ExpressionError
 from ..problems import Problem
-from . import folds
-from .expressions import Expression, parse
-from .folds import Fold
+from .calculation import names_of
+from .expressions import Expression
 from .functions import ELEMENTWISE, Function
-from .platoon import PLATOON
+from .reducers import PLATOON, Fold, Span, folds
 from .signals import Signals
 from .syntax import Call, Node, Number, Operation, Reference
-from .time_windows import Span
+from .terms import Plan, Prepared
 
 Array = NDArray[np.float64]
 
@@ -85,8 +84,8 @@ _PLAIN: dict[str, tuple[str, Callable[[], Fold]]] = {  # name: unit, fold
     "comfort": ("same", folds.peaks),
     "initial": ("same", folds.initial),
     "final": ("same", folds.final),
-    "mean": ("same", lambda: folds.means(np.mean)),
-    "rms": ("same", lambda: folds.means(lambda means: np.sqrt(means.max()), squares=True)),
+    "mean": ("same", lambda: folds.means(lambda means: means.mean(axis=-1))),
+    "rms": ("same", lambda: folds.means(lambda means: np.sqrt(means.max(axis=-1)), squares=True)),
     "spread": ("same", folds.spread),
     "integral": ("", folds.integral),
     "duration": ("s", folds.duration),
@@ -129,13 +128,21 @@ def unit_of(expression: Expression, signals: Signals, index: int | None = None) 
 
     A signal has its own; sums and reducers keep a unit all their parts share (bare numbers go with any).
     """
-    names = [*signals.names(), *signals.parameters]
+    if not isinstance(signals, Prepared):
+        return _unit_of(expression, signals, Plan(names_of(signals)), index)
+    kept, key = signals.plan.bindings, ("unit", expression.text, index)
+    if key not in kept or kept[key][0] is not signals.units:
+        kept[key] = signals.units, _unit_of(expression, signals, signals.plan, index)
+    return str(kept[key][1])
+
+
+def _unit_of(expression: Expression, signals: Signals, plan: Plan, index: int | None) -> str:
+    binding = expression.bound(plan, index)
 
     def visit(node: Node) -> str | None:  # None: a bare number
         match node:
             case Reference():
-                resolved = Expression(node.text, node).resolve(names, index)[0]
-                return shared([signals.units.get(name, "") for name in resolved])
+                return shared([signals.units.get(name, "") for name in binding.found(node)])
             case Number():
                 return None
             case Operation(operator="+" | "-" | "negative" | "positive", operands=operands):
@@ -205,31 +212,22 @@ class MetricChange:
         return 0.0 if self.other == self.value else self.other - self.value
 
 
-def check_metrics(
-    table: Mapping[str, str], names: Collection[str], steady: bool = True, parameters: Collection[str] | None = None
+def check_metric(
+    expression: Expression, names: Collection[str], steady: bool = True, parameters: Collection[str] | None = None
 ) -> list[Problem]:
-    """Every problem of a [metrics] table that can be found before a run.
+    """Every problem of a metric that can be found before a run.
 
     Args:
-        table: the expressions by name.
+        expression: the metric.
         names: the signals to be recorded and the parameters.
         steady: whether communication steps are of one length.
         parameters: which of the names are parameters; without it a forgotten reducer shows only after the run.
     """
-    problems: list[Problem] = []
-    for name, text in table.items():
-        place = f"metric '{name}'"
-        try:
-            expression = parse(text, FUNCTIONS)
-        except ExpressionError as error:
-            problems += error.at(place)
-            continue
-        found = expression.check(names)
-        if not found and parameters is not None and _varies(expression, expression.tree, names, parameters):
-            found = [_not_reduced(text)]
-        problems += [problem.at(place) for problem in found]
-        if expression.calls("at_sample") and not steady:
-            problems.append(EVERY_STEP.at(f"{place}: '{text}'"))
+    problems = expression.check(names)
+    if not problems and parameters is not None and _varies(expression, expression.tree, names, parameters):
+        problems = [_not_reduced(expression.text)]
+    if expression.calls("at_sample") and not steady:
+        problems.append(EVERY_STEP.at(f"'{expression.text}'"))
     return problems
 
 
@@ -248,32 +246,24 @@ def _not_reduced(text: str) -> Problem:
     return Problem("", f"'{text}' is a signal, not a number", f"reduce it, as in max({text})")
 
 
-def metric_indices(table: Mapping[str, str], names: Collection[str]) -> dict[str, tuple[int | None, ...]]:
-    """The values each metric will have: its i's, or (None,) for a single one. For tables that passed the check."""
-    return {name: parse(text, FUNCTIONS).instances(names) for name, text in table.items()}
-
-
-def evaluate_metrics(table: Mapping[str, str], signals: Signals) -> list[Metric]:
-    """All metrics of a table. One that cannot be evaluated is NaN and says why: the others are still wanted."""
-    return [_evaluate(name, text, signals) for name, text in table.items()]
-
-
-def _evaluate(name: str, text: str, signals: Signals) -> Metric:
+def measure(name: str, text: str, expression: Expression, run: Prepared) -> Metric:
+    """A metric of a run, which is written as the text. One that cannot be evaluated is NaN and says why."""
     values: dict[int | None, float] = {}
-    unit, comfort, truth = "", False, False
+    known: list[int | None] = []
+    truth, problem = False, ""
     try:
-        expression = parse(text, FUNCTIONS)
-        comfort = isinstance(expression.tree, Call) and expression.tree.name == "comfort"
-        for index in expression.instances([*signals.names(), *signals.parameters]):
+        for index in expression.instances(run.plan.names):
             values[index] = np.nan
-            value = expression.evaluate(signals, index)
+            value = expression.evaluate(run, index)
             if isinstance(value, np.ndarray):
                 raise ExpressionError(_not_reduced(text))
             values[index], truth = float(value), isinstance(value, bool)
-            unit = unit_of(expression, signals, index)
+            known.append(index)
     except ExpressionError as error:
-        return Metric(name, text, values or {None: np.nan}, unit, comfort, str(error))
-    return Metric(name, text, values, unit, comfort, truth=truth)
+        problem, truth = str(error), False
+    unit = unit_of(expression, run, known[-1]) if known else ""
+    comfort = isinstance(expression.tree, Call) and expression.tree.name == "comfort"
+    return Metric(name, text, values or {None: np.nan}, unit, comfort, problem, truth)
 
 
 def compare_metrics(metrics: Sequence[Metric], others: Sequence[Metric]) -> list[MetricChange]:

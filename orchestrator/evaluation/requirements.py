@@ -6,7 +6,7 @@ Numbers that differ by rounding are equal: their margin is 0. The grammar and it
 """
 
 import re
-from collections.abc import Callable, Collection, Iterator, Mapping
+from collections.abc import Callable, Collection, Iterator
 from dataclasses import dataclass
 from functools import partial
 from typing import Literal, NamedTuple
@@ -18,14 +18,14 @@ from ..errors import ExpressionError, WindowError
 from ..names import SignalName
 from ..problems import Problem, suggestion
 from ..times import digits, slack
-from .calculation import Scope, reach
+from .calculation import Scope, names_of, reach
 from .expressions import Expression, evaluate_constant, parse
 from .functions import CONSTANTS
 from .metrics import EVERY_STEP, FUNCTIONS
+from .reducers import Span, ends_of, scalar, window_of
 from .signals import Rehearsal, Signals, parts_of
 from .slack import COMPARISONS, slack_of
 from .syntax import Call, Name, Node, Number, Operation, Reference, walk
-from .time_windows import Span, ends_of, scalar, window_of
 
 QUANTIFIERS = ("always", "eventually", "finally")
 CLAUSES = ("from", "until", "outside")
@@ -105,8 +105,21 @@ class Requirement:
                 raise ExpressionError(Problem("", backwards, "swap the two"))
         return _Times(start, end, outside)
 
-    def check(self, names: Collection[str], parameters: Collection[str] | None = None) -> list[Problem]:
-        """Every problem that can be found before a run; `names` are the signals to be recorded and the parameters."""
+    @property
+    def looks(self) -> list[Expression]:
+        """Everything that looks at signals or parameters."""
+        return [self.condition, *self.moments]
+
+    def check(
+        self, names: Collection[str], steady: bool = True, parameters: Collection[str] | None = None
+    ) -> list[Problem]:
+        """Every problem that can be found before a run, as `metrics.check_metric` does it."""
+        problems = self._problems(names, parameters)
+        if self.condition.calls("at_sample") and not steady:
+            problems.append(EVERY_STEP)
+        return problems
+
+    def _problems(self, names: Collection[str], parameters: Collection[str] | None) -> list[Problem]:
         problems = self.condition.check(names)
         for moment in self.moments:
             found = moment.check(names)
@@ -137,7 +150,7 @@ class Requirement:
             return Verdict(self.name, self.text, "inconclusive", reason=str(error))
         first, last = ends_of(signals)
         span = Span(times.start, times.end, times.outside, forgiven=slack(signals.step, first, last))
-        indices = self.condition.instances([*signals.names(), *signals.parameters])
+        indices = self.condition.instances(names_of(signals))
         if not indices:
             return Verdict(self.name, self.text, "inconclusive", reason="no signal has such an index")
         try:
@@ -343,41 +356,3 @@ def parse_requirement(name: str, text: str) -> Requirement:
     if not any(moment.references for moment in made.moments):
         made.times(Rehearsal(()))
     return made
-
-
-def check_requirements(
-    table: Mapping[str, str], names: Collection[str], steady: bool = True, parameters: Collection[str] | None = None
-) -> list[Problem]:
-    """Every problem of a [require] table that can be found before a run, as `metrics.check_metrics` does it."""
-    problems: list[Problem] = []
-    for name, text in table.items():
-        place = f"requirement '{name}'"
-        try:
-            requirement = parse_requirement(name, text)
-        except ExpressionError as error:
-            problems += error.at(place)
-            continue
-        problems += [problem.at(place) for problem in requirement.check(names, parameters)]
-        if requirement.condition.calls("at_sample") and not steady:
-            problems.append(EVERY_STEP.at(place))
-    return problems
-
-
-def needed_signals(metrics: Mapping[str, str], requirements: Mapping[str, str], names: Collection[str]) -> set[str]:
-    """The signals and parameters that checked tables look at.
-
-    Args:
-        metrics: a [metrics] table.
-        requirements: a [require] table.
-        names: the signals to be recorded and the parameters.
-    """
-    parsed = [parse_requirement(name, text) for name, text in requirements.items()]
-    looks = [parse(text, FUNCTIONS) for text in metrics.values()]
-    looks += [look for requirement in parsed for look in (requirement.condition, *requirement.moments)]
-    found = (look.resolve(names, index) for look in looks for index in look.instances(names))
-    return {name for group in found for resolved in group for name in resolved}
-
-
-def judge_requirements(table: Mapping[str, str], signals: Signals) -> list[Verdict]:
-    """The verdicts of a [require] table that passed its check, in its order."""
-    return [parse_requirement(name, text).evaluate(signals) for name, text in table.items()]

@@ -2,6 +2,7 @@
 
 from collections.abc import Collection, Iterator, Mapping
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Any, Protocol
 
 import numpy as np
@@ -59,18 +60,24 @@ class Part:
     Attributes:
         whole: all of it. columns: the signals, and `time`, at these points.
         overlap: how many of the first points are those of the part before. beyond: how many of the last are those of
-            the next one.
+            the next one. first: the number of the first point.
     """
 
     whole: Signals
     columns: Mapping[str, NDArray[Any]]
     overlap: int
     beyond: int
+    first: int = 0
 
-    @property
+    @cached_property
     def time(self) -> NDArray[np.float64]:
         """As `Signals` has it."""
         return self.columns["time"]
+
+    def is_as(self, other: "Part") -> bool:
+        """Whether it has the same points of a run as another part."""
+        own, others = ((x.first, x.overlap, x.beyond, x.points) for x in (self, other))
+        return own == others
 
     @property
     def points(self) -> int:
@@ -125,7 +132,7 @@ def parts_of(signals: Signals, beyond: int = 0) -> Iterator[Part]:
     for first in range(0, count, BLOCK):
         last, overlap = min(first + BLOCK, count), int(first > 0)
         end = min(last + beyond, count)
-        yield Part(signals, signals.part(first - overlap, end), overlap, end - last)
+        yield Part(signals, signals.part(first - overlap, end), overlap, end - last, first - overlap)
 
 
 class Rehearsal:

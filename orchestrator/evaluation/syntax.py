@@ -9,6 +9,7 @@ import re
 import warnings
 from collections.abc import Iterator
 from dataclasses import dataclass
+from functools import cached_property
 from typing import TypeAlias
 
 from ..errors import ExpressionError
@@ -52,27 +53,32 @@ class Reference:
     column: int
     parts: tuple[tuple[str, tuple["Node | Span", ...]], ...]
 
+    @cached_property
+    def key(self) -> tuple[str, bool]:
+        """The same for references that stand for the same."""
+        return self.text, bool(self.indices)
+
     @property
     def indices(self) -> "tuple[Node | Span, ...]":
         """All its indices, left to right."""
         return tuple(index for _, indices in self.parts for index in indices)
 
-    @property
+    @cached_property
     def stacked(self) -> bool:
         """Whether it stands for several signals, one a row."""
         return any(isinstance(index, Span) for index in self.indices)
 
-    @property
+    @cached_property
     def uses_index(self) -> bool:
         """Whether the free index `i` occurs in an index."""
         return _says_i(self.indices)
 
-    @property
+    @cached_property
     def counts_instances(self) -> bool:
         """Whether `i` occurs in the index of the instance."""
         return _says_i(self.parts[0][1])
 
-    @property
+    @cached_property
     def array(self) -> str:
         """The name before its first index, or nothing: `train` of `train[i].speed`."""
         names = [name for name, _ in self.parts]

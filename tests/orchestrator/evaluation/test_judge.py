@@ -4,6 +4,7 @@ import math
 
 import numpy as np
 import pytest
+from railcosim.orchestrator.errors import ExpressionError
 from railcosim.orchestrator.evaluation import Judge
 from railcosim.orchestrator.run.recording import Results
 
@@ -52,3 +53,20 @@ def test_problems_are_told_apart():
     judge = Judge({"top": "max(s.y)"}, {"low": "s.x < 1"}, NAMES)
     assert [problem.place for problem in judge.metric_problems] == ["metric 'top': 'max(s.y)', column 5"]
     assert [problem.place for problem in judge.requirement_problems] == ["requirement 'low'"]
+
+
+def test_a_run_without_a_signal_has_no_value_and_says_so():
+    judge = Judge({"top": "max(s.x)", "other": "max(s.y)"}, {}, [*NAMES, "s.y"])
+    top, other = judge.metrics(run([1.0, 2.0]))
+    assert top.values == {None: 2.0}
+    assert other.problem == "'max(s.y)': the run has no 's.y'"
+
+
+def test_a_table_that_cannot_be_read_is_told_after_the_run_too():
+    judge = Judge({"torn": "max(", **METRICS}, {"low": "s.x < 1"}, NAMES)
+    torn, top, _ = judge.metrics(run([1.0, 2.0]))
+    assert "was never closed" in torn.problem
+    assert math.isnan(torn.values[None])
+    assert top.values == {None: 2.0}
+    with pytest.raises(ExpressionError, match="does not say when"):
+        judge.verdicts(run([1.0]))

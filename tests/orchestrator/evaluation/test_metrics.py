@@ -7,6 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from railcosim.orchestrator.errors import ExpressionError, WindowError
+from railcosim.orchestrator.evaluation import Judge
 from railcosim.orchestrator.evaluation.expressions import parse
 from railcosim.orchestrator.evaluation.metrics import (
     COMFORT_SCALE,
@@ -14,11 +15,8 @@ from railcosim.orchestrator.evaluation.metrics import (
     FUNCTIONS,
     Metric,
     MetricChange,
-    check_metrics,
     comfort_levels,
     compare_metrics,
-    evaluate_metrics,
-    metric_indices,
     unit_of,
 )
 
@@ -51,6 +49,14 @@ class Run:
 
     def __getitem__(self, name):
         return self.columns[name]
+
+
+def measured(table, run):
+    return Judge(table, {}, [*run.names(), *run.parameters]).metrics(run)
+
+
+def problems_of(table, names, steady=True, parameters=None):
+    return Judge(table, {}, names, parameters, steady=steady).metric_problems
 
 
 def ramp():
@@ -236,7 +242,7 @@ def test_nan_in_the_window_gives_nan_and_outside_it_does_not():
 def test_a_window_the_run_does_not_cover_has_no_value(text, message):
     with pytest.raises(WindowError, match=message):
         value(text)
-    metric = evaluate_metrics({"m": text}, ramp())[0]
+    metric = measured({"m": text}, ramp())[0]
     assert np.isnan(metric.values[None])
     assert message in metric.problem
 
@@ -284,7 +290,7 @@ def test_all_levels_of_the_reaction_scale_are_reported(acceleration, levels):
 
 def test_comfort_prints_its_levels_and_claims_no_standard():
     run = Run().put("train[1].acceleration", 1.0, "m/s2").put("train[2].acceleration", -0.4, "m/s2")
-    peak, rms = evaluate_metrics(
+    peak, rms = measured(
         {"peak": "comfort(train[i].acceleration)", "rms": "comfort(rms(train[i].acceleration, until = 5))"}, run
     )
     assert peak.comfort
@@ -300,22 +306,22 @@ def test_a_metric_with_a_free_index_has_a_value_for_each():
     for i in range(1, 5):
         run.put(f"train[{i}].position", -1000.0 * i**2, "m")
     table = {"gap": "final(train[i-1].position - train[i].position)", "all": "max(train[:].position)"}
-    gap, together = evaluate_metrics(table, run)
+    gap, together = measured(table, run)
     assert gap.values == {2: 3000.0, 3: 5000.0, 4: 7000.0}
     assert gap.unit == "m"
     assert gap.text(3) == "5000 m"
     assert together.values == {None: -1000.0}
-    assert metric_indices(table, list(run.names())) == {"gap": (2, 3, 4), "all": (None,)}
+    assert Judge(table, {}, list(run.names())).indices == {"gap": (2, 3, 4), "all": (None,)}
 
 
 def test_metrics_may_use_parameters():
     run = Run(parameters={"cruise[1].gap_min": 2.0, "cruise[2].gap_min": 4.0}).put("train[1].gap", 5.0)
     table = {"margin": "min(train[1].gap) - cruise[1].gap_min", "widest": "max(cruise[:].gap_min)"}
-    assert [metric.values for metric in evaluate_metrics(table, run)] == [{None: 3.0}, {None: 4.0}]
+    assert [metric.values for metric in measured(table, run)] == [{None: 3.0}, {None: 4.0}]
 
 
 def test_one_bad_metric_does_not_hide_the_others():
-    bad, signal, good = evaluate_metrics({"bad": "max(s.z)", "signal": "s.x", "good": "max(s.x)"}, ramp())
+    bad, signal, good = measured({"bad": "max(s.z)", "signal": "s.x", "good": "max(s.x)"}, ramp())
     assert np.isnan(bad.values[None])
     assert "there is no signal or parameter 's.z'" in bad.problem
     assert "'s.x' is a signal, not a number; reduce it, as in max(s.x)" in signal.problem
@@ -351,9 +357,9 @@ def test_units_are_told_only_where_they_are_certain(text, unit):
 
 
 def test_a_condition_is_true_or_false():
-    (metric, *_) = evaluate_metrics({"kept": "max(s.x) < 1e9", "number": "max(s.x)"}, ramp())
+    (metric, *_) = measured({"kept": "max(s.x) < 1e9", "number": "max(s.x)"}, ramp())
     assert (metric.truth, metric.text()) == (True, "true")
-    (metric,) = evaluate_metrics({"kept": "max(s.x) < -1e9"}, ramp())
+    (metric,) = measured({"kept": "max(s.x) < -1e9"}, ramp())
     assert (metric.values, metric.text()) == ({None: 0.0}, "false")
 
 
@@ -367,7 +373,7 @@ def test_values_are_printed_for_people():
 
 def test_check_tells_every_problem_of_the_table():
     names = list(ramp().names())
-    problems = check_metrics(
+    problems = problems_of(
         {
             "typo": "maxx(s.x)",
             "syntax": "max(s.x",
@@ -397,15 +403,15 @@ def test_check_tells_every_problem_of_the_table():
     ):
         assert problem.place.startswith(f"metric '{name}'")
         assert message in str(problem)
-    assert check_metrics({"shift": "max(at_sample(s.x))"}, names) == []
+    assert problems_of({"shift": "max(at_sample(s.x))"}, names) == []
 
 
 def test_a_metric_that_is_a_signal_is_found_before_the_run():
     names = [*ramp().names(), "c.limit"]
     fine = {"a": "max(s.x) - c.limit", "b": "c.limit", "c": "max(s.x - s.y)", "d": "abs(final(a[i].v))"}
-    assert check_metrics(fine, names, parameters=["c.limit"]) == []
-    assert check_metrics({"gap": "s.x - s.y"}, names) == []  # not told apart from parameters
-    (problem,) = check_metrics({"gap": "s.x - s.y"}, names, parameters=["c.limit"])
+    assert problems_of(fine, names, parameters=["c.limit"]) == []
+    assert problems_of({"gap": "s.x - s.y"}, names) == []  # not told apart from parameters
+    (problem,) = problems_of({"gap": "s.x - s.y"}, names, parameters=["c.limit"])
     assert problem.place == "metric 'gap'"
     assert problem.message == "'s.x - s.y' is a signal, not a number"
     assert problem.remedy == "reduce it, as in max(s.x - s.y)"

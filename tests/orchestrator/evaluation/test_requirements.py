@@ -7,7 +7,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from railcosim.orchestrator.errors import ExpressionError
-from railcosim.orchestrator.evaluation.requirements import check_requirements, judge_requirements, parse_requirement
+from railcosim.orchestrator.evaluation import Judge
+from railcosim.orchestrator.evaluation.requirements import parse_requirement
 
 pytestmark = pytest.mark.usefixtures("parts")
 
@@ -50,6 +51,10 @@ def run(end=100.0, **more):
 
 def judge(text, signals=None):
     return parse_requirement("name", text).evaluate(signals or run())
+
+
+def problems_of(table, names, steady=True, parameters=None):
+    return Judge({}, table, names, parameters, steady=steady).requirement_problems
 
 
 @pytest.mark.parametrize(
@@ -224,7 +229,7 @@ def test_refused_with_the_remedy(text, message):
     with pytest.raises(ExpressionError) as caught:
         parse_requirement("comfort", text)
     assert message in str(caught.value)
-    assert check_requirements({"comfort": text}, ["a[1].x"]) == caught.value.at("requirement 'comfort'")
+    assert problems_of({"comfort": text}, ["a[1].x"]) == caught.value.at("requirement 'comfort'")
 
 
 def test_bounds_and_windows_are_read_from_parameters():
@@ -243,7 +248,7 @@ def test_a_window_is_of_times_that_stand_still():
     names, parameters = ["a[1].x", "a[2].x", "gust.start_time", "gust.stop_time"], ["gust.start_time", "gust.stop_time"]
 
     def problems(text):
-        return [str(problem) for problem in check_requirements({"r": text}, names, True, parameters)]
+        return [str(problem) for problem in problems_of({"r": text}, names, True, parameters)]
 
     assert problems("always a[1].x < 3 outside [gust.start_time, gust.stop_time + 1]") == []
     place = "requirement 'r': 'a[1].x': "
@@ -300,7 +305,7 @@ def test_all_problems_of_one_text_are_told():
     ],
 )
 def test_check_finds_it_before_the_run(text, message):
-    problems = check_requirements({"comfort": text}, list(run().names()), steady=False)
+    problems = problems_of({"comfort": text}, list(run().names()), steady=False)
     assert len(problems) == 1
     assert message in str(problems[0])
     assert problems[0].place.startswith("requirement 'comfort'")
@@ -308,9 +313,13 @@ def test_check_finds_it_before_the_run(text, message):
 
 def test_a_table_is_checked_and_judged_in_its_order():
     table = {"one": "always a[i].x < 200", "two": "eventually b.ok", "three": "always at_sample(a[1].x) < 200"}
-    assert check_requirements(table, list(run().names())) == []
-    assert [verdict.name for verdict in judge_requirements(table, run())] == ["one", "two", "three"]
-    assert {verdict.verdict for verdict in judge_requirements(table, run())} == {"pass"}
+    assert problems_of(table, list(run().names())) == []
+    assert [verdict.name for verdict in Judge({}, table, list(run().names())).verdicts(run())] == [
+        "one",
+        "two",
+        "three",
+    ]
+    assert {verdict.verdict for verdict in Judge({}, table, list(run().names())).verdicts(run())} == {"pass"}
 
 
 def test_no_recorded_points_at_all():

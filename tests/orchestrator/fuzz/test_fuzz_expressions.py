@@ -10,15 +10,12 @@ import pytest
 from hypothesis import strategies as st
 from railcosim.orchestrator.comparison.preference import better
 from railcosim.orchestrator.errors import RailcosimError
+from railcosim.orchestrator.evaluation import Judge
 from railcosim.orchestrator.evaluation.expressions import evaluate_constant, parse
 from railcosim.orchestrator.evaluation.metrics import (
     FUNCTIONS,
-    check_metrics,
-    evaluate_metrics,
-    metric_indices,
     unit_of,
 )
-from railcosim.orchestrator.evaluation.requirements import check_requirements, judge_requirements
 from railcosim.orchestrator.figures import check_figures, draw
 from railcosim.orchestrator.run.recording import Results
 
@@ -142,14 +139,15 @@ def use_everywhere(text, run, quantifier, clause):
     for constants in ({}, {"i": 2, "count": 3}):
         with refusals():
             evaluate_constant(text, **constants)
-    if not check_metrics({"m": text}, NAMES, True, set(PARAMETERS)):
-        metric_indices({"m": text}, NAMES)
+    judge = Judge({"m": text}, {"r": f"{quantifier} {text} {clause}"}, NAMES, set(PARAMETERS))
+    if not judge.metric_problems:
+        assert judge.value_names
     better(text)
-    for metric in evaluate_metrics({"m": text}, run):
+    for metric in judge.metrics(run):
         assert all(map(metric.text, metric.values))
     with refusals():
-        assert told(check_requirements({"r": f"{quantifier} {text} {clause}"}, NAMES))
-        judge_requirements({"r": f"{quantifier} {text} {clause}"}, run)
+        assert told(judge.requirement_problems)
+        judge.verdicts(run)
     assert told(check_figures([{"title": "F", "y": [text], "x": text, "bands": [[text]]}], NAMES))
 
 

@@ -9,11 +9,11 @@ import itertools
 import numpy as np
 from numpy.typing import NDArray
 
-from ..errors import ExpressionError
+from ...errors import ExpressionError
+from ..functions import Function
 from . import folds
 from .folds import Fold
-from .functions import Function
-from .time_windows import Span
+from .windows import Span
 
 Array = NDArray[np.float64]
 Reduction = tuple[Array, Fold]
@@ -88,9 +88,9 @@ def _headway_capacity(_: Span, gap: Array, speed: Array) -> Reduction:
     with np.errstate(divide="ignore", invalid="ignore"):
         headway = np.where(v > 0.0, distance / v, np.where(np.isnan(v), np.nan, np.inf))
 
-    def capacity(means: Array) -> float:
-        longest = float(means.max())
-        return 3600.0 / longest if longest else np.inf
+    def capacity(means: Array) -> Array:
+        longest = means.max(axis=-1)
+        return np.where(longest == 0.0, np.inf, 3600.0 / longest)
 
     return headway, folds.means(capacity)
 

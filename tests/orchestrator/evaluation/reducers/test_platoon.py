@@ -5,13 +5,17 @@ import math
 import numpy as np
 import pytest
 from railcosim.orchestrator.errors import ExpressionError
-from railcosim.orchestrator.evaluation.metrics import FUNCTIONS, evaluate_metrics
-from railcosim.orchestrator.evaluation.platoon import PLATOON
+from railcosim.orchestrator.evaluation import FUNCTIONS, Judge
+from railcosim.orchestrator.evaluation.reducers import PLATOON
 from railcosim.orchestrator.run.recording import Results
 
 pytestmark = pytest.mark.usefixtures("parts")
 
 T = np.arange(0.0, 11.0)
+
+
+def measured(table, run):
+    return Judge(table, {}, [*run.names(), *run.parameters]).metrics(run)
 
 
 def signals(**columns):
@@ -21,7 +25,7 @@ def signals(**columns):
 
 
 def value(text, **columns):
-    (metric,) = evaluate_metrics({"m": text}, signals(**columns))
+    (metric,) = measured({"m": text}, signals(**columns))
     if metric.problem:
         raise ExpressionError(metric.problem)
     (only,) = metric.values.values()
@@ -107,7 +111,7 @@ def test_the_units_that_are_shown():
         "c": "headway_capacity(train[1].position, train[1].speed)",
         "d": "braking_margin(train[1].position, train[1].speed, train[1].speed, 1, 1)",
     }
-    found = evaluate_metrics(table, signals(**FALLING, train_1_position=T))
+    found = measured(table, signals(**FALLING, train_1_position=T))
     assert [metric.unit for metric in found] == ["s", "m", "trains/h", "m"]
 
 

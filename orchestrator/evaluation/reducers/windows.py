@@ -1,16 +1,17 @@
 """Which points of a signal count: the windows that every reducer takes."""
 
-from collections.abc import Sequence
+from collections.abc import Hashable, Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from ..errors import ExpressionError, WindowError
-from ..problems import Problem
-from ..times import digits, slack
-from .signals import Part, Signals
+from ...errors import ExpressionError, WindowError
+from ...problems import Problem
+from ...times import digits, slack
+from ..signals import Part, Signals
 
 Array = NDArray[np.float64]
 
@@ -34,6 +35,11 @@ class Span:
     begin: float = 0.0
     forgiven: float = 0.0
 
+    @property
+    def key(self) -> Hashable:
+        """What tells it from others."""
+        return self.after, self.until, tuple(self.outside), self.half_open, self.forgiven
+
     def points(self, time: Array) -> NDArray[np.bool_]:
         """Whether each of some times counts; shape (T,)."""
         chosen, forgiven = np.ones(time.shape, dtype=np.bool_), self.forgiven
@@ -54,41 +60,110 @@ class Span:
 
 
 @dataclass(frozen=True)
-class Window:
-    """What a reducer sees of a signal at once: its rows (n, T), the points of time (T,), and which of them count.
+class Selection:
+    """Which points of a part of a run count, and what follows from it.
 
-    The first point may be the last of the window before: then only the interval from there counts.
+    The first point may be the last of the part before: then only the interval from there counts.
+
+    Attributes:
+        time: all points, shape (T,), in s. points: whether each counts. span: why.
+        kept: where those that count are, as a slice if they follow one another. between: the same of the intervals.
+    """
+
+    time: Array
+    points: NDArray[np.bool_]
+    span: Span
+    kept: slice | NDArray[np.intp]
+    between: slice | NDArray[np.intp]
+
+    @classmethod
+    def of(cls, part: Part, span: Span) -> "Selection":
+        """That of a span in a part of a run."""
+        time = part.time[: part.points - part.beyond]
+        points = span.points(time)
+        intervals = span.intervals(time, points)
+        points[: part.overlap] = False
+        return cls(time, points, span, _places(points), _places(intervals))
+
+    @cached_property
+    def times(self) -> Array:
+        """The points that count, in s."""
+        return self.time[self.kept]
+
+    @cached_property
+    def lengths(self) -> Array:
+        """Of the intervals that count, in s."""
+        return np.asarray(np.diff(self.time)[self.between])
+
+
+def _places(chosen: NDArray[np.bool_]) -> slice | NDArray[np.intp]:
+    """Where it is true."""
+    if chosen.all():
+        return slice(0, len(chosen))
+    places = np.flatnonzero(chosen)
+    if places.size and places[-1] - places[0] == places.size - 1:
+        return slice(int(places[0]), int(places[-1]) + 1)
+    return places if places.size else slice(0, 0)
+
+
+@dataclass(frozen=True)
+class Window:
+    """What is seen of signals at once: their rows and which points of these count.
+
+    Attributes:
+        rows: shape (g, n, T): n rows of each of g that are looked at in the same way; without g of one alone.
     """
 
     rows: Array
-    time: Array
-    points: NDArray[np.bool_]
-    intervals: NDArray[np.bool_]
-    span: Span
+    selection: Selection
+
+    @classmethod
+    def of(cls, selection: Selection, values: Sequence[Array]) -> "Window":
+        """Of signals of shape (T,) or (n, T) each, or without T where they do not vary."""
+        time = selection.time
+        count = values[0].shape[0] if values[0].ndim > 1 else 1
+        if len(values) == 1 and values[0].ndim and values[0].dtype == np.float64 and values[0].shape[-1] >= time.size:
+            return cls(values[0].reshape(1, count, -1)[..., : time.size], selection)
+        rows = np.empty((len(values), count, time.size))
+        for row, value in zip(rows, values, strict=True):
+            row[...] = value[..., : time.size] if value.ndim else value
+        return cls(rows, selection)
 
     @property
-    def kept(self) -> Array:
-        """The rows at the points that count."""
-        return np.asarray(self.rows[:, self.points])
+    def time(self) -> Array:
+        """All points, shape (T,), in s."""
+        return self.selection.time
 
     @property
     def times(self) -> Array:
         """The points that count, in s."""
-        return self.time[self.points]
+        return self.selection.times
+
+    @cached_property
+    def kept(self) -> Array:
+        """The rows at the points that count."""
+        return _at(self.rows, self.selection.kept)
 
     def integral(self, rows: Array | None = None) -> Array:
         """Trapezoid rule over the intervals that count, one value a row; of other rows if they are given."""
         values = self.rows if rows is None else rows
-        areas = 0.5 * (values[:, 1:] + values[:, :-1]) * np.diff(self.time)
-        return np.asarray(areas[:, self.intervals].sum(axis=1))
-
-    def duration(self) -> float:
-        """Of the intervals that count, in s."""
-        return float(np.diff(self.time)[self.intervals].sum())
+        areas = 0.5 * (values[..., 1:] + values[..., :-1])
+        return total(_at(areas, self.selection.between) * self.selection.lengths)
 
     def slopes(self) -> Array:
-        """Difference quotients over the intervals that count, shape (n, intervals)."""
-        return np.asarray(np.diff(self.rows, axis=1)[:, self.intervals] / np.diff(self.time)[self.intervals])
+        """Difference quotients over the intervals that count, shape (..., intervals)."""
+        return _at(np.diff(self.rows), self.selection.between) / self.selection.lengths
+
+
+def _at(rows: Array, places: slice | NDArray[np.intp]) -> Array:
+    return rows[..., places] if isinstance(places, slice) else rows.take(places, axis=-1)
+
+
+def total(values: Array) -> Array:
+    """The sums over time: of a row alone in pairs, of several rows in the order of time."""
+    if values.shape[-2] == 1:
+        return np.asarray(values.sum(axis=-1))
+    return np.asarray(np.ascontiguousarray(np.moveaxis(values, -1, 0)).sum(axis=0))
 
 
 def scalar(value: Any, what: str) -> float:
@@ -97,6 +172,8 @@ def scalar(value: Any, what: str) -> float:
     Raises:
         ExpressionError: it does, or it is a list or NaN.
     """
+    if isinstance(value, np.ndarray) and value.ndim == 0 and not np.isnan(value):
+        return float(value)
     numbers = np.empty(0) if isinstance(value, list) else np.asarray(value, dtype=np.float64).ravel()
     if numbers.size == 0 or not np.all(numbers == numbers[0]):
         raise ExpressionError(f"{what} must be one number, not a list or a signal that varies")
@@ -148,11 +225,11 @@ def ends_of(signals: Signals) -> tuple[float, float]:
 
 def window_of(part: Part, x: Any, span: Span) -> Window:
     """What counts of a signal, shape (T,) or (n, T), in a part of a run."""
-    time = part.time
-    values = np.atleast_2d(np.asarray(x, dtype=np.float64))
-    own = slice(None, len(time) - part.beyond)
-    time, values = time[own], np.broadcast_to(values, (values.shape[0], time.size))[:, own]
-    points = span.points(time)
-    intervals = span.intervals(time, points)
-    points[: part.overlap] = False
-    return Window(values, time, points, intervals, span)
+    selection = Selection.of(part, span)
+    values = np.atleast_2d(np.asarray(x, dtype=np.float64))[:, : selection.time.size]
+    return Window(np.broadcast_to(values, (len(values), selection.time.size)), selection)
+
+
+def nothing_in_window() -> Problem:
+    """What to say where no point counts."""
+    return Problem("", "no recorded point lies in the window", "widen it, or record more often")

@@ -1,0 +1,21 @@
+"""How one number is made of a whole run: the points that count, and what remembers what was seen of them."""
+
+from . import folds
+from .folds import Fold
+from .platoon import PLATOON
+from .windows import Selection, Span, Window, ends_of, nothing_in_window, scalar, span_of, time_windows, window_of
+
+__all__ = [
+    "PLATOON",
+    "Fold",
+    "Selection",
+    "Span",
+    "Window",
+    "ends_of",
+    "folds",
+    "nothing_in_window",
+    "scalar",
+    "span_of",
+    "time_windows",
+    "window_of",
+]

@@ -1,0 +1,324 @@
+"""What expressions are made of once their names are resolved: terms, each of which is calculated once for a run.
+
+Expressions that are made ready together share their common parts, and reducers that look at a run in the same way look
+at it together.
+"""
+
+from collections.abc import Callable, Collection, Hashable, Mapping
+from typing import Any, TypeAlias
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..errors import ExpressionError, WindowError
+from .functions import Function, Value
+from .reducers import Fold, Selection, Span, Window, nothing_in_window, scalar, span_of
+from .signals import Part, Signals, parts_of
+from .vocabulary import Names
+
+
+class Term:
+    """A value that depends on a run.
+
+    Args:
+        calculate: makes it of the values of other terms. of: these.
+
+    Attributes:
+        level: how many reducers stand inside one another. reach: how many points ahead it looks.
+        shared: whether it is wanted more than once.
+    """
+
+    __slots__ = ("calculate", "level", "reach", "shared")
+
+    def __init__(self, calculate: "Callable[[Frame], Value]", *of: "Term") -> None:
+        self.calculate = calculate
+        self.level: int = max((term.level for term in of), default=0)
+        self.reach: int = max((term.reach for term in of), default=0)
+        self.shared = False
+
+
+Argument: TypeAlias = "Term | list[Argument] | None"
+"""Of a function: a list where it stands for windows in time, None where it is left out."""
+
+
+class Reduction:
+    """A number that a reducer makes of a whole run.
+
+    Args:
+        function: the reducer.
+        fixed: its arguments that are one number. varying: those that vary over time.
+        bounds: `after`, `until` and `outside`, or None.
+    """
+
+    def __init__(
+        self,
+        name: str,
+        function: Function,
+        fixed: Mapping[str, Term],
+        bounds: Mapping[str, Argument],
+        varying: Mapping[str, Term],
+    ) -> None:
+        self.name, self.function, self.fixed, self.bounds, self.varying = name, function, fixed, bounds, varying
+        self.half_open = function.window == "phase"
+        self.reach = max((term.reach for term in varying.values()), default=0)
+        of = [*fixed.values(), *varying.values(), *(term for bound in bounds.values() for term in _flat(bound))]
+        self.level = max((term.level for term in of), default=0)
+        self.window = (self.half_open, *map(_hashable, bounds.values()))
+        self.key = (function.call, self.window, *fixed.items(), *varying.items())
+        self.family = (function.call, self.window, *fixed.items(), *varying)
+        """What it has in common with those that look at a run in the same way."""
+
+
+class Plan:
+    """The terms of all expressions that are made ready together.
+
+    Args:
+        names: of the signals and parameters that runs will have.
+    """
+
+    def __init__(self, names: Collection[str]) -> None:
+        self.names = Names.of(names)
+        self.bindings: dict[Hashable, Any] = {}
+        """What was made ready, by what it is."""
+        self.levels: dict[int, dict[Hashable, Reduction]] = {}
+        """All reductions by how many reducers stand inside them."""
+        self._terms: dict[Hashable, Term] = {}
+
+    def term(self, key: Hashable, calculate: "Callable[[Frame], Value]", *of: Term) -> Term:
+        """The one term with this key."""
+        term = self._terms.get(key)
+        if term is None:
+            term = self._terms[key] = Term(calculate, *of)
+        else:
+            term.shared = True
+        return term
+
+    def reduction(self, reduction: Reduction) -> Term:
+        """What a reducer gives."""
+        reduction = self.levels.setdefault(reduction.level, {}).setdefault(reduction.key, reduction)
+        term = self.term(("reduction", reduction.key), lambda frame: frame.run.reduced(reduction))
+        term.level = reduction.level + 1
+        return term
+
+
+class Frame:
+    """Points of a run, and the values of terms there."""
+
+    def __init__(self, run: "Prepared", signals: Signals) -> None:
+        self.run, self.signals = run, signals
+        self._values: dict[Term, Value] = {}
+        self._selections: dict[Hashable, Selection] = {}
+
+    def __getitem__(self, term: Term) -> Value:
+        value = self._values.get(term)
+        if value is None:
+            value = term.calculate(self)
+            if term.shared:
+                self._values[term] = value
+        return value
+
+    def column(self, name: str) -> Value:
+        """A recorded signal (T,), else a parameter ()."""
+        if name in self.run.recorded:
+            recorded = np.asarray(self.signals[name])
+            if recorded.dtype.kind not in "bifu":
+                raise ExpressionError(f"'{name}' is a text; expressions work on numbers")
+            return recorded
+        if name not in self.signals.parameters:
+            raise ExpressionError(f"the run has no '{name}'")
+        value = self.signals.parameters[name]
+        if isinstance(value, str):
+            raise ExpressionError(f"'{name}' is a text ('{value}'); expressions work on numbers")
+        return np.asarray(value, dtype=np.float64)
+
+    def argument(self, argument: Argument) -> Any:
+        """The value of an argument of a function, as numbers."""
+        if isinstance(argument, Term):
+            return np.asarray(self[argument], dtype=np.float64)
+        return None if argument is None else [self.argument(item) for item in argument]
+
+    def selection(self, span: Span) -> Selection:
+        """Which points count, in a part of the run."""
+        assert isinstance(self.signals, Part)
+        found = self._selections.get(span.key)
+        if found is None:
+            found = self._selections[span.key] = Selection.of(self.signals, span)
+        return found
+
+
+class Prepared:
+    """A run that is looked at through a plan: as it is, and what is known of it.
+
+    Args:
+        plan: the terms. signals: the run.
+    """
+
+    def __init__(self, plan: Plan, signals: Signals) -> None:
+        self.plan, self.signals = plan, signals
+        self.recorded = signals.names()
+        self.whole = Frame(self, signals)
+        self._reduced: dict[Hashable, Value | ExpressionError | ValueError] = {}
+        self._spans: dict[Hashable, Span] = {}
+        self._last: tuple[Part, Frame] | None = None
+
+    def frame(self, part: Part) -> Frame:
+        """The values at some points; of the part that was looked at last they are kept."""
+        if self._last is None or not self._last[0].is_as(part):
+            self._last = part, Frame(self, part)
+        return self._last[1]
+
+    def span(self, reduction: Reduction) -> Span:
+        """The points that count for a reducer."""
+        span = self._spans.get(reduction.window)
+        if span is None:
+            bounds = {name: self.whole.argument(bound) for name, bound in reduction.bounds.items()}
+            span = self._spans[reduction.window] = span_of(self.signals, **bounds, half_open=reduction.half_open)
+        return span
+
+    def reduced(self, reduction: Reduction) -> Value:
+        """What a reducer gives; with it all that can be known in one look at the run are found.
+
+        Raises:
+            ExpressionError, ValueError: it gives nothing.
+        """
+        if reduction.key not in self._reduced:
+            self._look(reduction.level)
+        value = self._reduced[reduction.key]
+        if isinstance(value, Exception):
+            raise value
+        return value
+
+    def _look(self, level: int) -> None:
+        """At the run, for all reducers of a level of which nothing is known yet."""
+        families: dict[Hashable, list[Reduction]] = {}
+        for key, reduction in self.plan.levels[level].items():
+            if key not in self._reduced:
+                families.setdefault(reduction.family, []).append(reduction)
+        looks = [_Look(self, family, self._reduced) for family in families.values()]
+        beyond = max((reduction.reach for family in families.values() for reduction in family), default=0)
+        for part in parts_of(self.signals, beyond):
+            frame = self.frame(part)
+            failed = [look for look in looks if not look.see(frame)]
+            if failed and part.overlap:  # once more, without those that turned out to give nothing
+                self._look(level)
+                return
+        for look in looks:
+            look.finish()
+
+    # What follows is the run as it is.
+
+    @property
+    def time(self) -> NDArray[np.float64]:
+        """As `Signals` has it."""
+        return self.signals.time
+
+    @property
+    def points(self) -> int:
+        """As `Signals` has it."""
+        return self.signals.points
+
+    def part(self, first: int, last: int, /) -> Mapping[str, NDArray[Any]]:
+        """As `Signals` has it."""
+        return self.signals.part(first, last)
+
+    @property
+    def step(self) -> float:
+        """As `Signals` has it."""
+        return self.signals.step
+
+    @property
+    def completed(self) -> bool:
+        """As `Signals` has it."""
+        return self.signals.completed
+
+    @property
+    def stop_time(self) -> float:
+        """As `Signals` has it."""
+        return self.signals.stop_time
+
+    @property
+    def units(self) -> Mapping[str, str]:
+        """As `Signals` has it."""
+        return self.signals.units
+
+    @property
+    def parameters(self) -> Mapping[str, float | int | bool | str]:
+        """As `Signals` has it."""
+        return self.signals.parameters
+
+    def names(self) -> Collection[str]:
+        """As `Signals` has it."""
+        return self.recorded
+
+    def __getitem__(self, name: str, /) -> NDArray[Any]:
+        return self.signals[name]
+
+
+class _Look:
+    """Reductions of one family, which look at a run part by part.
+
+    Args:
+        run: that is looked at. members: of the family. found: where their values go, or why there are none.
+    """
+
+    def __init__(
+        self, run: Prepared, members: list[Reduction], found: dict[Hashable, Value | ExpressionError | ValueError]
+    ) -> None:
+        self._members, self._found = members, found
+        self._folds: dict[Hashable, tuple[Fold, list[Reduction]]] = {}
+        one = members[0]
+        try:
+            self._fixed = {
+                name: scalar(run.whole.argument(term), f"the {name} of {one.name}") for name, term in one.fixed.items()
+            }
+            self._span = run.span(one)
+        except (ExpressionError, ValueError) as error:
+            self._give_up(members, error)
+
+    def _give_up(self, members: list[Reduction], error: ExpressionError | ValueError) -> None:
+        self._members = [member for member in self._members if member not in members]
+        self._found.update((member.key, error) for member in members)
+
+    def see(self, frame: Frame) -> bool:
+        """Take in a part of the run; False if some member cannot."""
+        groups: dict[Hashable, tuple[Fold, list[Reduction], list[Value]]] = {}
+        before = self._members
+        for member in before:
+            try:
+                varying = {name: frame.argument(term) for name, term in member.varying.items()}
+                rows, fold = member.function.call(self._span, **self._fixed, **varying)
+                if rows.ndim and rows.shape[-1] not in (1, frame.signals.points):
+                    raise ValueError(f"{rows.shape[-1]} points of {frame.signals.points}")
+            except (ExpressionError, ValueError) as error:
+                self._give_up([member], error)
+                continue
+            # A fold depends on how many rows there are, and of what.
+            alike: Hashable = tuple(value.shape[:-1] for value in varying.values())
+            group = groups.setdefault(alike, (fold, [], []))
+            group[1].append(member)
+            group[2].append(rows)
+        for shapes, (new, members, values) in groups.items():
+            fold, _ = self._folds.setdefault(shapes, (new, members))
+            fold.see(Window.of(frame.selection(self._span), values))
+        return before is self._members
+
+    def finish(self) -> None:
+        """Find the values."""
+        for fold, members in self._folds.values():
+            for place, member in enumerate(members):
+                try:
+                    self._found[member.key] = np.asarray(fold.value(place))
+                except WindowError as error:
+                    self._found[member.key] = error
+        for member in self._members:
+            self._found.setdefault(member.key, WindowError(nothing_in_window()))
+
+
+def _flat(argument: Argument) -> list[Term]:
+    if isinstance(argument, Term):
+        return [argument]
+    return [] if argument is None else [term for item in argument for term in _flat(item)]
+
+
+def _hashable(argument: Argument) -> Hashable:
+    return tuple(_hashable(item) for item in argument) if isinstance(argument, list) else argument
