@@ -5,7 +5,7 @@ import math
 import numpy as np
 import pytest
 from railcosim.orchestrator.errors import ExpressionError
-from railcosim.orchestrator.evaluation import Judge
+from railcosim.orchestrator.evaluation import FUNCTIONS, Judge, parse
 from railcosim.orchestrator.run.recording import Results
 
 pytestmark = pytest.mark.usefixtures("parts")
@@ -70,3 +70,20 @@ def test_a_table_that_cannot_be_read_is_told_after_the_run_too():
     assert top.values == {None: 2.0}
     with pytest.raises(ExpressionError, match="does not say when"):
         judge.verdicts(run([1.0]))
+
+
+def test_a_metric_that_fails_late_leaves_the_others_whole():
+    """At a part of a long run where the others have seen the parts before."""
+    signals = run([1.0, 2.0, 3.0, 4.0, 5.0, 6.0, 7.0])
+    signals.time[-1] += 0.1
+    table = {"late": "max(at_sample(s.x))", **METRICS, "mean": "mean(s.x)"}
+    late, top, gap, mean = Judge(table, {}, NAMES).metrics(signals)
+    assert "at_sample needs steps of one length" in late.problem
+    assert top.values == {None: 7.0}
+    assert gap.values == {2: 3.0, 3: 5.0}
+    assert mean.values[None] == pytest.approx((0.5 * 5 * 3.5 + 0.6 * 6.5) / 3.1, rel=1e-15)
+
+
+def test_a_number_of_points_that_is_not_that_of_the_run_is_refused():
+    with pytest.raises(ExpressionError, match="its parts differ in their number of rows"):
+        parse("max(d)", FUNCTIONS).evaluate(run([1.0, 2.0, 3.0]), None, d=np.ones(2))
