@@ -11,8 +11,7 @@ from numpy.typing import NDArray
 
 from ...errors import ExpressionError
 from ..functions import Function
-from . import folds
-from .folds import Fold
+from .folds import Fold, maximum, means, minimum, peaks, settling
 from .windows import Span
 
 Array = NDArray[np.float64]
@@ -20,19 +19,19 @@ Reduction = tuple[Array, Fold]
 
 
 def _convergence_time(span: Span, x: Array, band: float = 1.0) -> Reduction:
-    return x, folds.settling(lambda rows: ~(np.abs(rows) <= band), span.begin, tolerates_nan=True)  # NaN is beyond
+    return x, settling(lambda rows: ~(np.abs(rows) <= band), span.begin, tolerates_nan=True)  # NaN is beyond
 
 
 def _speed_overshoot(_: Span, x: Array) -> Reduction:
-    return x, folds.maximum()
+    return x, maximum()
 
 
 def _gap_overshoot(_: Span, gap: Array, nominal: float) -> Reduction:
-    return gap - nominal, folds.maximum()
+    return gap - nominal, maximum()
 
 
 def _peak_acceleration(_: Span, x: Array) -> Reduction:
-    return x, folds.peaks()
+    return x, peaks()
 
 
 def _ratio(peak: float, before: float) -> float:
@@ -45,13 +44,13 @@ def _amplification(_: Span, x: Array, ahead: Array) -> Reduction:
     own, other = np.atleast_2d(x), np.atleast_2d(ahead)
     wide = max(own.shape[1], other.shape[1])
     rows = np.concatenate([np.broadcast_to(part, (len(part), wide)) for part in (own, other)])
-    return rows, folds.peaks(lambda peaks: _ratio(float(peaks[: len(own)].max()), float(peaks[len(own) :].max())))
+    return rows, peaks(lambda peaks: _ratio(float(peaks[: len(own)].max()), float(peaks[len(own) :].max())))
 
 
 def _string_ratio(_: Span, x: Array) -> Reduction:
     if np.atleast_2d(x).shape[0] < 2:
         raise ExpressionError("string_ratio compares trains with the one ahead: give rows, as in train[:].speed")
-    return x, folds.peaks(lambda peaks: max(_ratio(float(b), float(a)) for a, b in itertools.pairwise(peaks)))
+    return x, peaks(lambda peaks: max(_ratio(float(b), float(a)) for a, b in itertools.pairwise(peaks)))
 
 
 _ROUNDING = 1e-9
@@ -63,7 +62,7 @@ def _time_to_collision(_: Span, gap: Array, closing: Array) -> Reduction:
     with np.errstate(divide="ignore", invalid="ignore"):
         times = np.where(speed > _ROUNDING, np.maximum(distance, 0.0) / speed, np.inf)
     times = np.where(distance <= 0.0, 0.0, times)
-    return np.where(np.isnan(distance) | np.isnan(speed), np.nan, times), folds.minimum()
+    return np.where(np.isnan(distance) | np.isnan(speed), np.nan, times), minimum()
 
 
 def _braking_margin(  # noqa: PLR0917 (as a user writes it)
@@ -80,7 +79,7 @@ def _braking_margin(  # noqa: PLR0917 (as a user writes it)
         raise ExpressionError("braking and ahead_braking must be greater than 0 m/s2")
     v, w = np.maximum(speed, 0.0), np.maximum(ahead_speed, 0.0)
     needed = v * reaction_time + v * v / (2.0 * braking) - w * w / (2.0 * ahead_braking)
-    return gap - standstill_gap - needed, folds.minimum()
+    return gap - standstill_gap - needed, minimum()
 
 
 def _headway_capacity(_: Span, gap: Array, speed: Array) -> Reduction:
@@ -92,7 +91,7 @@ def _headway_capacity(_: Span, gap: Array, speed: Array) -> Reduction:
         longest = means.max(axis=-1)
         return np.where(longest == 0.0, np.inf, 3600.0 / longest)
 
-    return headway, folds.means(capacity)
+    return headway, means(capacity)
 
 
 PLATOON: dict[str, Function] = {
