@@ -4,7 +4,8 @@ from .checkpoint import CHECKPOINT_FILE, read_checkpoint
 from .ending import conclude
 from .execution import at_half_the_step, execute, go_on, resume, run
 from .outcome import Run
-from .record import add_step_check
+from .record import add_step_check, read_metrics
+from .record import read as read_record
 from .recording import CSV_FILE, ROWS_FILE, Results, Telling, recover_rows
 from .session import Progress
 from .step_check import StepChange, StepCheck, check_step
@@ -32,6 +33,8 @@ __all__ = [
     "execute",
     "go_on",
     "read_checkpoint",
+    "read_metrics",
+    "read_record",
     "recover_rows",
     "resume",
     "run",

@@ -125,6 +125,22 @@ def read(directory: Path) -> dict[str, Any]:
         raise ScenarioError(f"{directory} holds no run that can be read: {error}") from error
 
 
+def read_metrics(directory: Path) -> dict[str, Any]:
+    """What was evaluated of a run; nothing of one that has not come that far.
+
+    Raises:
+        ScenarioError: it is there and cannot be read.
+    """
+    path = directory / "metrics.json"
+    if not path.exists():
+        return {}
+    try:
+        found = read_json(path)
+        return {**found, "metrics": {**found["metrics"]}}
+    except (OSError, ValueError, LookupError, TypeError) as error:
+        raise ScenarioError(f"{path} cannot be read: {error}") from error
+
+
 def add(directory: Path, **entries: Any) -> None:
     """Add to the record of a run that has ended."""
     path = directory / "run.json"

@@ -1,0 +1,153 @@
+"""The parts of a page that need no script: verdicts, metrics, published values, provenance.
+
+Everything that comes from a scenario or an FMU is escaped here, and nowhere else is text put into the page.
+"""
+
+from __future__ import annotations
+
+import html
+from collections.abc import Iterable, Mapping, Sequence
+from typing import Any
+
+from .content import Content
+
+_VERDICTS = {"pass": "holds", "fail": "broken", "inconclusive": "open"}
+_MARKS = {"pass": "✓", "fail": "✗", "inconclusive": "?"}
+
+
+def escaped(text: object) -> str:
+    """Text that came from outside, as markup that shows it."""
+    return html.escape(str(text), quote=True)
+
+
+def number(value: object) -> str:
+    """A number as a table shows it."""
+    if value is None:
+        return "–"
+    return f"{value:.6g}" if isinstance(value, float) else escaped(value)
+
+
+def table(heads: Sequence[str], rows: Iterable[Sequence[str]], caption: str) -> str:
+    """A table that can be sorted; cells are markup."""
+    head = "".join(f'<th scope="col">{name}</th>' for name in heads)
+    body = "".join(f"<tr>{''.join(f'<td>{cell}</td>' for cell in row)}</tr>" for row in rows)
+    return (
+        f'<div class="wide" tabindex="0" role="region" aria-label="{escaped(caption)}"><table class="sortable">'
+        f"<caption>{escaped(caption)}</caption><thead><tr>{head}</tr></thead><tbody>{body}</tbody></table></div>"
+    )
+
+
+def requirements(content: Content, run: int) -> str:
+    """Verdict, margin, and where it was decided; a button goes there."""
+    rows = []
+    for place, verdict in enumerate(content.metrics.get("requirements", ())):
+        kind = verdict["verdict"]
+        at = number(verdict["time"])
+        where = (
+            at
+            if verdict["time"] is None
+            else f'<button type="button" data-run="{run}" data-requirement="{place}">{at} s</button>'
+        )
+        rows.append(
+            [
+                f'<span class="{_VERDICTS.get(kind, "open")}">{_MARKS.get(kind, "?")} {escaped(kind)}</span>',
+                escaped(verdict["name"]),
+                number(verdict["margin"]),
+                where,
+                "" if verdict["index"] is None else number(verdict["index"]),
+                f"<code>{escaped(verdict['text'])}</code>{_small(verdict['reason'])}",
+            ]
+        )
+    return table(["verdict", "name", "margin", "decided at", "of", "requirement"], rows, "Requirements") if rows else ""
+
+
+def metrics(content: Content) -> str:
+    """Every metric, one row a value."""
+    rows = [
+        [
+            escaped(name + (f"[{index}]" if index else "")),
+            number(value),
+            escaped(metric["unit"]),
+            f"<code>{escaped(' '.join(metric['expression'].split()))}</code>{_small(metric['problem'])}",
+        ]
+        for name, metric in content.metrics.get("metrics", {}).items()
+        for index, value in (metric["values"] or {"": None}).items()
+    ]
+    return table(["metric", "value", "unit", "expression"], rows, "Metrics") if rows else ""
+
+
+def published(content: Content) -> str:
+    """Known values beside what was measured; what a source printed and what is ours are told apart."""
+    rows = [
+        [
+            escaped(row["verdict"]),
+            escaped(row["metric"]),
+            number(row["value"]),
+            number(row["measured"]),
+            number(row["tolerance"]),
+            escaped(row["unit"]),
+            escaped(row["origin"]),
+            f"{escaped(row['claim'])}{_small(row['where'])}{_small(row['reason'] or row['departs'])}",
+        ]
+        for row in (*content.metrics.get("published", ()), *content.metrics.get("references", ()))
+    ]
+    heads = ["verdict", "metric", "known", "measured", "tolerance", "unit", "origin", "claim"]
+    return table(heads, rows, "Known values") if rows else ""
+
+
+def findings(content: Content) -> str:
+    """What no train can do, and what was said of the run."""
+    said = [str(finding["message"]) for finding in content.record.get("findings", ())]
+    said += [str(note) for note in content.record.get("notes", ())]
+    error = content.record.get("error")
+    items = [f'<li class="broken">{escaped(error)}</li>'] if error else []
+    items += [f"<li>{escaped(text)}</li>" for text in said]
+    return f'<ul class="told">{"".join(items)}</ul>' if items else ""
+
+
+def provenance(content: Content, command: str) -> str:
+    """What produced the numbers, and how to have them again."""
+    record = content.record
+    facts: list[tuple[str, str]] = [
+        ("run again", f"<code>{escaped(command)}</code>"),
+        ("run", f"<code>{escaped(record.get('run', ''))}</code>"),
+        ("algorithm", escaped(f"{record.get('algorithm')}, step {number(record.get('step'))} s")),
+        ("time", escaped(f"{number(record.get('start_time'))} to {number(record.get('time_reached'))} s")),
+        ("seed", escaped(record.get("seed"))),
+        ("versions", escaped(", ".join(f"{k} {v}" for k, v in record.get("versions", {}).items()))),
+        ("Python", escaped(f"{record.get('python')} on {record.get('platform')}")),
+    ]
+    listed = "".join(f"<dt>{name}</dt><dd>{value}</dd>" for name, value in facts)
+    rows = [
+        [escaped(name), escaped(told["model"]), escaped(told["kind"]), f"<code>{escaped(str(told['digest'])[:16])}</code>"]
+        for name, told in record.get("instances", {}).items()
+    ]
+    models = table(["instance", "model", "kind", "digest (begin)"], rows, "Instances")
+    starts = table(
+        ["parameter", "value", "unit"],
+        [[escaped(k), number(v), escaped(_unit(content, k))] for k, v in content.results.parameters.items()],
+        "Parameters and start values",
+    )
+    return f"<dl>{listed}</dl>{_folded('Instances', models)}{_folded('Parameters', starts)}"
+
+
+def _unit(content: Content, name: str) -> str:
+    return content.results.units.get(name, "")
+
+
+def _folded(title: str, markup: str) -> str:
+    return f"<details><summary>{escaped(title)}</summary>{markup}</details>"
+
+
+def _small(text: object) -> str:
+    return f"<small>{escaped(text)}</small>" if text else ""
+
+
+def command_of(record: Mapping[str, Any]) -> str:
+    """What runs the same again, as far as options tell it."""
+    words = ["orchestrate run", str(record.get("scenario") or record.get("path"))]
+    if record.get("preset"):
+        words += ["--preset", str(record["preset"])]
+    if record.get("modified"):
+        words.append("(with the changes that stand among the parameters)")
+    return " ".join(words)

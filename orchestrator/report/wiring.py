@@ -1,0 +1,116 @@
+"""The wiring of a run as a drawing: instances in columns, each after those it listens to; late connections dashed."""
+
+from __future__ import annotations
+
+from collections import Counter, defaultdict
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import networkx as nx
+
+from .tables import escaped
+
+_WIDTH, _HEIGHT, _ACROSS, _DOWN, _EDGE = 150, 34, 250, 54, 20
+_MOST = 60
+"""Instances that are drawn one by one; of more, each group is one box."""
+
+
+def draw_wiring(record: Mapping[str, Any]) -> str:
+    """The instances and their connections as SVG with a text for who cannot see it."""
+    names = list(record.get("instances", {}))
+    grouped = len(names) > _MOST
+    box = {name: name.partition("[")[0] if grouped else name for name in names}
+    late = {(str(a), str(b)) for a, b in _pairs(record.get("late", ()))}
+    wires: Counter[tuple[str, str]] = Counter()
+    delayed: set[tuple[str, str]] = set()
+    for connection in record.get("connections", ()):
+        ends = [_owner(connection[end], box) for end in ("source", "target")]
+        if None in ends or ends[0] == ends[1]:
+            continue
+        pair = (str(ends[0]), str(ends[1]))
+        wires[pair] += 1
+        if connection.get("delay") or pair in late:
+            delayed.add(pair)
+    boxes = list(dict.fromkeys(box.values()))
+    places = _places(boxes, list(wires), delayed)
+    width = _EDGE * 2 + _WIDTH + _ACROSS * max((x for x, _ in places.values()), default=0)
+    height = _EDGE * 2 + _HEIGHT + _DOWN * max((y for _, y in places.values()), default=0)
+    parts = [_wire(places, pair, count, pair in delayed) for pair, count in wires.items()]
+    parts += [_box(places[name], name, sum(b == name for b in box.values()), record) for name in boxes]
+    said = f"{len(names)} instances, {sum(wires.values())} connections"
+    return (
+        f'<figure class="wide" tabindex="0" role="region" aria-label="Wiring"><svg class="wiring" role="img" viewBox="0 0 {width} {height}" '
+        f'width="{width}" height="{height}"><title>{said}</title><defs><marker id="tip" viewBox="0 0 8 8" refX="8" refY="4" '
+        f'markerWidth="7" markerHeight="7" orient="auto"><path d="M0 0L8 4L0 8z"/></marker></defs>{"".join(parts)}</svg>'
+        f"<figcaption>{said}. Dashed: a value that arrives a communication step late.</figcaption></figure>"
+    )
+
+
+def _pairs(late: Sequence[Any]) -> list[tuple[Any, Any]]:
+    found = []
+    for each in late:
+        if isinstance(each, Mapping):
+            found.append((each.get("source", ""), each.get("target", "")))
+        elif isinstance(each, Sequence) and not isinstance(each, str) and len(each) == 2:
+            found.append((each[0], each[1]))
+    return found
+
+
+def _owner(signal: str, box: Mapping[str, str]) -> str | None:
+    return box.get(signal.partition(".")[0])
+
+
+def _places(
+    boxes: Sequence[str], wires: Sequence[tuple[str, str]], delayed: set[tuple[str, str]]
+) -> dict[str, tuple[int, int]]:
+    """Column and row of each box: a box stands right of all that it listens to in the same step."""
+    graph = nx.DiGraph()
+    graph.add_nodes_from(boxes)
+    graph.add_edges_from(pair for pair in wires if pair not in delayed)
+    whole = nx.condensation(graph)
+    depth: dict[int, int] = {}
+    for node in nx.topological_sort(whole):
+        depth[node] = 1 + max((depth[before] for before in whole.predecessors(node)), default=-1)
+    column: dict[str, int] = {}
+    for node in whole:
+        members = sorted(whole.nodes[node]["members"], key=boxes.index)
+        for k, name in enumerate(members):  # a loop is laid out along its order
+            column[name] = depth[node] + k % 2 * (len(members) > 1)
+    rows: dict[int, int] = defaultdict(int)
+    found = {}
+    for name in boxes:
+        found[name] = (column[name], rows[column[name]])
+        rows[column[name]] += 1
+    return found
+
+
+def _middle(place: tuple[int, int]) -> tuple[float, float]:
+    return _EDGE + place[0] * _ACROSS, _EDGE + place[1] * _DOWN + _HEIGHT / 2
+
+
+def _wire(places: Mapping[str, tuple[int, int]], pair: tuple[str, str], count: int, is_late: bool) -> str:
+    (x0, y0), (x1, y1) = (_middle(places[name]) for name in pair)
+    if places[pair[0]][0] < places[pair[1]][0]:
+        x0 += _WIDTH
+        bend = 0.5 * (x1 - x0)
+        path = f"M{x0} {y0}C{x0 + bend} {y0} {x1 - bend} {y1} {x1} {y1}"
+    elif places[pair[0]][0] > places[pair[1]][0]:
+        x1 += _WIDTH
+        bend = 0.5 * (x0 - x1)
+        path = f"M{x0} {y0 + 8}C{x0 - bend} {y0 + 8} {x1 + bend} {y1 + 8} {x1} {y1 + 8}"
+    else:
+        x0, x1 = x0 + _WIDTH, x1 + _WIDTH
+        path = f"M{x0} {y0}C{x0 + 45} {y0} {x1 + 45} {y1} {x1} {y1}"
+    told = f"{pair[0]} to {pair[1]}: {count} connection{'s' if count > 1 else ''}{', late' if is_late else ''}"
+    return f'<path class="wire{" late" if is_late else ""}" d="{path}" marker-end="url(#tip)"><title>{escaped(told)}</title></path>'
+
+
+def _box(place: tuple[int, int], name: str, members: int, record: Mapping[str, Any]) -> str:
+    x, y = _EDGE + place[0] * _ACROSS, _EDGE + place[1] * _DOWN
+    told = record["instances"].get(name, {}).get("model", f"{members} instances")
+    label, model = (text if len(text) < 22 else text[:20] + "…" for text in (name, str(told)))
+    return (
+        f'<g><rect x="{x}" y="{y}" width="{_WIDTH}" height="{_HEIGHT}" rx="5"/>'
+        f'<text x="{x + _WIDTH / 2}" y="{y + 14}">{escaped(label)}</text>'
+        f'<text class="model" x="{x + _WIDTH / 2}" y="{y + 28}">{escaped(model)}</text><title>{escaped(f"{name}: {told}")}</title></g>'
+    )
