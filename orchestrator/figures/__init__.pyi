@@ -1,6 +1,7 @@
 from .checking import check_figures
 from .curves import Curve, bracketed, curves_of
 from .drawing import draw, draw_curves, file_name, remove_drawn
+from .marks import filled_title
 from .palette import Palette, member_colour, ranks
 from .panels import FIGURE_KEYS, FORMATS, PANEL_KEYS, heading, panels_of, remarked, share_x, texts_of, written_as
 from .style import COLOURS, DASHES, colour, colour_and_dashes, legend, page
@@ -21,6 +22,7 @@ __all__ = [
     "draw",
     "draw_curves",
     "file_name",
+    "filled_title",
     "heading",
     "legend",
     "member_colour",

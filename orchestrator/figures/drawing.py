@@ -5,7 +5,6 @@ import json
 import re
 import unicodedata
 from collections.abc import Iterable, Mapping, Sequence
-from contextlib import suppress
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -16,9 +15,9 @@ from ..errors import ExpressionError, FigureError
 from ..evaluation import Signals
 from ..problems import Problem
 from .curves import Curve, curves_of, x_label_of, y_label_of
-from .marks import draw_marks, number
+from .marks import draw_marks, filled_title, number
 from .palette import Palette, member_colour, ranks
-from .panels import FORMATS, bands_of, heading, numbers_in, panels_of, share_x
+from .panels import FORMATS, bands_of, heading, panels_of, share_x
 from .style import DASHES, colour_and_dashes, legend, page, room, wrapped
 
 if TYPE_CHECKING:
@@ -143,13 +142,7 @@ def draw_curves(
             set_scale("log", nonpositive="mask")
     for band in bands_of(panel):
         _draw_band(ax, [scale * number(end, signals) for end in band])
-    title = panel.get("title", "")
-    for text in numbers_in(title):
-        found = [f"{number(text, signals):.4g}"]
-        for other in others:
-            with suppress(ExpressionError):  # a swapped model need not have it
-                found.append(f"{number(text, other):.4g}")
-        title = title.replace(f"{{{text}}}", " / ".join(dict.fromkeys(found)))
+    title = filled_title(panel, signals, others)
     drawing: Any = ax.figure
     ax.set_title(wrapped(title, drawing.get_figwidth() - _MARGIN))
     ax.set_ylabel(panel.get("y_label", y_label_of(panel, curves)))

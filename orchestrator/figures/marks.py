@@ -6,7 +6,8 @@ A mark is ``{ x = 100, label = "about 100 s (stated)" }``, with ``x``, ``y`` or 
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import suppress
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -14,7 +15,7 @@ import numpy as np
 from ..errors import ExpressionError
 from ..evaluation import FUNCTIONS, Signals, parse
 from ..problems import Problem, suggestion
-from .panels import marks_of
+from .panels import marks_of, numbers_in
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -68,6 +69,18 @@ def draw_marks(ax: Axes, panel: Mapping[str, Any], signals: Signals, scale: floa
             ax.axvline(x, **style)
             side = ax.get_xaxis_transform()
             ax.annotate(label, (x, 0.08), xycoords=side, xytext=(4, 0), ha="left", va="bottom", **text)
+
+
+def filled_title(panel: Mapping[str, Any], signals: Signals, others: Sequence[Signals] = ()) -> str:
+    """The title of a panel with the numbers of its run, and of other runs where they differ."""
+    title = str(panel.get("title", ""))
+    for text in numbers_in(title):
+        found = [f"{number(text, signals):.4g}"]
+        for other in others:
+            with suppress(ExpressionError):  # a swapped model need not have it
+                found.append(f"{number(text, other):.4g}")
+        title = title.replace(f"{{{text}}}", " / ".join(dict.fromkeys(found)))
+    return title
 
 
 def number(value: str | float, signals: Signals) -> float:

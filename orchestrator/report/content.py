@@ -1,8 +1,8 @@
-"""What a page shows of one run, out of its directory: signals, panels, marks, verdicts, provenance."""
+"""What a page shows of runs, out of their directories: signals, panels, marks, verdicts, trains, provenance."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -12,12 +12,15 @@ from numpy.typing import NDArray
 
 from ..errors import RailcosimError
 from ..evaluation import needed_signals
-from ..figures import COLOURS, curves_of, panels_of
+from ..figures import Curve, bracketed, curves_of, filled_title, panels_of
 from ..run import Results, read_metrics, read_record
 from .payload import Packed, is_even, pack
+from .trains import gradients_of, trains_of
 
-MOST_SHOWN = 8
-"""Lines of a panel that nobody chose."""
+_LOOKED_AT = 8
+"""Signals of a requirement that a panel shows, at most."""
+_REPEATS = 1000
+"""Of an event that comes again and again, so many are marked."""
 
 
 @dataclass
@@ -29,183 +32,188 @@ class Columns:
 
     def add(self, values: NDArray[Any]) -> int:
         """Pack a column; its number."""
-        words: list[str] = []
+        words: dict[str, int] = {}
         if values.dtype.kind not in "fiub":  # texts: numbered in the order in which they come
-            places: dict[str, int] = {}
-            values = np.array([places.setdefault(str(word), len(places)) for word in values])
-            words = list(places)
+            values = np.array([words.setdefault(str(word), len(words)) for word in values], dtype=np.float64)
         column = pack(values)
         self.packed.append(column)
-        self.told.append({"points": len(values), "offset": column.offset} | ({"words": words} if words else {}))
+        self.told.append({"points": len(values), "offset": column.offset} | ({"words": list(words)} if words else {}))
         return len(self.packed) - 1
+
+    @property
+    def loss(self) -> float:
+        """By how much a number of the page differs from that of the run, at most."""
+        return max((column.loss for column in self.packed), default=0.0)
 
 
 @dataclass(frozen=True)
 class Content:
-    """One run.
-
-    Attributes:
-        directory: of the run. record, metrics: run.json and metrics.json. results: the signals.
-        shown: what the page's script is given, but for the columns.
-    """
+    """One run: its directory, run.json, metrics.json, signals, and the place of each in the page's columns."""
 
     directory: Path
     record: Mapping[str, Any]
     metrics: Mapping[str, Any]
     results: Results
-    shown: Mapping[str, Any]
+    places: Mapping[str, int]
+
+    @property
+    def title(self) -> str:
+        """What the run is called."""
+        return str(self.record.get("title") or self.record.get("scenario") or self.directory.name)
 
 
-def gather(directory: Path, columns: Columns) -> Content:
-    """Read a run and pack its signals.
-
-    Args:
-        directory: of the run, complete or cut short.
-        columns: to which its columns are added.
+def read_content(directory: Path, columns: Columns) -> Content:
+    """Read a run, complete or cut short, and pack its signals.
 
     Raises:
         ScenarioError: there is no run that can be read.
     """
     record, results = read_record(directory), Results.load(directory)
-    metrics = read_metrics(directory)
-    time = results.time
-    places = {name: columns.add(results[name]) for name in results}
-    even = is_even(time)
-    shown = {
-        "name": str(record.get("scenario") or directory.name),
-        "title": str(record.get("title") or record.get("scenario") or directory.name),
-        "time": {"first": float(time[0]), "last": float(time[-1])} if even and len(time) else columns.add(time),
-        "points": len(time),
-        "signals": [_signal(name, place, results) for name, place in places.items()],
-        "panels": [*_panels(results, columns, places)],
-        "bands": _bands(record),
-        "requirements": _requirements(metrics, results),
-        "trains": _trains(results),
+    return Content(
+        directory, record, read_metrics(directory), results, {name: columns.add(results[name]) for name in results}
+    )
+
+
+def shown(contents: Sequence[Content], names: Sequence[str], columns: Columns) -> dict[str, Any]:
+    """What the script of the page is given.
+
+    Args:
+        contents: the runs.
+        names: what each is called where there are several.
+        columns: to which computed curves are added.
+    """
+    return {
+        "runs": [_run(content, name, columns) for content, name in zip(contents, names, strict=True)],
+        "signals": _signals(contents),
+        "panels": _panels(contents, names, columns),
+        "columns": columns.told,
     }
-    return Content(directory, record, metrics, results, shown)
 
 
-def _signal(name: str, place: int, results: Results) -> dict[str, Any]:
-    values = results[name]
-    told = {"name": name, "unit": results.units.get(name, ""), "column": place}
-    return told | ({} if values.dtype.kind == "f" else {"steps": True})
+def _run(content: Content, name: str, columns: Columns) -> dict[str, Any]:
+    time, results = content.results.time, content.results
+    even = len(time) > 0 and is_even(time)
+    return {
+        "name": name,
+        "time": {"first": float(time[0]), "last": float(time[-1])} if even else columns.add(time),
+        "points": len(time),
+        "bands": list(_bands(content.record)),
+        "requirements": list(_requirements(content)),
+        "trains": trains_of(results),
+        "gradients": gradients_of(content.record),
+    }
 
 
-def _panels(results: Results, columns: Columns, places: Mapping[str, int]) -> list[dict[str, Any]]:
-    """The panels that the scenario's figures ask for, as far as they are over time."""
+def _signals(contents: Sequence[Content]) -> list[dict[str, Any]]:
+    """Every signal once, with its column in each run."""
     found = []
-    for figure in results.figures:
+    for name in dict.fromkeys(name for content in contents for name in content.results):
+        own = next(content for content in contents if name in content.places)
+        told = {
+            "name": name,
+            "unit": own.results.units.get(name, ""),
+            "columns": [content.places.get(name) for content in contents],
+        }
+        found.append(told | ({} if own.results[name].dtype.kind == "f" else {"steps": True}))
+    return found
+
+
+def _panels(contents: Sequence[Content], names: Sequence[str], columns: Columns) -> list[dict[str, Any]]:
+    """The panels over time that the first run's figures ask for, with the curves of all."""
+    found = []
+    for figure in contents[0].results.figures:
         for panel in panels_of(figure):
             if panel.get("x") is not None:
                 continue
-            try:
-                curves = curves_of(panel, results)
-            except RailcosimError:  # what a run that was cut short does not have
-                continue
-            lines = []
-            for k, curve in enumerate(curves):
-                scale = float(panel.get("scale", 1.0))
-                same = next((n for n in _plain(panel) if _is_same(results, n, curve.y)), None)
-                line: dict[str, Any] = {"label": curve.label.replace("\\$", "$"), "colour": COLOURS[k % len(COLOURS)]}
-                if same is not None and scale == 1.0:
-                    line["column"] = places[same]
-                elif len(curve.y) == len(results.time):
-                    line["column"] = columns.add(curve.y * scale)
-                else:
-                    line |= {"column": columns.add(curve.y * scale), "x": columns.add(curve.x)}
-                lines.append(line)
-            title = str(panel.get("title") or figure["title"])
-            label = str(panel.get("y_label", "")) or _unit_label({curve.unit for curve in curves})
-            found.append({"title": title, "label": label, "lines": lines})
+            lines: list[dict[str, Any]] = []
+            for run, content in enumerate(contents):
+                lines += _lines(content, run, panel, columns, names[run] if len(contents) > 1 else "")
+            if lines:
+                units = {line.pop("curve_unit") for line in lines}
+                label = str(panel.get("y_label", "")) or (bracketed(units.pop()) if len(units) == 1 else "")
+                title = _title(panel, contents[0].results) or str(figure["title"])
+                found.append({"title": title, "label": label, "lines": lines})
     return found
 
 
-def _plain(panel: Mapping[str, Any]) -> list[str]:
-    """The entries of a panel, of which those that are a signal's name may be shown as that signal."""
-    texts = panel["y"]
-    return [texts] if isinstance(texts, str) else list(texts)
+def _title(panel: Mapping[str, Any], results: Results) -> str:
+    try:
+        return filled_title(panel, results)
+    except RailcosimError:  # of a run that was cut short
+        return str(panel.get("title", ""))
 
 
-def _is_same(results: Results, name: str, values: NDArray[np.float64]) -> bool:
-    return name in results and len(results[name]) == len(values) and bool(np.array_equal(results[name], values, True))
+def _lines(
+    content: Content, run: int, panel: Mapping[str, Any], columns: Columns, prefix: str
+) -> Iterator[dict[str, Any]]:
+    """The curves of a panel in one run."""
+    try:
+        curves = curves_of(panel, content.results)
+    except RailcosimError:  # what a run that was cut short does not have
+        return
+    scale = float(panel.get("scale", 1.0))
+    for k, curve in enumerate(curves):
+        label = curve.label.replace("\\$", "$")
+        yield {
+            "label": f"{prefix}: {label}" if prefix else label,
+            "run": run,
+            "look": [run, k] if prefix else [k, 0],
+            "unit": curve.unit if scale == 1.0 else "",
+            "curve_unit": curve.unit if scale == 1.0 else "",
+            **_columns_of(curve, scale, content, columns),
+        }
 
 
-def _unit_label(units: set[str]) -> str:
-    unit = next(iter(units)) if len(units) == 1 else ""
-    return f"[{unit}]" if unit else ""
+def _columns_of(curve: Curve, scale: float, content: Content, columns: Columns) -> dict[str, int]:
+    """Where the numbers of a curve are: those of a signal as it is stand in the page already."""
+    results = content.results
+    if scale == 1.0:
+        for name, place in content.places.items():
+            own = results[name]
+            if own.dtype.kind == "f" and len(own) == len(curve.y) and np.array_equal(own, curve.y, equal_nan=True):
+                return {"column": place}
+    column = columns.add(curve.y * scale)
+    return {"column": column} if len(curve.y) == results.points else {"column": column, "x": columns.add(curve.x)}
 
 
-def _bands(record: Mapping[str, Any]) -> list[dict[str, Any]]:
-    """What happened on the way: events that lasted, and findings."""
+def _bands(record: Mapping[str, Any]) -> Iterator[dict[str, Any]]:
+    """What happened on the way: events, and faults and outages that a model was built with."""
     stop = float(record["stop_time"])
-    found = []
     for event in record.get("events", ()):
-        begin = float(event["at"])
-        end = stop if event.get("duration") is None and event["action"] != "set" else begin + float(event["duration"] or 0)
-        every = event.get("every")
-        repeats = int((stop - begin) / every) + 1 if every else 1
-        for k in range(min(repeats, 1000)):
-            shift = k * every if every else 0.0
-            label = f"{event['action']} of {event['signal']}"
-            found.append({"from": begin + shift, "until": min(stop, end + shift), "label": label})
-    return found
+        begin, every = float(event["at"]), event.get("every")
+        lasts = event.get("duration")
+        for k in range(min(_REPEATS, int((stop - begin) / every) + 1) if every else 1):
+            start = begin + k * every if every else begin
+            end = start if event["action"] == "set" else stop if lasts is None else start + float(lasts)
+            yield {"from": start, "until": min(stop, end), "label": f"{event['action']} {event['signal']}"}
+    for name, told in record.get("instances", {}).items():
+        for what, value in told.get("build", {}).items():
+            for begin, end in _stretches(value):
+                if begin < stop:
+                    yield {"from": begin, "until": min(stop, end), "label": f"{name}: {what}"}
 
 
-def _requirements(metrics: Mapping[str, Any], results: Results) -> list[dict[str, Any]]:
+def _stretches(value: Any) -> Iterator[tuple[float, float]]:
+    """Times from and until which something holds, in the data a model was built with."""
+    for entry in value if isinstance(value, list) else ():
+        match entry:
+            case {"from": int() | float() as begin, "until": int() | float() as end}:
+                yield float(begin), float(end)
+            case [int() | float() as begin, int() | float() as end]:
+                yield float(begin), float(end)
+
+
+def _requirements(content: Content) -> Iterator[dict[str, Any]]:
     """Of each requirement the signals it looks at, and where it was decided."""
-    names = [*results.names(), *results.parameters]
-    found = []
-    for verdict in metrics.get("requirements", ()):
+    names = [*content.results.names(), *content.results.parameters]
+    for verdict in content.metrics.get("requirements", ()):
         try:
             needed = needed_signals({}, {verdict["name"]: verdict["text"]}, names)
-        except RailcosimError:
+        except RailcosimError:  # of another version
             needed = set()
-        looked = [name for name in results if name in needed]
-        of_index = [name for name in looked if f"[{verdict['index']}]" in name] if verdict["index"] is not None else looked
-        told = {key: verdict[key] for key in ("name", "verdict", "time", "index")}
-        found.append(told | {"signals": (of_index or looked)[:MOST_SHOWN]})
-    return found
+        looked = [name for name in content.results if name in needed]
+        own = [name for name in looked if verdict["index"] is not None and f"[{verdict['index']}]" in name]
+        told = {key: verdict[key] for key in ("name", "verdict", "time")}
+        yield told | {"signals": (own or looked)[:_LOOKED_AT]}
 
 
-def _trains(results: Results) -> list[dict[str, Any]]:
-    """Whatever has a position, a speed and an acceleration: where it is, how fast, how long."""
-    found = []
-    instances = dict.fromkeys(name.partition(".")[0] for name in results)
-    for instance in instances:
-        head = [f"{instance}.{what}" for what in ("position", "speed", "acceleration")]
-        if not all(name in results or f"{name}[1]" in results for name in head):
-            continue
-        vehicles = [name for name in results if name.startswith(f"{instance}.position[")]
-        position, speed = (name if name in results else f"{name}[1]" for name in head[:2])
-        length = results.parameters.get(f"{instance}.length", 0.0)
-        if not length and f"{instance}.vehicle_length" in results.parameters:
-            forces = [name for name in results if name.startswith(f"{instance}.vehicle_force[")]
-            length = max(1, len(forces)) * float(results.parameters[f"{instance}.vehicle_length"])
-        limits = [name for name in _limits(results, instance)]
-        found.append(
-            {
-                "name": instance,
-                "position": position,
-                "speed": speed,
-                "tail": vehicles[-1] if vehicles else None,
-                "length": float(length),
-                "limits": limits,
-            }
-        )
-    return found
-
-
-def _limits(results: Results, instance: str) -> list[str]:
-    """Signals that are a ceiling of this train's speed: those of instances with its number, or without any."""
-    number = instance.partition("[")[2]
-    found = []
-    for name in results:
-        owner, _, what = name.partition(".")
-        if what in ("speed_limit", "ceiling") and owner.partition("[")[2] in ("", number):
-            found.append(name)
-    return found
-
-
-def series(results: Results, names: Sequence[str]) -> list[NDArray[Any]]:
-    """Several signals at once."""
-    return [results[name] for name in names]

@@ -13,12 +13,13 @@ from typing import Any
 from .. import world
 from ..errors import RailcosimError
 from . import tables
-from .content import Columns, Content, gather
+from .content import Columns, Content, read_content, shown
 from .wiring import draw_wiring
 
 REPORT_FILE = "report.html"
 _REMEDY = "install the extra: pip install 'railcosim[report]'"
 _SCRIPTS = ("bokeh.min.js", "bokeh-api.min.js")
+_RESOURCES = ("report.css", "page.js", "trains.js", "report.js")
 _NETWORK = (("https://cdn.jsdelivr.net/", ""), ("https://maps.googleapis.com/", ""))
 """Where the library would load more from; a page has it all, and shows no mathematics or maps."""
 
@@ -39,7 +40,7 @@ def write_report(directories: Sequence[Path], output: Path | None = None) -> Pat
     """
     scripts = _library()
     columns = Columns()
-    contents = [gather(directory, columns) for directory in directories]
+    contents = [read_content(directory, columns) for directory in directories]
     path = output if output is not None else directories[0] / REPORT_FILE
     part = path.with_name(path.name + ".part")
     try:
@@ -68,61 +69,80 @@ def _library() -> list[str]:
 
 def _page(contents: Sequence[Content], columns: Columns, scripts: Sequence[str]) -> str:
     own = importlib.resources.files(__package__) / "resources"
-    style, script = ((own / name).read_text(encoding="utf-8") for name in ("report.css", "report.js"))
-    title = contents[0].shown["title"]
-    data = {"runs": [content.shown for content in contents], "columns": columns.told}
-    parts = [
-        '<!DOCTYPE html>\n<html lang="en"><head><meta charset="utf-8">',
-        "<meta http-equiv=\"Content-Security-Policy\" content=\"default-src 'none'; script-src 'unsafe-inline'; "
-        "style-src 'unsafe-inline'; img-src data: blob:; font-src data:\">",
-        '<meta name="viewport" content="width=device-width, initial-scale=1">',
-        f"<title>{html.escape(title)}</title><style>{style}</style></head><body>",
-        _head(contents),
-        "<main>",
-        *(_run(content, k, len(contents) > 1) for k, content in enumerate(contents)),
-        "</main>",
-        f'<script type="application/json" id="data">{_inert(json.dumps(_finite(data), allow_nan=False))}</script>',
-        *(f'<script type="text/plain" id="column-{k}">{column.text}</script>' for k, column in enumerate(columns.packed)),
-        *(f"<script>{_inert_script(text)}</script>" for text in (*scripts, script)),
-        "</body></html>\n",
+    style, *parts = ((own / name).read_text(encoding="utf-8") for name in _RESOURCES)
+    names = _names(contents)
+    data = _inert(json.dumps(_finite(shown(contents, names, columns)), allow_nan=False))
+    return "".join(
+        [
+            '<!DOCTYPE html>\n<html lang="en"><head><meta charset="utf-8">',
+            "<meta http-equiv=\"Content-Security-Policy\" content=\"default-src 'none'; script-src 'unsafe-inline'; "
+            "style-src 'unsafe-inline'; img-src data: blob:; font-src data:\">",
+            '<meta name="viewport" content="width=device-width, initial-scale=1">',
+            f"<title>{html.escape(contents[0].title)}</title><style>{style}</style></head><body>",
+            _head(contents, names),
+            "<main>",
+            _verdicts(contents, names),
+            '<section id="trains" hidden><h2>Trains</h2></section>',
+            '<section id="signals"><h2>Signals</h2><noscript><p>The curves need JavaScript.</p></noscript></section>',
+            _wirings(contents, names),
+            _provenance(contents, names, columns.loss),
+            "</main>",
+            f'<script type="application/json" id="data">{data}</script>',
+            *(f'<script type="text/plain" id="column-{k}">{each.text}</script>' for k, each in enumerate(columns.packed)),
+            *(f"<script>{_inert_script(text)}</script>" for text in (*scripts, *parts)),
+            "</body></html>\n",
+        ]
+    )
+
+
+def _names(contents: Sequence[Content]) -> list[str]:
+    """What tells the runs apart: scenario and preset if that does, else their directories."""
+    names = [" ".join(filter(None, (c.record.get("scenario"), c.record.get("preset")))) for c in contents]
+    return names if len(set(names)) == len(names) else [str(content.directory) for content in contents]
+
+
+def _head(contents: Sequence[Content], names: Sequence[str]) -> str:
+    parts = {"verdicts": "Verdicts", "trains": "Trains", "signals": "Signals", "wiring": "Wiring", "made": "Provenance"}
+    links = "".join(f'<a href="#{place}">{name}</a>' for place, name in parts.items())
+    lines = [
+        f'<p><span class="{"holds" if content.record.get("status") == "completed" else "broken"}">'
+        f"{tables.escaped(content.record.get('status', ''))}</span> {tables.escaped(name)}</p>"
+        for content, name in zip(contents, names, strict=True)
     ]
+    return (
+        '<a class="skip" href="#verdicts">Skip to the content</a>'
+        f"<header><h1>{tables.escaped(contents[0].title)}</h1>{''.join(lines)}"
+        f'<nav aria-label="Parts">{links}</nav></header>'
+    )
+
+
+def _verdicts(contents: Sequence[Content], names: Sequence[str]) -> str:
+    parts = ['<section id="verdicts"><h2>Verdicts</h2>']
+    parts += [tables.findings(content, name if len(contents) > 1 else "") for content, name in zip(contents, names, strict=True)]
+    parts += [tables.requirements(contents, names)]
+    parts += [tables.folded("Metrics", tables.metrics(contents, names))]
+    parts += [tables.folded("Known values", tables.published(contents, names)), "</section>"]
     return "".join(parts)
 
 
-def _head(contents: Sequence[Content]) -> str:
-    record = contents[0].record
-    status = str(record.get("status", ""))
-    names = [("verdicts", "Verdicts"), ("trains", "Trains"), ("signals", "Signals"), ("wiring", "Wiring"), ("made", "Provenance")]
-    links = "".join(f'<a href="#{place}">{name}</a>' for place, name in names)
-    title = tables.escaped(contents[0].shown["title"])
-    preset = f", preset {record['preset']}" if record.get("preset") else ""
-    told = tables.escaped(f"{record.get('scenario')}{preset}")
-    return (
-        '<a class="skip" href="#verdicts">Skip to the content</a>'
-        f'<header><h1>{title}</h1><p><span class="{"holds" if status == "completed" else "broken"}">{tables.escaped(status)}</span> '
-        f'{told}</p><nav aria-label="Parts">{links}</nav></header>'
-    )
+def _wirings(contents: Sequence[Content], names: Sequence[str]) -> str:
+    drawn: dict[str, list[str]] = {}
+    for content, name in zip(contents, names, strict=True):
+        drawn.setdefault(draw_wiring(content.record), []).append(name)
+    several = len(contents) > 1
+    parts = [f"{f'<h3>{tables.escaped(chr(44).join(of))}</h3>' if several else ''}{svg}" for svg, of in drawn.items()]
+    return f'<section id="wiring"><h2>Wiring</h2>{"".join(parts)}</section>'
 
 
-def _run(content: Content, k: int, several: bool) -> str:
-    name = tables.escaped(content.shown["name"])
-    known = tables.published(content)
-    folded = f"<details{'' if len(known) < 20000 else ''}><summary>Known values</summary>{known}</details>" if known else ""
-    measured = tables.metrics(content)
-    return "".join(
-        [
-            f'<h2 class="run">{name}</h2>' if several else "",
-            f'<section id="verdicts"><h2>Verdicts</h2>{tables.findings(content)}{tables.requirements(content, k)}',
-            f"<details><summary>Metrics</summary>{measured}</details>" if measured else "",
-            folded,
-            "</section>",
-            f'<section id="trains" hidden><h2>Trains</h2><div class="trains" data-run="{k}"></div></section>',
-            f'<section id="signals"><h2>Signals</h2><div class="signals" data-run="{k}"></div>',
-            "<noscript><p>The curves need JavaScript.</p></noscript></section>",
-            f'<section id="wiring"><h2>Wiring</h2>{draw_wiring(content.record)}</section>',
-            f'<section id="made"><h2>Provenance</h2>{tables.provenance(content, tables.command_of(content.record))}</section>',
-        ]
+def _provenance(contents: Sequence[Content], names: Sequence[str], loss: float) -> str:
+    parts = []
+    for content, name in zip(contents, names, strict=True):
+        parts += [f"<h3>{tables.escaped(name)}</h3>" if len(contents) > 1 else "", tables.provenance(content)]
+    lost = (
+        f"<p>Curves are drawn in single precision, less than {tables.number(loss)} off in their unit; all digits are in "
+        "results.csv beside this page.</p>"
     )
+    return f'<section id="made"><h2>Provenance</h2>{"".join(parts)}{lost}</section>'
 
 
 def _finite(value: Any) -> Any:

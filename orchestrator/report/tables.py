@@ -37,49 +37,56 @@ def table(heads: Sequence[str], rows: Iterable[Sequence[str]], caption: str) -> 
     )
 
 
-def requirements(content: Content, run: int) -> str:
+def requirements(contents: Sequence[Content], names: Sequence[str]) -> str:
     """Verdict, margin, and where it was decided; a button goes there."""
     rows = []
-    for place, verdict in enumerate(content.metrics.get("requirements", ())):
-        kind = verdict["verdict"]
-        at = number(verdict["time"])
-        where = (
-            at
-            if verdict["time"] is None
-            else f'<button type="button" data-run="{run}" data-requirement="{place}">{at} s</button>'
-        )
-        rows.append(
-            [
-                f'<span class="{_VERDICTS.get(kind, "open")}">{_MARKS.get(kind, "?")} {escaped(kind)}</span>',
-                escaped(verdict["name"]),
-                number(verdict["margin"]),
-                where,
-                "" if verdict["index"] is None else number(verdict["index"]),
-                f"<code>{escaped(verdict['text'])}</code>{_small(verdict['reason'])}",
-            ]
-        )
-    return table(["verdict", "name", "margin", "decided at", "of", "requirement"], rows, "Requirements") if rows else ""
+    for run, content in enumerate(contents):
+        for place, verdict in enumerate(content.metrics.get("requirements", ())):
+            kind, at = verdict["verdict"], number(verdict["time"])
+            button = f'<button type="button" data-run="{run}" data-requirement="{place}">{at} s</button>'
+            rows.append(
+                [
+                    *_of(names, run),
+                    f'<span class="{_VERDICTS.get(kind, "open")}">{_MARKS.get(kind, "?")} {escaped(kind)}</span>',
+                    escaped(verdict["name"]),
+                    number(verdict["margin"]),
+                    at if verdict["time"] is None else button,
+                    "" if verdict["index"] is None else number(verdict["index"]),
+                    f"<code>{escaped(verdict['text'])}</code>{_small(verdict['reason'])}",
+                ]
+            )
+    heads = [*_head_of(names), "verdict", "name", "margin", "decided at", "of", "requirement"]
+    return table(heads, rows, "Requirements") if rows else ""
 
 
-def metrics(content: Content) -> str:
-    """Every metric, one row a value."""
+def metrics(contents: Sequence[Content], names: Sequence[str]) -> str:
+    """Every metric, one row a value, one column a run."""
+    found: dict[tuple[str, str], list[object]] = {}
+    told: dict[tuple[str, str], Mapping[str, Any]] = {}
+    for run, content in enumerate(contents):
+        for name, metric in content.metrics.get("metrics", {}).items():
+            for index, value in (metric["values"] or {"": None}).items():
+                found.setdefault((name, index), [None] * len(contents))[run] = value
+                told.setdefault((name, index), metric)
     rows = [
         [
             escaped(name + (f"[{index}]" if index else "")),
-            number(value),
-            escaped(metric["unit"]),
-            f"<code>{escaped(' '.join(metric['expression'].split()))}</code>{_small(metric['problem'])}",
+            *map(number, values),
+            escaped(told[name, index]["unit"]),
+            f"<code>{escaped(' '.join(told[name, index]['expression'].split()))}</code>"
+            f"{_small(told[name, index]['problem'])}",
         ]
-        for name, metric in content.metrics.get("metrics", {}).items()
-        for index, value in (metric["values"] or {"": None}).items()
+        for (name, index), values in found.items()
     ]
-    return table(["metric", "value", "unit", "expression"], rows, "Metrics") if rows else ""
+    values = [escaped(name) for name in names] if len(names) > 1 else ["value"]
+    return table(["metric", *values, "unit", "expression"], rows, "Metrics") if rows else ""
 
 
-def published(content: Content) -> str:
+def published(contents: Sequence[Content], names: Sequence[str]) -> str:
     """Known values beside what was measured; what a source printed and what is ours are told apart."""
     rows = [
         [
+            *_of(names, run),
             escaped(row["verdict"]),
             escaped(row["metric"]),
             number(row["value"]),
@@ -89,27 +96,39 @@ def published(content: Content) -> str:
             escaped(row["origin"]),
             f"{escaped(row['claim'])}{_small(row['where'])}{_small(row['reason'] or row['departs'])}",
         ]
+        for run, content in enumerate(contents)
         for row in (*content.metrics.get("published", ()), *content.metrics.get("references", ()))
     ]
-    heads = ["verdict", "metric", "known", "measured", "tolerance", "unit", "origin", "claim"]
+    heads = [*_head_of(names), "verdict", "metric", "known", "measured", "tolerance", "unit", "origin", "claim"]
     return table(heads, rows, "Known values") if rows else ""
 
 
-def findings(content: Content) -> str:
-    """What no train can do, and what was said of the run."""
+def _of(names: Sequence[str], run: int) -> list[str]:
+    """A cell that tells the run, where there are several."""
+    return [escaped(names[run])] if len(names) > 1 else []
+
+
+def _head_of(names: Sequence[str]) -> list[str]:
+    return ["run"] if len(names) > 1 else []
+
+
+def findings(content: Content, name: str) -> str:
+    """What ended a run, what no train can do, and what was said of it."""
     said = [str(finding["message"]) for finding in content.record.get("findings", ())]
     said += [str(note) for note in content.record.get("notes", ())]
     error = content.record.get("error")
     items = [f'<li class="broken">{escaped(error)}</li>'] if error else []
     items += [f"<li>{escaped(text)}</li>" for text in said]
-    return f'<ul class="told">{"".join(items)}</ul>' if items else ""
+    if not items:
+        return ""
+    return f'{f"<h3>{escaped(name)}</h3>" if name else ""}<ul class="told">{"".join(items)}</ul>'
 
 
-def provenance(content: Content, command: str) -> str:
+def provenance(content: Content) -> str:
     """What produced the numbers, and how to have them again."""
     record = content.record
     facts: list[tuple[str, str]] = [
-        ("run again", f"<code>{escaped(command)}</code>"),
+        ("run again", f"<code>{escaped(command_of(record))}</code>"),
         ("run", f"<code>{escaped(record.get('run', ''))}</code>"),
         ("algorithm", escaped(f"{record.get('algorithm')}, step {number(record.get('step'))} s")),
         ("time", escaped(f"{number(record.get('start_time'))} to {number(record.get('time_reached'))} s")),
@@ -128,15 +147,16 @@ def provenance(content: Content, command: str) -> str:
         [[escaped(k), number(v), escaped(_unit(content, k))] for k, v in content.results.parameters.items()],
         "Parameters and start values",
     )
-    return f"<dl>{listed}</dl>{_folded('Instances', models)}{_folded('Parameters', starts)}"
+    return f"<dl>{listed}</dl>{folded('Instances', models)}{folded('Parameters', starts)}"
 
 
 def _unit(content: Content, name: str) -> str:
     return content.results.units.get(name, "")
 
 
-def _folded(title: str, markup: str) -> str:
-    return f"<details><summary>{escaped(title)}</summary>{markup}</details>"
+def folded(title: str, markup: str) -> str:
+    """What is shown when it is asked for; nothing of nothing."""
+    return f"<details><summary>{escaped(title)}</summary>{markup}</details>" if markup else ""
 
 
 def _small(text: object) -> str:
