@@ -19,7 +19,9 @@ const Trains = (() => {
       this.slider.addEventListener("input", () => this.explorer.at(this.first + (this.slider.value / 1000) * (this.last - this.first)));
       this.words = make("p", { "aria-live": "off" });
       this.space = make("canvas", { class: "line", role: "img", "aria-label": "time and space: position of each train over time" });
-      host.append(make("div", { class: "bar", role: "group", "aria-label": "Animation" }, this.play, rates, follow, this.slider), this.canvas, this.words, this.space);
+      this.place_speed = make("canvas", { class: "line", role: "img", "aria-label": "speed of each train over its position, with its ceiling" });
+      host.append(make("div", { class: "bar", role: "group", "aria-label": "Animation" }, this.play, rates, follow, this.slider), this.canvas, this.words,
+        make("h3", {}, "Position over time"), this.space, make("h3", {}, "Speed over position, from stop to stop; dashed: the ceiling"), this.place_speed);
       this.first = time[0]; this.last = time[time.length - 1];
       explorer.listeners.push(() => this.draw());
       new ResizeObserver(() => { this.ground(); this.draw(); }).observe(this.canvas);
@@ -36,6 +38,7 @@ const Trains = (() => {
         if (train.x[k] < low) low = train.x[k];
         if (train.x[k] > high) high = train.x[k];
         if (train.v[k] > fastest) fastest = train.v[k];
+        for (const values of train.ceiling) if (values[k] < 200 && values[k] > fastest) fastest = values[k];
       }
       this.low = low - 0.02 * (high - low) - 1; this.high = high + 0.02 * (high - low) + 1; this.fastest = fastest;
       this.ground(); this.draw();
@@ -78,9 +81,41 @@ const Trains = (() => {
       context.fillText(`${digits(Math.round(this.high))} m`, 56, 16); context.fillText(`${digits(Math.round(this.low))} m`, 56, height - 26); context.textAlign = "left";
       this.kept = context.getImageData(0, 0, this.space.width, this.space.height);
     }
+    slopes(context, at, low, high, foot, height) { // what rises is a burden, what falls a help
+      const steps = this.run.gradients, steepest = Math.max(1e-9, ...steps.map((step) => Math.abs(step.gradient)));
+      steps.forEach((step, k) => {
+        const begin = at(Math.max(low, k ? step.from : -Infinity)), end = at(Math.min(high, steps[k + 1]?.from ?? Infinity));
+        if (end <= begin) return;
+        const tall = (height / 2) * (Math.abs(step.gradient) / steepest);
+        context.fillStyle = step.gradient > 0 ? "#D55E0099" : "#009E7399";
+        context.fillRect(begin, step.gradient > 0 ? foot - height / 2 - tall : foot - height / 2, end - begin, Math.max(1, tall));
+        const label = `${digits(Math.round(step.gradient * 1e4) / 10)} ‰`;
+        if (end - begin > context.measureText(label).width + 6) { context.fillStyle = style("--ink"); context.fillText(label, begin + 3, foot); }
+      });
+    }
+    speeds(k) {
+      const height = 200, [context, width] = this.fit(this.place_speed, height), [low, high] = [this.low, this.high];
+      const top = this.fastest * 3.6 * 1.08, foot = height - 24;
+      const px = (x) => 60 + ((x - low) / (high - low)) * (width - 70), py = (v) => foot - ((v * 3.6) / top) * (foot - 8);
+      context.fillStyle = style("--page"); context.fillRect(0, 0, width, height); context.fillStyle = style("--soft"); context.strokeStyle = style("--line");
+      const unit = [5, 10, 20, 50, 100].find((step) => top / step <= 6) ?? 100;
+      for (let v = 0; v <= top; v += unit) { context.beginPath(); context.moveTo(60, py(v / 3.6)); context.lineTo(width - 10, py(v / 3.6)); context.stroke(); context.fillText(`${v} km/h`, 4, py(v / 3.6) + 4); }
+      context.fillText(`${digits(Math.round(low))} m`, 60, height - 6); context.textAlign = "right"; context.fillText(`${digits(Math.round(high))} m`, width - 10, height - 6); context.textAlign = "left";
+      this.trains.forEach((train, row) => {
+        if (this.followed >= 0 && row !== this.followed) return;
+        let begin = k, end = k;
+        while (begin > 0 && Math.abs(train.v[begin - 1]) > 1e-3) begin--;
+        while (end < train.v.length - 1 && Math.abs(train.v[end + 1]) > 1e-3) end++;
+        const every = Math.max(1, Math.floor((end - begin) / (2 * width)));
+        const trace = (values) => { context.beginPath(); let down = false; for (let n = begin; n <= end; n += every) { if (!Number.isFinite(values[n])) { down = false; continue; } down ? context.lineTo(px(train.x[n]), py(values[n])) : context.moveTo(px(train.x[n]), py(values[n])); down = true; } context.stroke(); };
+        context.strokeStyle = style("--broken"); context.setLineDash([4, 3]); context.lineWidth = 1; train.ceiling.forEach(trace);
+        context.setLineDash([]); context.strokeStyle = train.colour; context.lineWidth = 1.5; trace(train.v);
+        context.fillStyle = train.colour; context.beginPath(); context.arc(px(train.x[k]), py(train.v[k]), 4, 0, 7); context.fill();
+      });
+    }
     draw() {
       if (!this.trains) return;
-      const rows = this.trains.length, lane = rows > 12 ? 16 : 30, height = 50 + lane * rows, [context, width] = this.fit(this.canvas, height);
+      const rows = this.trains.length, lane = rows > 12 ? 16 : 30, slopes = this.run.gradients.length ? 34 : 0, height = 50 + lane * rows + slopes, [context, width] = this.fit(this.canvas, height);
       const k = placeIn(this.time, this.explorer.now), followed = this.trains[this.followed];
       let low = this.low, high = this.high;
       if (followed) { const half = Math.max(600, 0.03 * (high - low)); low = followed.x[k] - half; high = followed.x[k] + half; }
@@ -92,6 +127,7 @@ const Trains = (() => {
         context.beginPath(); context.moveTo(at(x), 0); context.lineTo(at(x), height - 20); context.stroke();
         if (Math.round(x / unit) % Math.ceil(80 / ((unit / (high - low)) * width)) === 0) context.fillText(x >= 10000 ? `${digits(x / 1000)} km` : `${digits(x)} m`, at(x) + 3, height - 6);
       }
+      if (slopes) this.slopes(context, at, low, high, height - 22, slopes - 8);
       const said = [];
       this.trains.forEach((train, row) => {
         const y = 12 + row * lane, front = at(train.x[k]), length = train.rear ? train.x[k] - train.rear[k] : train.length;
@@ -108,6 +144,7 @@ const Trains = (() => {
       this.canvas.setAttribute("aria-label", `trains at ${digits(this.explorer.now)} s: ${said.join("; ")}`);
       this.words.textContent = `t = ${digits(this.explorer.now)} s. ${followed ? "" : this.trains.every((train) => !train.length && !train.rear) ? "These models have no length: trains are drawn as points." : "Trains are to scale, or 9 pixels."}`;
       this.slider.value = String(Math.round((1000 * (this.explorer.now - this.first)) / (this.last - this.first || 1)));
+      this.speeds(k);
       if (this.kept) {
         const space = this.space.getContext("2d"), ratio = devicePixelRatio || 1, px = 60 + ((this.explorer.now - this.first) / (this.last - this.first || 1)) * (this.space.width / ratio - 70);
         space.putImageData(this.kept, 0, 0); space.strokeStyle = style("--ink"); space.lineWidth = 1; space.beginPath(); space.moveTo(px, 6); space.lineTo(px, 196); space.stroke();
