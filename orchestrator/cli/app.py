@@ -12,7 +12,7 @@ import typer
 from ...components.errors import ComponentError
 from .. import world
 from ..errors import FmuError, RailcosimError, RunError, ScenarioError
-from . import analysis, models, runs, scenarios
+from . import analysis, models, reports, runs, scenarios
 from .options import FMU_FAILED, OK, WRONG_INPUT
 from .printing import Log, folded, tell
 from .streams import flush_streams, secure_streams
@@ -86,6 +86,7 @@ for command in (
     scenarios.check,
     runs.plot,
     runs.reproduce,
+    reports.report,
     models.describe,
     models.build,
     models.pack,

@@ -1,7 +1,7 @@
 """One HTML page of a run that opens from disk and asks the network for nothing.
 
-`content` gathers what is shown, `payload` packs the signals, `tables`, `wiring` and `trains` write the parts that need no
-script, and `page` puts it all into one file. What the page does is in ``resources/``.
+`content` gathers what is shown, `payload` packs the signals, `tables` and `wiring` write the parts that need no script,
+and `page` puts it all into one file. What the page does is in ``resources/``.
 """
 
 from .page import REPORT_FILE, write_report

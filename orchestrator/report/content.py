@@ -215,5 +215,3 @@ def _requirements(content: Content) -> Iterator[dict[str, Any]]:
         own = [name for name in looked if verdict["index"] is not None and f"[{verdict['index']}]" in name]
         told = {key: verdict[key] for key in ("name", "verdict", "time")}
         yield told | {"signals": (own or looked)[:_LOOKED_AT]}
-
-

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import html
-import importlib.resources
 import importlib.util
 import json
 from collections.abc import Sequence
@@ -19,6 +18,7 @@ from .wiring import draw_wiring
 REPORT_FILE = "report.html"
 _REMEDY = "install the extra: pip install 'railcosim[report]'"
 _SCRIPTS = ("bokeh.min.js", "bokeh-api.min.js")
+_OWN = Path(__file__).parent / "resources"
 _RESOURCES = ("report.css", "page.js", "trains.js", "report.js")
 _NETWORK = (("https://cdn.jsdelivr.net/", ""), ("https://maps.googleapis.com/", ""))
 """Where the library would load more from; a page has it all, and shows no mathematics or maps."""
@@ -68,8 +68,7 @@ def _library() -> list[str]:
 
 
 def _page(contents: Sequence[Content], columns: Columns, scripts: Sequence[str]) -> str:
-    own = importlib.resources.files(__package__) / "resources"
-    style, *parts = ((own / name).read_text(encoding="utf-8") for name in _RESOURCES)
+    style, *parts = (world.read_text(_OWN / name, encoding="utf-8") for name in _RESOURCES)
     names = _names(contents)
     data = _inert(json.dumps(_finite(shown(contents, names, columns)), allow_nan=False))
     return "".join(
@@ -88,7 +87,10 @@ def _page(contents: Sequence[Content], columns: Columns, scripts: Sequence[str])
             _provenance(contents, names, columns.loss),
             "</main>",
             f'<script type="application/json" id="data">{data}</script>',
-            *(f'<script type="text/plain" id="column-{k}">{each.text}</script>' for k, each in enumerate(columns.packed)),
+            *(
+                f'<script type="text/plain" id="column-{k}">{each.text}</script>'
+                for k, each in enumerate(columns.packed)
+            ),
             *(f"<script>{_inert_script(text)}</script>" for text in (*scripts, *parts)),
             "</body></html>\n",
         ]
@@ -118,7 +120,10 @@ def _head(contents: Sequence[Content], names: Sequence[str]) -> str:
 
 def _verdicts(contents: Sequence[Content], names: Sequence[str]) -> str:
     parts = ['<section id="verdicts"><h2>Verdicts</h2>']
-    parts += [tables.findings(content, name if len(contents) > 1 else "") for content, name in zip(contents, names, strict=True)]
+    parts += [
+        tables.findings(content, name if len(contents) > 1 else "")
+        for content, name in zip(contents, names, strict=True)
+    ]
     parts += [tables.requirements(contents, names)]
     parts += [tables.folded("Metrics", tables.metrics(contents, names))]
     parts += [tables.folded("Known values", tables.published(contents, names)), "</section>"]
@@ -139,8 +144,8 @@ def _provenance(contents: Sequence[Content], names: Sequence[str], loss: float) 
     for content, name in zip(contents, names, strict=True):
         parts += [f"<h3>{tables.escaped(name)}</h3>" if len(contents) > 1 else "", tables.provenance(content)]
     lost = (
-        f"<p>Curves are drawn in single precision, less than {tables.number(loss)} off in their unit; all digits are in "
-        "results.csv beside this page.</p>"
+        f"<p>Curves are drawn in single precision, at most {tables.number(loss)} off in their unit; all digits are in "
+        "results.csv of the run.</p>"
     )
     return f'<section id="made"><h2>Provenance</h2>{"".join(parts)}{lost}</section>'
 

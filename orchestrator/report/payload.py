@@ -41,7 +41,8 @@ def pack(values: NDArray[Any]) -> Packed:
     offset = 0.5 * low + 0.5 * high
     with np.errstate(over="ignore"):
         rounded = (full - offset).astype("<f4")
-    loss = float(np.nanmax(np.abs(rounded + offset - full), initial=0.0, where=np.isfinite(full)))
+    back = rounded[np.isfinite(full)].astype(np.float64) + offset
+    loss = float(np.abs(back - finite).max(initial=0.0))
     squeeze = zlib.compressobj(_LEVEL, wbits=-15)
     # Bytes of like weight side by side: neighbouring points share all but the last.
     shuffled = np.ascontiguousarray(rounded.view(np.uint8).reshape(-1, 4).T)

@@ -138,7 +138,12 @@ def provenance(content: Content) -> str:
     ]
     listed = "".join(f"<dt>{name}</dt><dd>{value}</dd>" for name, value in facts)
     rows = [
-        [escaped(name), escaped(told["model"]), escaped(told["kind"]), f"<code>{escaped(str(told['digest'])[:16])}</code>"]
+        [
+            escaped(name),
+            escaped(told["model"]),
+            escaped(told["kind"]),
+            f"<code>{escaped(str(told['digest'])[:16])}</code>",
+        ]
         for name, told in record.get("instances", {}).items()
     ]
     models = table(["instance", "model", "kind", "digest (begin)"], rows, "Instances")

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections import Counter, defaultdict
 from collections.abc import Mapping, Sequence
 from typing import Any
@@ -11,6 +12,8 @@ import networkx as nx
 from .tables import escaped
 
 _WIDTH, _HEIGHT, _ACROSS, _DOWN, _EDGE = 150, 34, 250, 54, 20
+_LATE = re.compile(r"^(\S+) receives (\S+) ")
+"""How a run says that a connection is late."""
 _MOST = 60
 """Instances that are drawn one by one; of more, each group is one box."""
 
@@ -20,7 +23,7 @@ def draw_wiring(record: Mapping[str, Any]) -> str:
     names = list(record.get("instances", {}))
     grouped = len(names) > _MOST
     box = {name: name.partition("[")[0] if grouped else name for name in names}
-    late = {(str(a), str(b)) for a, b in _pairs(record.get("late", ()))}
+    late = {(_owner(b, box), _owner(a, box)) for said in record.get("late") or () for a, b in _LATE.findall(said)}
     wires: Counter[tuple[str, str]] = Counter()
     delayed: set[tuple[str, str]] = set()
     for connection in record.get("connections", ()):
@@ -38,22 +41,15 @@ def draw_wiring(record: Mapping[str, Any]) -> str:
     parts = [_wire(places, pair, count, pair in delayed) for pair, count in wires.items()]
     parts += [_box(places[name], name, sum(b == name for b in box.values()), record) for name in boxes]
     said = f"{len(names)} instances, {sum(wires.values())} connections"
+    if record.get("order"):
+        said += ", numbered in the order in which they step"
+    tip = 'viewBox="0 0 8 8" refX="8" refY="4" markerWidth="7" markerHeight="7" orient="auto"'
     return (
-        f'<figure class="wide" tabindex="0" role="region" aria-label="Wiring"><svg class="wiring" role="img" viewBox="0 0 {width} {height}" '
-        f'width="{width}" height="{height}"><title>{said}</title><defs><marker id="tip" viewBox="0 0 8 8" refX="8" refY="4" '
-        f'markerWidth="7" markerHeight="7" orient="auto"><path d="M0 0L8 4L0 8z"/></marker></defs>{"".join(parts)}</svg>'
+        '<figure class="wide" tabindex="0" role="region" aria-label="Wiring"><svg class="wiring" role="img" '
+        f'viewBox="0 0 {width} {height}" width="{width}" height="{height}"><title>{said}</title>'
+        f'<defs><marker id="tip" {tip}><path d="M0 0L8 4L0 8z"/></marker></defs>{"".join(parts)}</svg>'
         f"<figcaption>{said}. Dashed: a value that arrives a communication step late.</figcaption></figure>"
     )
-
-
-def _pairs(late: Sequence[Any]) -> list[tuple[Any, Any]]:
-    found = []
-    for each in late:
-        if isinstance(each, Mapping):
-            found.append((each.get("source", ""), each.get("target", "")))
-        elif isinstance(each, Sequence) and not isinstance(each, str) and len(each) == 2:
-            found.append((each[0], each[1]))
-    return found
 
 
 def _owner(signal: str, box: Mapping[str, str]) -> str | None:
@@ -102,15 +98,19 @@ def _wire(places: Mapping[str, tuple[int, int]], pair: tuple[str, str], count: i
         x0, x1 = x0 + _WIDTH, x1 + _WIDTH
         path = f"M{x0} {y0}C{x0 + 45} {y0} {x1 + 45} {y1} {x1} {y1}"
     told = f"{pair[0]} to {pair[1]}: {count} connection{'s' if count > 1 else ''}{', late' if is_late else ''}"
-    return f'<path class="wire{" late" if is_late else ""}" d="{path}" marker-end="url(#tip)"><title>{escaped(told)}</title></path>'
+    kind = "wire late" if is_late else "wire"
+    return f'<path class="{kind}" d="{path}" marker-end="url(#tip)"><title>{escaped(told)}</title></path>'
 
 
 def _box(place: tuple[int, int], name: str, members: int, record: Mapping[str, Any]) -> str:
     x, y = _EDGE + place[0] * _ACROSS, _EDGE + place[1] * _DOWN
     told = record["instances"].get(name, {}).get("model", f"{members} instances")
+    order = record.get("order") or []
+    name = f"{order.index(name) + 1}. {name}" if name in order else name
     label, model = (text if len(text) < 22 else text[:20] + "…" for text in (name, str(told)))
     return (
         f'<g><rect x="{x}" y="{y}" width="{_WIDTH}" height="{_HEIGHT}" rx="5"/>'
         f'<text x="{x + _WIDTH / 2}" y="{y + 14}">{escaped(label)}</text>'
-        f'<text class="model" x="{x + _WIDTH / 2}" y="{y + 28}">{escaped(model)}</text><title>{escaped(f"{name}: {told}")}</title></g>'
+        f'<text class="model" x="{x + _WIDTH / 2}" y="{y + 28}">{escaped(model)}</text>'
+        f"<title>{escaped(f'{name}: {told}')}</title></g>"
     )

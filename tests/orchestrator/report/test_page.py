@@ -1,0 +1,107 @@
+"""The page as a file: whole, self-contained, and without a word of a user's that is taken for markup."""
+
+import html.parser
+import json
+import re
+
+import pytest
+from railcosim.orchestrator import run, world
+from railcosim.orchestrator.cli import app as cli
+from railcosim.orchestrator.errors import RailcosimError
+from railcosim.orchestrator.report import page, write_report
+
+
+class Read(html.parser.HTMLParser):
+    """What a browser would see: elements, attributes, texts outside of scripts."""
+
+    def __init__(self, text):
+        super().__init__()
+        self.elements, self.texts, self.scripts, self._in = [], [], {}, None
+        self.feed(text)
+
+    def handle_starttag(self, tag, attrs):
+        self.elements.append((tag, dict(attrs)))
+        self._in = tag if tag in ("script", "style") else None
+        self._id = dict(attrs).get("id")
+
+    def handle_endtag(self, tag):
+        self._in = None
+
+    def handle_data(self, data):
+        if self._in is None:
+            self.texts.append(data)
+        elif self._id:
+            self.scripts[self._id] = data
+
+
+def test_a_page(directory, title):
+    path = write_report([directory])
+    assert path == directory / "report.html"
+    text = path.read_text(encoding="utf-8")
+    seen = Read(text)
+    assert title in seen.texts
+    assert not [attrs for tag, attrs in seen.elements if tag == "img"]
+    assert not [attrs for tag, attrs in seen.elements if {"src", "onerror"} & attrs.keys()]
+    assert {attrs["href"][0] for tag, attrs in seen.elements if "href" in attrs} == {"#"}
+    policy = next(attrs["content"] for tag, attrs in seen.elements if "http-equiv" in attrs)
+    assert policy.startswith("default-src 'none'")
+    data = json.loads(seen.scripts["data"])
+    assert len(data["signals"]) == 3
+    assert all(seen.scripts[f"column-{k}"] for k in range(len(data["columns"])))
+    assert "cdn.jsdelivr" not in text
+    assert "maps.googleapis" not in text
+
+
+def test_words_of_a_page(directory):
+    text = " ".join(Read(write_report([directory]).read_text(encoding="utf-8")).texts)
+    for said in (
+        "✓ pass",
+        "✗ fail",
+        "always lag[i].x < 0.5",
+        "peak[2]",
+        "3 instances, 2 connections",
+        "single precision",
+    ):
+        assert said in text
+
+
+def test_several_runs(wavy, directory, tmp_path):
+    run(wavy(stop_time=10.0), kind="native", output=tmp_path / "other", figures=False)
+    path = write_report([directory, tmp_path / "other"], tmp_path / "both.html")
+    seen = Read(path.read_text(encoding="utf-8"))
+    assert path == tmp_path / "both.html"
+    heads = [attrs["data-run"] for tag, attrs in seen.elements if "data-run" in attrs]
+    assert heads == ["0", "0", "1", "1"]
+    assert str(directory) in seen.texts  # both are of the same scenario
+
+
+def test_a_page_of_a_failed_run_says_so(wavy, mine, tmp_path):
+    system = wavy()
+    system.add("fails", mine("Fails"), until=5.0)
+    with pytest.raises(Exception, match="fails"):
+        run(system, kind="native", output=tmp_path / "run", figures=False)
+    text = " ".join(Read(write_report([tmp_path / "run"]).read_text(encoding="utf-8")).texts)
+    assert "failed" in text
+    assert re.search(r"fails, t = 5", text)
+
+
+def test_without_the_library(directory, monkeypatch):
+    monkeypatch.setattr(page.importlib.util, "find_spec", lambda name: None)
+    with pytest.raises(RailcosimError, match=r"pip install 'railcosim\[report\]'"):
+        write_report([directory])
+
+
+def test_no_room(directory, monkeypatch):
+    def full(path, *_, **__):
+        raise OSError(28, "No space left on device")
+
+    monkeypatch.setattr(world, "write_text", full)
+    with pytest.raises(RailcosimError, match=r"report\.html cannot be written: No space left on device"):
+        write_report([directory])
+
+
+def test_the_command(directory, capsys):
+    assert cli.call(["report", str(directory / "run.json")]) == 0
+    assert capsys.readouterr().out == f"{directory / 'report.html'}\n"
+    assert cli.call(["report", str(directory.parent)]) == 2
+    assert "holds no run that can be read" in capsys.readouterr().err
