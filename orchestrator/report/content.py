@@ -167,10 +167,11 @@ def _lines(
 def _columns_of(curve: Curve, scale: float, content: Content, columns: Columns) -> dict[str, int]:
     """Where the numbers of a curve are: those of a signal as it is stand in the page already."""
     results = content.results
-    if scale == 1.0:
+    if scale == 1.0 and len(curve.y):
         for name, place in content.places.items():
             own = results[name]
-            if own.dtype.kind == "f" and len(own) == len(curve.y) and np.array_equal(own, curve.y, equal_nan=True):
+            alike = own.dtype.kind == "f" and len(own) == len(curve.y) and own[-1] == curve.y[-1]
+            if alike and np.array_equal(own, curve.y, equal_nan=True):
                 return {"column": place}
     column = columns.add(curve.y * scale)
     return {"column": column} if len(curve.y) == results.points else {"column": column, "x": columns.add(curve.x)}

@@ -22,9 +22,7 @@ def escaped(text: object) -> str:
 
 def number(value: object) -> str:
     """A number as a table shows it."""
-    if value is None:
-        return "–"
-    return f"{value:.6g}" if isinstance(value, float) else escaped(value)
+    return "–" if value is None else f"{value:.6g}" if isinstance(value, float) else escaped(value)
 
 
 def table(heads: Sequence[str], rows: Iterable[Sequence[str]], caption: str) -> str:
@@ -119,9 +117,8 @@ def findings(content: Content, name: str) -> str:
     error = content.record.get("error")
     items = [f'<li class="broken">{escaped(error)}</li>'] if error else []
     items += [f"<li>{escaped(text)}</li>" for text in said]
-    if not items:
-        return ""
-    return f'{f"<h3>{escaped(name)}</h3>" if name else ""}<ul class="told">{"".join(items)}</ul>'
+    head = f"<h3>{escaped(name)}</h3>" if name else ""
+    return f'{head}<ul class="told">{"".join(items)}</ul>' if items else ""
 
 
 def provenance(content: Content) -> str:
@@ -171,8 +168,6 @@ def _small(text: object) -> str:
 def command_of(record: Mapping[str, Any]) -> str:
     """What runs the same again, as far as options tell it."""
     words = ["orchestrate run", str(record.get("scenario") or record.get("path"))]
-    if record.get("preset"):
-        words += ["--preset", str(record["preset"])]
-    if record.get("modified"):
-        words.append("(with the changes that stand among the parameters)")
+    words += ["--preset", str(record["preset"])] if record.get("preset") else []
+    words += ["(with the changes that stand among the parameters)"] if record.get("modified") else []
     return " ".join(words)

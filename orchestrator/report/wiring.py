@@ -86,17 +86,12 @@ def _middle(place: tuple[int, int]) -> tuple[float, float]:
 
 def _wire(places: Mapping[str, tuple[int, int]], pair: tuple[str, str], count: int, is_late: bool) -> str:
     (x0, y0), (x1, y1) = (_middle(places[name]) for name in pair)
-    if places[pair[0]][0] < places[pair[1]][0]:
-        x0 += _WIDTH
-        bend = 0.5 * (x1 - x0)
-        path = f"M{x0} {y0}C{x0 + bend} {y0} {x1 - bend} {y1} {x1} {y1}"
-    elif places[pair[0]][0] > places[pair[1]][0]:
-        x1 += _WIDTH
-        bend = 0.5 * (x0 - x1)
-        path = f"M{x0} {y0 + 8}C{x0 - bend} {y0 + 8} {x1 + bend} {y1 + 8} {x1} {y1 + 8}"
-    else:
-        x0, x1 = x0 + _WIDTH, x1 + _WIDTH
-        path = f"M{x0} {y0}C{x0 + 45} {y0} {x1 + 45} {y1} {x1} {y1}"
+    ahead = places[pair[1]][0] - places[pair[0]][0]
+    # From the right side to the left one, or the other way round for what goes back; within a column by the right.
+    x0, x1 = x0 + _WIDTH * (ahead >= 0), x1 + _WIDTH * (ahead <= 0)
+    bend = 0.5 * (x1 - x0) if ahead else 45.0
+    y0, y1 = (y + 8 * (ahead < 0) for y in (y0, y1))
+    path = f"M{x0} {y0}C{x0 + bend} {y0} {x1 - bend * (1 if ahead else -1)} {y1} {x1} {y1}"
     told = f"{pair[0]} to {pair[1]}: {count} connection{'s' if count > 1 else ''}{', late' if is_late else ''}"
     kind = "wire late" if is_late else "wire"
     return f'<path class="{kind}" d="{path}" marker-end="url(#tip)"><title>{escaped(told)}</title></path>'

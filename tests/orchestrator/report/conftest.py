@@ -19,12 +19,10 @@ def build(mine, **how):
     system.provenance.title = TITLE
     system.judged.metrics = {"peak": "peak(lag[i].x)", "end": "final(wave.y)"}
     system.judged.requirements = {"low": "always lag[i].x < 0.95", "lower": "always lag[i].x < 0.5"}
+    twice = {"title": "twice, up to {max(lag[1].x)}", "y": ["lag[1].x"], "scale": 2.0, "y_label": "2 x"}
     system.judged.figures = [
-        {"title": "Both </script>", "y": ["lag[:].x", "wave.y"]},
-        {
-            "title": "Scaled",
-            "panels": [{"title": "twice, up to {max(lag[1].x)}", "y": ["lag[1].x"], "scale": 2.0, "y_label": "2 x"}],
-        },
+        {"title": "Both </script>", "y": ["lag[:].x", "wave.y", "lag[1].x - wave.y"]},
+        {"title": "Scaled", "panels": [twice]},
         {"title": "Over another", "x": "lag[1].x", "y": ["lag[2].x"]},
     ]
     return system

@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 from railcosim.orchestrator import System, run
 from railcosim.orchestrator.errors import ScenarioError
-from railcosim.orchestrator.report.content import Columns, read_content, shown
+from railcosim.orchestrator.report.content import Columns, _bands, read_content, shown
+from railcosim.orchestrator.report.trains import gradients_of
 from railcosim.orchestrator.system import Event
 
 
@@ -34,7 +35,8 @@ def test_panels_over_time_show_signals_by_their_own_columns(directory):
     both, scaled = data["panels"]  # the third figure is not over time
     assert both["title"] == "Both </script>"
     names = ["lag[1].x", "lag[2].x", "wave.y"]
-    assert [line["column"] for line in both["lines"]] == [content.places[name] for name in names]
+    assert [line["column"] for line in both["lines"][:3]] == [content.places[name] for name in names]
+    assert both["lines"][3]["column"] not in content.places.values()
     assert scaled["title"].startswith("twice, up to 0.")
     assert scaled["label"] == "2 x"
     assert scaled["lines"][0]["column"] not in content.places.values()
@@ -46,7 +48,7 @@ def test_two_runs(wavy, tmp_path):
     data, _ = told(tmp_path / "a", tmp_path / "b")
     assert [one["points"] for one in data["runs"]] == [201, 101]
     assert all(len(signal["columns"]) == 2 for signal in data["signals"])
-    assert [line["label"] for line in data["panels"][1]["lines"]] == ["0: lag[1].x", "1: lag[1].x"]
+    assert [line["label"] for line in data["panels"][1]["lines"]] == ["0: lag[1] x", "1: lag[1] x"]
 
 
 def test_events_are_bands(wavy, tmp_path):
@@ -65,9 +67,6 @@ def test_events_are_bands(wavy, tmp_path):
 
 def test_what_models_were_built_with_is_shown():
     """Faults and outages as bands, gradients under the trains."""
-    from railcosim.orchestrator.report.content import _bands
-    from railcosim.orchestrator.report.trains import gradients_of
-
     record = {
         "stop_time": 100.0,
         "instances": {
@@ -117,6 +116,28 @@ def test_a_run_that_failed(wavy, mine, tmp_path):
     assert len(data["panels"]) == 2
 
 
+def test_figures_of_signals_that_are_not_there(directory):
+    """A run that was swapped or cut short may lack them; a page shows the rest."""
+    path = directory / "run.json"
+    record = json.loads(path.read_text())
+    first, second, _ = record["figures_wanted"]
+    first["y"] = ["missing.x"]
+    second["panels"][0]["title"] = "up to {missing.x}"
+    path.write_text(json.dumps(record))
+    data, _ = told(directory)
+    assert [panel["title"] for panel in data["panels"]] == ["up to {missing.x}"]
+
+
+def test_a_run_without_a_point(directory):
+    lines = (directory / "results.csv").read_text().splitlines()
+    (directory / "results.csv").write_text(lines[0] + "\n")
+    record = json.loads((directory / "run.json").read_text())
+    del record["rows"]
+    (directory / "run.json").write_text(json.dumps(record))
+    data, _ = told(directory)
+    assert data["runs"][0]["points"] == 0
+
+
 def test_no_run(tmp_path):
     with pytest.raises(ScenarioError, match="holds no run that can be read"):
         told(tmp_path)
@@ -124,7 +145,7 @@ def test_no_run(tmp_path):
 
 def test_verdicts_that_cannot_be_read(directory):
     (directory / "metrics.json").write_text("{")
-    with pytest.raises(ScenarioError, match="metrics.json cannot be read"):
+    with pytest.raises(ScenarioError, match=r"metrics\.json cannot be read"):
         told(directory)
     (directory / "metrics.json").unlink()
     data, _ = told(directory)

@@ -42,7 +42,7 @@ def test_late_connections_are_dashed_and_break_loops():
 def test_loops_and_twins():
     figure = drawn("abc", [("a", "b"), ("a", "b"), ("b", "a"), ("c", "c"), ("c", "unknown")], order=None)
     assert paths(figure) == {"a to b: 2 connections": "wire", "b to a: 1 connection": "wire"}
-    assert len({place for place in places(figure).values()}) == 3
+    assert len(set(places(figure).values())) == 3
 
 
 def test_many_instances_are_drawn_by_group():
