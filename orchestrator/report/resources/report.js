@@ -26,11 +26,12 @@
       if (this.waiting) return;
       this.waiting = requestAnimationFrame(() => { this.waiting = 0; for (const panel of this.panels) panel.refresh(); });
     }
-    zoom(factor, shift = 0) {
-      const { start, end } = this.range, width = (end - start) * factor;
-      const middle = factor < 1 && this.now > start && this.now < end ? this.now : (start + end) / 2;
-      const [low, high] = this.whole, size = Math.min(width, high - low);
-      const begin = Math.min(Math.max(middle - size / 2 + shift * (end - start), low), high - size);
+    zoom(factor, shift = 0) { // around the cursor, if it is seen, which stays where it is on the screen
+      const { start, end } = this.range, [low, high] = this.whole;
+      const centre = this.now >= start && this.now <= end ? this.now : (start + end) / 2;
+      const size = Math.min((end - start) * factor, high - low);
+      const wanted = centre - ((centre - start) / (end - start)) * size + shift * (end - start);
+      const begin = Math.min(Math.max(wanted, low), high - size);
       this.look(begin, begin + size);
     }
     bar() {
@@ -44,7 +45,7 @@
       }
       this.clock = make("output", { "aria-label": "time of the cursor" });
       bar.append("cursor at ", this.clock);
-      bar.append(make("small", {}, "drag to move, wheel to zoom; arrow keys move the cursor, + and − zoom"));
+      bar.append(make("small", {}, "drag to move, Ctrl or Shift with the wheel to zoom; arrow keys move the cursor, + and − zoom"));
       this.host.append(bar);
       this.host.addEventListener("keydown", (event) => this.key(event));
     }
@@ -119,8 +120,7 @@
       const label = /^\$\$|\\\(|\\\[/.test(told.label) ? "" : told.label; // what the library would take for mathematics
       const range = new Bokeh.Range1d(explorer.range);
       range.change.connect(() => explorer.look(range.start, range.end));
-      const figure = Bokeh.Plotting.figure({ x_range: range, height: 240, sizing_mode: "stretch_width", tools: "xpan,xwheel_zoom",
-        active_scroll: null, toolbar_location: null, output_backend: "webgl", lod_threshold: null, min_border_left: 62, y_axis_label: label || null, x_axis_label: "time [s]" });
+      const figure = Bokeh.Plotting.figure({ x_range: range, height: 240, sizing_mode: "stretch_width", tools: "xpan", toolbar_location: null, output_backend: "webgl", lod_threshold: null, min_border_left: 62, y_axis_label: label || null, x_axis_label: "time [s]" });
       this.figure = figure; shades(figure);
       for (const band of explorer.runs.flatMap((run) => run.bands)) figure.add_layout(new Bokeh.BoxAnnotation({ left: band.from, right: band.until, fill_color: "#D55E00", fill_alpha: 0.12, line_color: null, level: "underlay" }));
       this.cursor = new Bokeh.Span({ dimension: "height", location: explorer.now, line_color: "#888888", line_width: 1 });
@@ -135,6 +135,10 @@
       this.list(); this.refresh();
       this.view = await Bokeh.Plotting.show(figure, this.plot);
       this.plot.addEventListener("pointermove", (event) => this.point(event));
+      this.plot.addEventListener("wheel", (event) => { // alone it scrolls the page
+        if (!event.ctrlKey && !event.shiftKey) return;
+        event.preventDefault(); this.point(event); explorer.zoom((event.deltaY || event.deltaX) < 0 ? 0.8 : 1.25);
+      }, { passive: false });
     }
     point(event) {
       const frame = this.figure.inner_width, box = this.plot.getBoundingClientRect();
