@@ -11,6 +11,7 @@ from .. import world
 from ..comparison import compare as compare_systems
 from ..comparison import read_directions, variants
 from ..figures import remove_drawn
+from ..report import REPORT_FILE, check_drawable, write_report
 from .options import (
     FAILED,
     FMU_FAILED,
@@ -21,6 +22,7 @@ from .options import (
     KindName,
     Preset,
     Quiet,
+    Report,
     Scenario,
     Set,
     Step,
@@ -31,7 +33,7 @@ from .options import (
     interrupted,
     load_system,
 )
-from .printing import and_figures, open_console, say, show_comparison, show_progress
+from .printing import and_figures, open_console, say, show_comparison, show_page, show_progress
 
 Scenarios = Annotated[
     list[str], typer.Argument(metavar="SCENARIO...", help="Shipped scenarios (see 'orchestrate list'), or .toml files.")
@@ -61,6 +63,7 @@ def compare(
         Path | None, typer.Option("--output", "-o", help="Directory; results/compare-<scenarios> by default.")
     ] = None,
     no_figures: Annotated[bool, typer.Option("--no-figures", help="Draw nothing.")] = False,
+    report: Report = False,
     figure_format: FigureFormat = None,
     dpi: Dpi = None,
     quiet: Quiet = False,
@@ -71,6 +74,8 @@ def compare(
     variant are parted by commas: --swap cruise=A,train=B. Exit codes: 0 fine; 1 a requirement failed in a variant; 2
     the input is wrong; 3 a variant failed; 130 interrupted by Ctrl-C, 143 by SIGTERM, 129 by SIGHUP.
     """
+    if report:
+        check_drawable()
     systems = variants(
         scenarios,
         presets=presets or (),
@@ -94,6 +99,10 @@ def compare(
         progress=lambda name, start: show_progress(name, quiet, start),
     )
     show_comparison(comparison, quiet)
+    ran = [variant.run.directory for variant in comparison.variants if variant.run and variant.run.directory]
+    if report and ran:
+        page = write_report(ran, directory / REPORT_FILE, comparison.names if len(ran) == len(comparison.names) else ())
+        show_page(page, quiet)
     if comparison.interrupted:
         raise typer.Exit(interrupted(comparison.interrupted))
     if comparison.broken:

@@ -95,6 +95,10 @@ Trust = Annotated[
         help="Import Python code wherever a file names it; else only what is in the scenario's folder or named here.",
     ),
 ]
+Report = Annotated[
+    bool,
+    typer.Option("--report", help="Make report.html as well: a page to zoom, play and compare in (extra 'report')."),
+]
 Quiet = Annotated[bool, typer.Option("--quiet", "-q", help="Print only errors, what was found, and what failed.")]
 
 

@@ -14,6 +14,7 @@ from ..errors import ScenarioError
 from ..evaluation import BAD, ComparedValue
 from ..figures import check_figures, draw, written_as
 from ..isolation import isolate
+from ..report import check_drawable, write_report
 from ..run import (
     ROWS_FILE,
     Finding,
@@ -40,6 +41,7 @@ from .options import (
     KindName,
     Preset,
     Quiet,
+    Report,
     Set,
     Step,
     Stop,
@@ -55,6 +57,7 @@ from .printing import (
     say,
     show_cases,
     show_findings,
+    show_page,
     show_progress,
     show_run,
     show_values,
@@ -107,6 +110,7 @@ def run(
         Path | None, typer.Option("--output", "-o", help="Directory for the results; results/<scenario> by default.")
     ] = None,
     no_figures: Annotated[bool, typer.Option("--no-figures", help="Draw nothing.")] = False,
+    report: Report = False,
     figure_format: FigureFormat = None,
     dpi: Dpi = None,
     quiet: Quiet = False,
@@ -120,6 +124,8 @@ def run(
     130 interrupted by Ctrl-C, 143 by SIGTERM, 129 by SIGHUP (what was computed is on disk). A second Ctrl-C ends it at
     once, also where an FMU does not return.
     """
+    if report:
+        check_drawable()
     how: Any = {"figures": not no_figures, "threads": threads, "checkpoint_every": checkpoint_every}
     if resume_from is not None:
         given = (preset, settings or None, builds or None, step, algorithm, isolated or None, output)
@@ -154,6 +160,8 @@ def run(
         if outcome.directory is not None:
             add_step_check(outcome.directory, verdict)
     show_run(outcome, second, verdict, quiet)
+    if report and outcome.directory is not None:
+        show_page(write_report([outcome.directory]), quiet)
     for ended in (outcome, second):
         if ended is not None and ended.status == "failed" and ended.error is not None:
             raise ended.error

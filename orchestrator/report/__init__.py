@@ -1,9 +1,9 @@
-"""One HTML page of a run that opens from disk and asks the network for nothing.
+"""One HTML page of runs that opens from disk and asks the network for nothing.
 
 `content` gathers what is shown, `payload` packs the signals, `tables` and `wiring` write the parts that need no script,
 and `page` puts it all into one file. What the page does is in ``resources/``.
 """
 
-from .page import REPORT_FILE, write_report
+from ...components.doors import hang_door
 
-__all__ = ["REPORT_FILE", "write_report"]
+hang_door(__name__)

@@ -24,12 +24,13 @@ _NETWORK = (("https://cdn.jsdelivr.net/", ""), ("https://maps.googleapis.com/", 
 """Where the library would load more from; a page has it all, and shows no mathematics or maps."""
 
 
-def write_report(directories: Sequence[Path], output: Path | None = None) -> Path:
+def write_report(directories: Sequence[Path], output: Path | None = None, names: Sequence[str] = ()) -> Path:
     """Write a page.
 
     Args:
         directories: of the runs it shows.
         output: the file; in the first of the directories by default.
+        names: what each is called; scenario and preset, or else the directory, by default.
 
     Returns:
         The file.
@@ -44,7 +45,7 @@ def write_report(directories: Sequence[Path], output: Path | None = None) -> Pat
     path = output if output is not None else directories[0] / REPORT_FILE
     part = path.with_name(path.name + ".part")
     try:
-        world.write_text(part, _page(contents, columns, scripts), encoding="utf-8")
+        world.write_text(part, _page(contents, list(names) or _names(contents), columns, scripts), encoding="utf-8")
         world.replace(part, path)
     except OSError as error:
         world.unlink(part, missing_ok=True)
@@ -52,12 +53,21 @@ def write_report(directories: Sequence[Path], output: Path | None = None) -> Pat
     return path
 
 
-def _library() -> list[str]:
-    """The charting library's scripts, out of its package, which need not be imported for that."""
+def check_drawable() -> Path:
+    """Where the charting library's scripts are, which need not be imported for a page.
+
+    Raises:
+        RailcosimError: it is not installed.
+    """
     found = importlib.util.find_spec("bokeh")
     if found is None or found.origin is None:
         raise RailcosimError(f"a report is drawn by Bokeh, which is not installed; {_REMEDY}")
-    folder = Path(found.origin).parent / "server" / "static" / "js"
+    return Path(found.origin).parent / "server" / "static" / "js"
+
+
+def _library() -> list[str]:
+    """Its scripts, without the addresses where it would load more."""
+    folder = check_drawable()
     scripts = []
     for name in _SCRIPTS:
         text = world.read_text(folder / name, encoding="utf-8")
@@ -67,9 +77,8 @@ def _library() -> list[str]:
     return scripts
 
 
-def _page(contents: Sequence[Content], columns: Columns, scripts: Sequence[str]) -> str:
+def _page(contents: Sequence[Content], names: Sequence[str], columns: Columns, scripts: Sequence[str]) -> str:
     style, *parts = (world.read_text(_OWN / name, encoding="utf-8") for name in _RESOURCES)
-    names = _names(contents)
     data = _inert(json.dumps(_finite(shown(contents, names, columns)), allow_nan=False))
     return "".join(
         [

@@ -1,5 +1,5 @@
 from .comparison import show_comparison
-from .console import Log, and_figures, counted, folded, open_console, say, show_notes, tell
+from .console import Log, and_figures, counted, folded, open_console, say, show_notes, show_page, tell
 from .findings import show_findings
 from .interface import show_interface
 from .outcome import show_run
@@ -22,6 +22,7 @@ __all__ = [
     "show_findings",
     "show_interface",
     "show_notes",
+    "show_page",
     "show_progress",
     "show_report",
     "show_run",

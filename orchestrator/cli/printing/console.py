@@ -8,6 +8,7 @@ import re
 import sys
 import unicodedata
 from collections.abc import Iterable
+from pathlib import Path
 
 from rich.console import Console, ConsoleOptions, ConsoleRenderable, RenderHook, RenderResult
 from rich.segment import Segment
@@ -101,3 +102,9 @@ def counted(count: int, what: str) -> str:
 def and_figures(count: int) -> str:
     """What a list of files ends with."""
     return f", {counted(count, 'figure')}" if count else ""
+
+
+def show_page(page: Path, quiet: bool) -> None:
+    """Say where a page is."""
+    if not quiet:
+        say(open_console(), f"Report: {page}", whole=True)

@@ -105,3 +105,25 @@ def test_the_command(directory, capsys):
     assert capsys.readouterr().out == f"{directory / 'report.html'}\n"
     assert cli.call(["report", str(directory.parent)]) == 2
     assert "holds no run that can be read" in capsys.readouterr().err
+
+
+SCENARIO = """[simulation]
+stop_time = 1.0
+[instances.lag]
+component = "{model}"
+start.u = 1.0
+[presets.far]
+"lag.u" = 2.0
+"""
+
+
+def test_runs_and_comparisons_make_pages(mine, tmp_path, capsys):
+    scenario, out = tmp_path / "lag.toml", tmp_path / "out"
+    scenario.write_text(SCENARIO.format(model=mine("Lag")))
+    assert cli.call(["run", str(scenario), "--report", "-o", str(out)]) == 0
+    assert f"Report: {out / 'report.html'}" in capsys.readouterr().out
+    assert cli.call(["run", str(scenario), "--report", "-o", str(out), "-q"]) == 0
+    assert capsys.readouterr().out == ""
+    assert cli.call(["compare", str(scenario), "--preset", "far", "--report", "-o", str(out), "--no-figures"]) == 0
+    texts = Read((out / "report.html").read_text(encoding="utf-8")).texts
+    assert {"lag", "lag far"} & set(texts)
