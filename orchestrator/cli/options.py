@@ -97,7 +97,7 @@ Trust = Annotated[
 ]
 Report = Annotated[
     bool,
-    typer.Option("--report", help="Make report.html as well: a page to zoom, play and compare in (extra 'report')."),
+    typer.Option("--report", help="Make report.html as well, a page to zoom and play in (extra 'report')."),
 ]
 Quiet = Annotated[bool, typer.Option("--quiet", "-q", help="Print only errors, what was found, and what failed.")]
 

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import RailcosimError
-from ..evaluation import needed_signals
+from ..evaluation import Judge
 from ..figures import Curve, bracketed, curves_of, filled_title, panels_of
 from ..run import Results, read_metrics, read_record
 from .payload import Packed, is_even, pack
@@ -209,9 +209,9 @@ def _requirements(content: Content) -> Iterator[dict[str, Any]]:
     names = [*content.results.names(), *content.results.parameters]
     for verdict in content.metrics.get("requirements", ()):
         try:
-            needed = needed_signals({}, {verdict["name"]: verdict["text"]}, names)
+            needed = Judge({}, {verdict["name"]: verdict["text"]}, names).needed_signals
         except RailcosimError:  # of another version
-            needed = set()
+            needed = frozenset()
         looked = [name for name in content.results if name in needed]
         own = [name for name in looked if verdict["index"] is not None and f"[{verdict['index']}]" in name]
         told = {key: verdict[key] for key in ("name", "verdict", "time")}
