@@ -4,8 +4,9 @@
 
 * a component without Memory, Tape or Noise integrates its states over the step with its inputs held; all its outputs
   belong to the end of the step;
-* a sampled one first evaluates ``outputs``, then ``update``, then integrates; an output with direct feed-through keeps
-  the value of the sample it was computed at, because it belongs to the inputs it was computed from;
+* a sampled one has a clock of its own (`sampling`); at a sample it first evaluates ``outputs``, then ``update``, then
+  integrates; an output with direct feed-through keeps the value of the sample it was computed at, because it belongs to
+  the inputs it was computed from;
 * a get after a set is fresh.
 """
 
@@ -24,12 +25,11 @@ from .component import Component, Slot, convert, evaluated, pack
 from .declarations import Input, Memory, Output, Parameter, State, Tape
 from .errors import ComponentError, nearest
 from .methods import Methods
+from .sampling import SampleClock
 from .tape import TapeDeck
 from .tracing import TracingError, feedthrough, initial_dependencies
 
 Phase = Literal["instantiated", "initialization", "running", "terminated"]
-_GRID_TOLERANCE = 1e-6
-"""How far, relative to a sample, a communication step may miss a whole number of samples (rounding, h = 1/3)."""
 
 
 class Simulation:
@@ -51,10 +51,12 @@ class Simulation:
         self._values = component.present_values
         self._given = {name: self._values[name] for name in component.slots if name in self._values}
         self._held_names = self._feedthrough_names() if component.is_sampled else frozenset()
+        self._clock = SampleClock(component, self._methods) if component.is_sampled else None
         self._computed_starts = self._computed_start_names()
         self._deck: TapeDeck | None = None
         self._prepared = False
         self._fresh: dict[str, Any] | None = None
+        self._time = 0.0
 
     # ---------------------------------------------------------------- life cycle
 
@@ -63,6 +65,8 @@ class Simulation:
         self._expect("be initialized", "instantiated")
         self.phase = "initialization"
         self.time = start_time
+        if self._clock is not None:
+            self._clock.start(start_time)
 
     def start(self) -> None:
         """Leave initialization: fixed parameters are closed from here on."""
@@ -78,20 +82,16 @@ class Simulation:
         self._expect("step", "running")
         if not 0.0 < length < math.inf:
             raise ComponentError(f"{self.name}: a communication step must be positive, not {length!r} s")
-        begin = self._values["time"]
-        held: dict[str, Any] = {}
-        if self.component.is_sampled:
-            count, sample = self.samples(length)
-            for k in range(count):
-                self._values["time"] = begin + k * sample
-                held = self._sample(sample, k * sample)
-                self._methods.integrate(begin + k * sample, sample)
+        begin = self._time
+        if self._clock is not None:
+            self._clock.advance(begin, length, self._sample)
         else:
             self._methods.integrate(begin, length)
-        self._values["time"] = begin + length
+            self._values["time"] = begin + length
+        self._time = begin + length
         self._fresh = None
-        if held:
-            self._fresh = self._evaluate() | held
+        if self._held_names and self._clock is not None:
+            self._fresh = self._evaluate() | self._clock.held
 
     def terminate(self) -> None:
         """End the run: the tape, with the trip in progress if it is to be kept, goes to its file."""
@@ -111,11 +111,12 @@ class Simulation:
 
     @property
     def time(self) -> float:
-        """Current time in s."""
-        return float(self._values["time"])
+        """The communication point in s, as it was told; the equations see the time of the sample that is due there."""
+        return self._time
 
     @time.setter
     def time(self, value: float) -> None:
+        self._time = float(value)
         self._values["time"] = value
         self.invalidate()
 
@@ -164,6 +165,8 @@ class Simulation:
             "component": self.name,
             "phase": self.phase,
             "time": self.time,
+            "seen": self._values["time"],
+            "clock": None if self._clock is None else self._clock.state(),
             "values": {name: _plain(self._values[name]) for name in self._given},
             "fresh": None if self._fresh is None else {name: _plain(value) for name, value in self._fresh.items()},
             "tape": None if self._deck is None else self._deck.state(),
@@ -186,6 +189,9 @@ class Simulation:
         self._values.update(values)
         self.phase = state["phase"]
         self.time = state["time"]
+        self._values["time"] = state["seen"]
+        if self._clock is not None:
+            self._clock.restore(state["clock"])
         self._deck = None
         if state["tape"] is not None:
             self._deck = self._make_deck()
@@ -198,25 +204,12 @@ class Simulation:
 
     # ---------------------------------------------------------------- inside a step
 
-    def samples(self, length: float) -> tuple[int, float]:
-        """How many samples of which period make a communication step."""
-        period = self._values["sample_time"]
-        if period == 0.0:
-            return 1, length
-        count = round(length / period)
-        if count < 1 or abs(count * period - length) > _GRID_TOLERANCE * period:
-            raise ComponentError(
-                f"{self.name}: the communication step {length!r} s is not a whole multiple of "
-                f"sample_time = {period!r} s"
-            )
-        return count, length / count
-
     def _sample(self, period: float, elapsed: float) -> dict[str, Any]:
         """One sample, ``elapsed`` seconds after the inputs were read; gives the outputs to be held."""
         values, deck = self._values, self._deck
         if deck is not None:
             deck.follow(values["trip"], values["trip_time"], self._methods.keep)
-        outputs = self._evaluate(elapsed)
+        outputs = self._evaluate(elapsed, at_sample=True)
         changes = self._methods.update(period)
         if deck is not None:
             deck.record(self._trip_time(elapsed), changes)
@@ -224,10 +217,10 @@ class Simulation:
         values.update((slot.name, changes[slot.name]) for slot in self._methods.states if slot.name in changes)
         return {name: outputs[name] for name in self._held_names}
 
-    def _evaluate(self, elapsed: float = 0.0) -> dict[str, Any]:
+    def _evaluate(self, elapsed: float = 0.0, *, at_sample: bool = False) -> dict[str, Any]:
         self._methods.draw()
         if self._deck is not None:
-            self._values.update(self._deck.read(self._trip_time(elapsed)))
+            self._values.update(self._deck.read(self._trip_time(elapsed), at_sample=at_sample))
         return self._methods.evaluate()
 
     def _trip_time(self, elapsed: float) -> float:

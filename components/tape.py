@@ -63,16 +63,17 @@ class TapeDeck:
         """Whether the train has not yet departed; a departure at zero may be told with a rounding error."""
         return trip_time < -0.01 * self.sample_time
 
-    def index(self, trip_time: float) -> int | None:
-        """The sample along the trip; None while waiting (negative trip time).
+    def index(self, trip_time: float, *, at_sample: bool = True) -> int | None:
+        """The sample along the trip, between samples the last one; None while waiting (negative trip time).
 
         Raises:
-            ComponentError: off the sample grid by more than 1 % of a sample, or past the end of the tape.
+            ComponentError: at a sample, but off the grid by more than 1 % of one; or past the end of the tape.
         """
         if self.waiting(trip_time):
             return None
-        n = round(trip_time / self.sample_time)
-        if abs(trip_time - n * self.sample_time) > 0.01 * self.sample_time:
+        place = trip_time / self.sample_time
+        n = round(place) if at_sample else math.floor(place + 0.01)
+        if at_sample and abs(trip_time - n * self.sample_time) > 0.01 * self.sample_time:
             raise ComponentError(
                 f"{self.owner}: trip_time = {trip_time!r} s is not a multiple of sample_time = {self.sample_time!r} s"
             )
@@ -82,9 +83,9 @@ class TapeDeck:
             )
         return n
 
-    def read(self, trip_time: float) -> dict[str, Any]:
+    def read(self, trip_time: float, *, at_sample: bool = True) -> dict[str, Any]:
         """What the last committed trip recorded here, by name; the start row while waiting."""
-        n = self.index(trip_time)
+        n = self.index(trip_time, at_sample=at_sample)
         row = self.start if n is None else self.committed[n]
         values, at = {}, 0
         for slot in self.slots:

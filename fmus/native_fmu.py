@@ -14,7 +14,7 @@ from .toolchain import PLATFORMS, compile_library, folders
 _RUNTIME = Path(__file__).parent / "runtime"
 _PARTS = (
     *("log.c", "noise.c", "tape.c", "inputs.c", "integration.c", "simulation.c"),
-    *("fmi2.c", "values.c", "derivatives.c", "state.c"),
+    *("advance.c", "fmi2.c", "values.c", "derivatives.c", "state.c"),
 )
 
 

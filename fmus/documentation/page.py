@@ -95,8 +95,9 @@ def stepping(component: Component) -> list[str]:
         period = values["sample_time"]
         now = f"sample_time = {period:g} s" if period else "sample_time = 0, which samples once per communication step"
         lines.append(
-            "A sampled block: use a fixed communication step. It must be a whole multiple of sample_time, unless that "
-            f"is 0; here {now}."
+            "A sampled block with a clock of its own: it takes any communication step, samples when a sample is due, "
+            "and holds between. Inputs are read when the communication step begins, so let it divide sample_time or be "
+            f"a multiple of it; here {now}."
         )
     if any(component.of(State)):
         lines.append(

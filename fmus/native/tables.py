@@ -57,6 +57,7 @@ def model_header(component: Component, traced: Traced, guid: str) -> str:
     constants: dict[str, Any] = {
         "N_VARIABLES": layout.variables,
         "N_VALUES": max(1, layout.values),
+        "N_GIVEN": sum(v.causality in ("parameter", "input") for v in variables),
         "FIRST_OUTPUT": layout.outputs[0],
         "N_OUTPUTS": layout.outputs[1],
         "FIRST_STATE": layout.states[0],

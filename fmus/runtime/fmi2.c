@@ -140,7 +140,7 @@ fmi2Status fmi2SetupExperiment(fmi2Component c, fmi2Boolean toleranceDefined, fm
     if (!isfinite(startTime) || (stopTimeDefined && !(stopTime >= startTime))) {
         return fail(s, "fmi2SetupExperiment: there is no experiment from %g s to %g s", startTime, stopTime);
     }
-    s->time = s->start_time = s->last_successful_time = startTime;
+    s->time = s->start_time = s->last_successful_time = s->reached = startTime;
     s->has_stop_time = stopTimeDefined != fmi2False;
     s->stop_time = stopTime;
     return fmi2OK;
@@ -220,23 +220,22 @@ fmi2Status fmi2DoStep(fmi2Component c, fmi2Real currentCommunicationPoint, fmi2R
     }
     /* A communication point is told with a few roundings; the last step of a time that was summed up may end far more
        of them past the stop time. */
-    double rounding = 1e-6 * h + 4.0 * DBL_EPSILON * fabs(s->time);
+    double reached = s->last_successful_time, rounding = 1e-6 * h + 4.0 * DBL_EPSILON * fabs(reached);
     if (!(h > 0.0) || !isfinite(h)) {
         return fail(s, "fmi2DoStep: a communication step must be positive, not %g s", h);
     }
-    if (!(fabs(currentCommunicationPoint - s->time) <= rounding)) {
+    if (!(fabs(currentCommunicationPoint - reached) <= rounding)) {
         return fail(s, "fmi2DoStep: the communication point %.17g s does not continue the last one, %.17g s",
-                    currentCommunicationPoint, s->time);
+                    currentCommunicationPoint, reached);
     }
     if (s->has_stop_time && currentCommunicationPoint + h > s->stop_time + 1e-3 * h + rounding) {
         return fail(s, "fmi2DoStep: the step to %.17g s goes past the stop time %.17g s", currentCommunicationPoint + h,
                     s->stop_time);
     }
-    s->time = currentCommunicationPoint;
-    if (advance(s, h) != fmi2OK) {
+    if (advance(s, currentCommunicationPoint, h) != fmi2OK) {
         return broken(s);
     }
-    s->last_successful_time = s->time;
+    s->last_successful_time = currentCommunicationPoint + h;
     return fmi2OK;
 }
 

@@ -70,6 +70,9 @@ typedef void Equations(const double *clock, const double *values, double *result
 
 #include "model.h"
 
+/* What a block keeps of its values to integrate between its samples; none if it has either no states or no samples. */
+#define N_BASE (IS_SAMPLED && N_STATES > 0 ? N_VALUES : 1)
+
 typedef enum {
     PHASE_INSTANTIATED = 1,
     PHASE_INITIALIZATION = 2,
@@ -97,10 +100,10 @@ typedef struct {
 
 typedef struct {
     Phase phase;
-    double time;
+    double time; /* that the equations see */
     double start_time;
     double stop_time;
-    double last_successful_time;
+    double last_successful_time; /* the communication point, as it was told */
     bool has_stop_time;
     bool fresh;    /* the outputs among the values belong to the present inputs */
     bool prepared; /* what follows from start values is up to date */
@@ -109,7 +112,12 @@ typedef struct {
     bool moving; /* an input has derivatives, given for the coming step */
     double input_derivatives[AT_LEAST_ONE(N_REAL_INPUTS)][MAX_ORDER]; /* over time, from the first */
     double input_starts[AT_LEAST_ONE(N_REAL_INPUTS)];                 /* of the step under way */
-    double held[AT_LEAST_ONE(N_OUTPUTS)];
+    double taken;   /* number of samples so far */
+    double reached; /* the time to which the states belong */
+    double held[AT_LEAST_ONE(N_OUTPUTS)]; /* the outputs of the last sample */
+    bool based;                           /* integration stopped between two samples */
+    double base_time;                     /* from where it began */
+    double base[N_BASE];                  /* the values there */
     double scratch[AT_LEAST_ONE(N_SCRATCH)];
     double direction[N_VALUES]; /* of a directional derivative */
     double slopes[4][AT_LEAST_ONE(N_STATES)];

@@ -1,5 +1,5 @@
-/* An instance in time: the initial state, samples, integration, outputs. components/simulate.py says it in Python, and the
-   order of every floating-point operation here is the order there: the two agree to the last bit. */
+/* An instance in time: the initial state, integration, outputs. components/simulate.py says it in Python, and the order of
+   every floating-point operation here is the order there: the two agree to the last bit. */
 
 #include <math.h>
 #include <string.h>
@@ -51,18 +51,19 @@ static double trip_time_after(const Instance *s, double elapsed)
 }
 #endif
 
-/* All outputs into the values, `elapsed` seconds after the inputs were read. */
-static fmi2Status evaluate(Instance *s, double elapsed)
+/* All outputs into the values, `elapsed` seconds after the inputs were read; at a sample the tape is at one of its own. */
+static fmi2Status evaluate(Instance *s, double elapsed, bool at_sample)
 {
     if (draw(s) != fmi2OK) {
         return fmi2Error;
     }
 #if N_TAPE > 0
-    if (tape_read(s, trip_time_after(s, elapsed)) != fmi2OK) {
+    if (tape_read(s, trip_time_after(s, elapsed), at_sample) != fmi2OK) {
         return fmi2Error;
     }
 #else
     (void)elapsed;
+    (void)at_sample;
 #endif
 #if N_OUTPUTS > 0
     call_equations(s, MODEL_OUTPUTS, s->scratch);
@@ -159,105 +160,6 @@ static fmi2Status integrate(Instance *s, double begin, double elapsed, double le
 }
 #endif
 
-#if IS_SAMPLED
-/* How many samples of which period make a communication step. */
-static fmi2Status samples(Instance *s, double length, int *count, double *period)
-{
-    double declared = s->values[SAMPLE_TIME];
-    double n = declared == 0.0 ? 1.0 : rint(length / declared);
-    if (declared != 0.0 && !(n >= 1.0 && n < 2147483647.0 && fabs(n * declared - length) <= 1e-6 * declared)) {
-        return fail(s, "the communication step %.17g s is not a whole multiple of sample_time = %.17g s", length,
-                    declared);
-    }
-    *count = (int)n;
-    *period = length / n;
-    return fmi2OK;
-}
-
-/* One sample: outputs with the old memory, then the next memory, tape row and re-initialised states. */
-static fmi2Status sample(Instance *s, double period, double elapsed)
-{
-#if N_TAPE > 0
-    if (tape_follow(s) != fmi2OK) {
-        return fmi2Error;
-    }
-#endif
-    if (evaluate(s, elapsed) != fmi2OK) {
-        return fmi2Error;
-    }
-    memcpy(s->held, s->values + FIRST_OUTPUT, N_OUTPUTS * sizeof(double));
-    double *next = s->scratch, *row = next + N_MEMORY, *again = row + N_TAPE;
-    s->step = period;
-#if N_MEMORY + N_TAPE + N_REINITIALISED > 0
-    call_equations(s, MODEL_UPDATE, next);
-#endif
-    if (check_results(s, "update", FIRST_MEMORY, N_MEMORY, next) != fmi2OK) {
-        return fmi2Error;
-    }
-    for (int k = 0; k < N_TAPE; k++) {
-        if (!isfinite(row[k])) {
-            return fail(s, "update: column %d of the tape is %g at t = %.17g s", k + 1, row[k], s->time);
-        }
-    }
-#if N_TAPE > 0
-    tape_record(s, row);
-#endif
-    for (int k = 0; k < N_REINITIALISED; k++) {
-        int target = model_reinitialised[k];
-        if (check_results(s, "update", target, 1, again + k) != fmi2OK) {
-            return fmi2Error;
-        }
-        s->values[target] = again[k];
-    }
-    memcpy(s->values + FIRST_MEMORY, next, N_MEMORY * sizeof(double));
-    return fmi2OK;
-}
-#endif
-
-/* One communication step from the present time. */
-static fmi2Status advance(Instance *s, double length)
-{
-    double begin = s->time;
-    if (start_inputs(s, length) != fmi2OK) {
-        return fmi2Error;
-    }
-#if IS_SAMPLED
-    int count = 1;
-    double period = length;
-    if (samples(s, length, &count, &period) != fmi2OK) {
-        return fmi2Error;
-    }
-    for (int k = 0; k < count; k++) {
-        double elapsed = (double)k * period;
-        s->time = begin + elapsed;
-        move_inputs(s, elapsed);
-        if (sample(s, period, elapsed) != fmi2OK || integrate(s, begin + elapsed, elapsed, period) != fmi2OK) {
-            return fmi2Error;
-        }
-    }
-#else
-    if (integrate(s, begin, 0.0, length) != fmi2OK) {
-        return fmi2Error;
-    }
-#endif
-    s->time = begin + length;
-    move_inputs(s, length);
-    stop_inputs(s);
-    s->fresh = false;
-#if IS_SAMPLED && HAS_HELD
-    if (evaluate(s, 0.0) != fmi2OK) {
-        return fmi2Error;
-    }
-    for (int k = 0; k < N_OUTPUTS; k++) {
-        if (model_held[k]) {
-            s->values[FIRST_OUTPUT + k] = s->held[k];
-        }
-    }
-    s->fresh = true;
-#endif
-    return fmi2OK;
-}
-
 /* Outputs as the present inputs make them; after an error the values stay as they are, to be looked at. */
 static fmi2Status refresh(Instance *s)
 {
@@ -267,7 +169,7 @@ static fmi2Status refresh(Instance *s)
     if (s->phase == PHASE_INITIALIZATION && prepare(s) != fmi2OK) {
         return fmi2Error;
     }
-    if (!s->fresh && evaluate(s, 0.0) != fmi2OK) {
+    if (!s->fresh && evaluate(s, 0.0, false) != fmi2OK) {
         return fmi2Error;
     }
     s->fresh = true;
@@ -290,8 +192,8 @@ static void restart(Instance *s)
     tape_free(&s->tape);
 #endif
     s->phase = PHASE_INSTANTIATED;
-    s->time = s->start_time = s->last_successful_time = 0.0;
-    s->has_stop_time = s->fresh = s->prepared = false;
-    s->step = 0.0;
+    s->time = s->start_time = s->last_successful_time = s->reached = 0.0;
+    s->has_stop_time = s->fresh = s->prepared = s->based = false;
+    s->step = s->taken = 0.0;
     stop_inputs(s);
 }

@@ -3,7 +3,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-enum { STATE_VERSION = 3 };
+enum { STATE_VERSION = 4 };
 
 /* What tells a block from any other; small enough to be copied to the stack and looked at. */
 typedef struct {
@@ -25,11 +25,17 @@ typedef struct {
     bool fresh;
     bool prepared;
     bool moving;
+    bool based;
     bool tape_has_trip;
     int tape_trip;
     int tape_first;
     int tape_last;
+    double taken;
+    double reached;
+    double base_time;
     double values[N_VALUES];
+    double held[AT_LEAST_ONE(N_OUTPUTS)];
+    double base[N_BASE];
     double input_derivatives[AT_LEAST_ONE(N_REAL_INPUTS)][MAX_ORDER];
     char texts[AT_LEAST_ONE(N_TEXTS)][MAX_TEXT];
 } State;
@@ -67,11 +73,19 @@ static void save_state(const Instance *s, State *state)
     state->fresh = s->fresh;
     state->prepared = s->prepared;
     state->moving = s->moving;
+    state->based = s->based;
+    state->taken = s->taken;
+    state->reached = s->reached;
+    state->base_time = s->base_time;
     state->tape_has_trip = s->tape.has_trip;
     state->tape_trip = s->tape.trip;
     state->tape_first = s->tape.first;
     state->tape_last = s->tape.last;
     memcpy(state->values, s->values, sizeof state->values);
+    memcpy(state->held, s->held, sizeof state->held);
+    if (s->based) {
+        memcpy(state->base, s->base, sizeof state->base);
+    }
     memcpy(state->input_derivatives, s->input_derivatives, sizeof state->input_derivatives);
     memcpy(state->texts, s->texts, sizeof state->texts);
     if (s->tape.rows > 0) {
@@ -85,6 +99,8 @@ static fmi2Status restore_state(Instance *s, const State *state)
         return fail(s, "the saved state belongs to another model");
     }
     memcpy(s->values, state->values, sizeof s->values);
+    memcpy(s->held, state->held, sizeof s->held);
+    memcpy(s->base, state->base, sizeof s->base);
     memcpy(s->input_derivatives, state->input_derivatives, sizeof s->input_derivatives);
     memcpy(s->texts, state->texts, sizeof s->texts);
 #if N_TAPE > 0
@@ -106,6 +122,10 @@ static fmi2Status restore_state(Instance *s, const State *state)
     s->fresh = state->fresh;
     s->prepared = state->prepared;
     s->moving = state->moving;
+    s->based = state->based;
+    s->taken = state->taken;
+    s->reached = state->reached;
+    s->base_time = state->base_time;
     s->tape.has_trip = state->tape_has_trip;
     s->tape.trip = state->tape_trip;
     s->tape.first = state->tape_first;

@@ -13,16 +13,17 @@ static bool waiting(const Instance *s, double trip_time)
     return trip_time < -0.01 * s->tape.sample_time;
 }
 
-/* The sample along the trip into *index; -1 while waiting. */
-static fmi2Status tape_index(Instance *s, double trip_time, int *index)
+/* The sample along the trip into *index; -1 while waiting. Between samples it is the last one. */
+static fmi2Status tape_index(Instance *s, double trip_time, bool at_sample, int *index)
 {
     const Tape *tape = &s->tape;
     *index = -1;
     if (waiting(s, trip_time)) {
         return fmi2OK;
     }
-    double n = rint(trip_time / tape->sample_time);
-    if (fabs(trip_time - n * tape->sample_time) > 0.01 * tape->sample_time) {
+    double place = trip_time / tape->sample_time;
+    double n = at_sample ? rint(place) : floor(place + 0.01);
+    if (at_sample && fabs(trip_time - n * tape->sample_time) > 0.01 * tape->sample_time) {
         return fail(s, "trip_time = %.17g s is not a multiple of sample_time = %.17g s", trip_time, tape->sample_time);
     }
     if (n >= (double)tape->rows) {
@@ -32,9 +33,9 @@ static fmi2Status tape_index(Instance *s, double trip_time, int *index)
     return fmi2OK;
 }
 
-static fmi2Status tape_read(Instance *s, double trip_time)
+static fmi2Status tape_read(Instance *s, double trip_time, bool at_sample)
 {
-    if (tape_index(s, trip_time, &s->tape.row) != fmi2OK) {
+    if (tape_index(s, trip_time, at_sample, &s->tape.row) != fmi2OK) {
         return fmi2Error;
     }
     const double *row = s->tape.row < 0 ? model_tape_start : s->tape.committed + (size_t)s->tape.row * N_TAPE;

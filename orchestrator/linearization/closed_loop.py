@@ -26,6 +26,7 @@ from ..problems import Problem, suggestion
 from ..run import Checked, Progress, assembled, check
 from ..system import System
 from ..times import digits
+from ..wiring import unmet_samples
 from .blocks import Array, Continuous, Stepped, make_block
 from .composition import Composition
 
@@ -112,12 +113,21 @@ def linearize(
     with Workspace() as workspace:
         try:
             checked = check(system, workspace, kind)
+            _check_samples(system, checked)
             with assembled(checked) as master:
                 master.initialize(system.stepping.start_time, stop)
                 _advance(master, system, round(steps), progress)
                 return Loop(system, checked, master, inputs, outputs).linearize(sampled)
         finally:
             forget_paths(workspace.folder)
+
+
+def _check_samples(system: System, checked: Checked) -> None:
+    """Every step must be like any other, or there is no model of one."""
+    interfaces = {name: model.interface for name, model in checked.models.items()}
+    problems = [problem for problem, _ in unmet_samples(system, interfaces, checked.wiring.starts)]
+    if problems:
+        raise ScenarioError(problems)
 
 
 def _advance(master: Master, system: System, count: int, progress: Progress | None) -> None:

@@ -1,3 +1,4 @@
+from .inputs import unmet_samples
 from .links import Link, Wiring, described, is_direct
 from .order import Order, derive_order
 from .resolution import wire
@@ -21,5 +22,6 @@ __all__ = [
     "find_followings",
     "find_trains",
     "is_direct",
+    "unmet_samples",
     "wire",
 ]

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Container, Iterable, Iterator, Mapping, Sequence
+from typing import Any
 
 from ..fmi import Interface, Variable
 from ..names import SignalName
@@ -11,6 +12,9 @@ from ..problems import Problem
 from ..system import System
 from ..times import digits
 from .links import Link, Wiring
+
+_COUNTABLE = 2.0**31 - 1.0
+"""Samples that a step may have."""
 
 _LISTED = 4
 """How many inputs of an instance are named that nothing feeds."""
@@ -114,22 +118,33 @@ def _kept(instance: str, inputs: Sequence[Variable]) -> list[str]:
     ]
 
 
+def unmet_samples(
+    system: System, interfaces: Mapping[str, Interface], starts: Mapping[str, Mapping[str, Any]]
+) -> Iterator[tuple[Problem, bool]]:
+    """Instances of ours that sample between communication points, and whether they can take so many samples."""
+    for name, interface in interfaces.items():
+        sample = starts[name].get("sample_time")
+        if sample is None and interface.sampled and "sample_time" in interface.variables:
+            sample = interface.variables["sample_time"].start
+        if not interface.annotation or not sample or not isinstance(sample, int | float):
+            continue
+        step = system.instances[name].step or system.stepping.step
+        if not _is_multiple(step, sample):
+            what = f"step {digits(step)} s is not a whole multiple of its sample_time {digits(sample)} s"
+            remedy = f"set step or {name}.sample_time"
+            problem = Problem(name, f"the communication {what}", remedy, (SignalName(name),))
+            yield problem.at(system.instances[name].origin), step / sample < _COUNTABLE
+
+
 def check_sampling(system: System, interfaces: Mapping[str, Interface], wiring: Wiring) -> None:
     """Note steps that meet no sample, or are not those an FMU is made for."""
     told = set()
+    for problem, countable in unmet_samples(system, interfaces, wiring.starts):
+        if countable:
+            wiring.notes.append(f"{problem.place}: {problem.message}: it samples by a clock of its own")
+        else:
+            wiring.problems.append(problem)
     for name, interface in interfaces.items():
-        sample = wiring.starts[name].get("sample_time")
-        if sample is None and interface.sampled and "sample_time" in interface.variables:
-            sample = interface.variables["sample_time"].start
-        if interface.annotation and sample and isinstance(sample, int | float):
-            own_step = system.instances[name].step or system.stepping.step
-            if not _is_multiple(own_step, sample):
-                what = (
-                    f"the communication step {digits(own_step)} s is not a whole multiple of its "
-                    f"sample_time {digits(sample)} s"
-                )
-                problem = Problem(name, f"{what}: set step or {name}.sample_time", names=(SignalName(name),))
-                wiring.problems.append(problem.at(system.instances[name].origin))
         own, step = interface.default_step, system.instances[name].step or system.stepping.step
         if own and not interface.variable_step and not interface.annotation and interface.model not in told:
             told.add(interface.model)

@@ -146,12 +146,6 @@ def test_a_step_that_is_a_multiple_up_to_rounding_is_taken(samples, running):
     assert simulation.get("count") == 3
 
 
-@pytest.mark.parametrize("length", [0.05, 0.15, 0.1001])
-def test_a_step_off_the_sample_grid_is_refused(samples, length, running, refusal):
-    text = refusal(lambda: running(samples.Counter()).step(length))
-    assert text == f"Counter: the communication step {length} s is not a whole multiple of sample_time = 0.1 s"
-
-
 def test_update_may_put_a_state_back(samples):
     """By hand: 2 m/s from 0; the trip changes at 0.3 s, so the sample there restarts from 3 m."""
     result = simulate(samples.Shuttle(), 0.5, 0.1, lambda t: {"trip": 1 if t < 0.25 else 2})

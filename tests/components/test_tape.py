@@ -162,7 +162,8 @@ def test_a_departure_with_a_rounding_error_is_a_departure(samples, refusal):
 def test_off_the_grid_and_past_the_end(samples, refusal):
     simulation = learner(samples)
     simulation.set("trip_time", 0.25)
-    assert refusal(lambda: simulation.get("command")) == (
+    assert simulation.get("command") == 0.0  # between samples it reads what it read at the last one
+    assert refusal(lambda: simulation.step(STEP)) == (
         "Learner: trip_time = 0.25 s is not a multiple of sample_time = 0.1 s"
     )
     simulation.set("trip_time", 2.1)

@@ -83,7 +83,10 @@ def test_a_component_without_a_note_has_none():
     assert Page(page(PointMassTrain(), "python")).notes == []
 
 
-@pytest.mark.parametrize(("name", "expected"), [("Counter", "whole multiple of sample_time"), ("Chain", "max_step")])
+@pytest.mark.parametrize(
+    ("name", "expected"),
+    [("Counter", "takes any communication step, samples when a sample is due"), ("Chain", "max_step")],
+)
 def test_stepping_advice(sample, name, expected):
     assert expected in Page(page(resolve(sample(name))(), "python")).text
 

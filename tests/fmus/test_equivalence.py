@@ -141,7 +141,8 @@ def scripts(draw, component):
         once_a_step = not has_tape and not component.declarations["sample_time"].minimum and draw(st.booleans())
         starts["sample_time"] = 0.0 if once_a_step else step / draw(st.integers(1, 4))
         if not has_tape and starts["sample_time"] > 0.0:
-            lengths = [starts["sample_time"] * k for k in draw(st.lists(st.integers(1, 3), min_size=6, max_size=6))]
+            parts = draw(st.lists(st.sampled_from([1, 2, 3, 0.5, 0.25, 0.7, 1e-10]), min_size=6, max_size=6))
+            lengths = [starts["sample_time"] * part for part in parts]
     for noise in component.noises.values():
         starts[noise.hold.name] = step * draw(st.sampled_from([0.25, 0.5, 1.0, 2.5, 3.0]))
     if not component.is_sampled or (starts["sample_time"] == 0.0 and draw(st.booleans())):

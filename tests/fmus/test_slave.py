@@ -104,12 +104,6 @@ def test_calls_out_of_order_and_gaps_in_time_are_refused(instantiate):
         assert "must be positive" in instantiate("Gust").initialize().refused("call", "doStep", 0.0, length)
 
 
-def test_a_step_off_the_sample_grid_is_refused(instantiate, sample):
-    instance = instantiate(sample("Counter")).initialize()
-    message = instance.refused("call", "doStep", 0.0, 0.25)
-    assert "0.25 s is not a whole multiple of sample_time = 0.1 s" in message
-
-
 # ---------------------------------------------------------------- what a failure tells
 
 FAILING = '''"""A component of a user's own."""

@@ -77,15 +77,6 @@ def test_an_experiment_that_ends_before_it_starts_is_refused(load, stop):
     assert fmu.SetupExperiment(0, c_double(0), c_double(1), 1, c_double(1)) == OK
 
 
-def test_a_step_that_is_no_multiple_of_the_sample_time_is_refused(load):
-    fmu = load(MIXED).initialize()
-    assert fmu.step(0.3) == ERROR
-    assert "multiple of sample_time" in fmu.said
-    for tiny, length in ((1e-300, 1.0), (1e-12, 1.0), (1e-3, 1e-4), (1.0, 1e10)):
-        fmu = load(COUNTER).initialize(sample_time=tiny)
-        assert fmu.step(length) == ERROR
-
-
 def test_hopeless_step_limits_are_errors_not_hours(load):
     fmu = load("PointMassTrain").initialize(max_step=1e-300)
     assert fmu.step() == ERROR

@@ -345,3 +345,9 @@ def test_isolated_instances_give_the_same_model():
     plain, isolated = linearize(system, 1.0), linearize(isolate(system, ["train"]), 1.0)
     assert (plain.a.tolist(), plain.b.tolist()) == (isolated.a.tolist(), isolated.b.tolist())
     assert plain.values == isolated.values
+
+
+def test_a_step_that_meets_no_sample_has_no_model(pi_loop):
+    pi_loop.instances["pi"].start["sample_time"] = 0.3
+    with pytest.raises(ScenarioError, match=r"not a whole multiple of its sample_time 0\.3 s; set step or pi\.sample"):
+        linearize(pi_loop, 0.0, kind="plain")
