@@ -1,15 +1,21 @@
-"""What a component's methods must return, out of its declarations, and what is wrong with what they do."""
+"""What a component's methods must return, out of its declarations; and where their author wrote what is wrong."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Set
+import traceback
+from collections.abc import Callable, Mapping, Set
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Any
 
-from .authors import place_of
+import numpy as np
+
 from .component import Component, Method, Slot
 from .declarations import Memory, Output, State, Tape
 from .errors import ComponentError
+
+_OURS = Path(__file__).parent
+_NUMPY = Path(np.__file__).parent
 
 
 @dataclass(frozen=True)
@@ -57,3 +63,23 @@ def check_returned(component: Component, method: Method, returned: Any, owed: Du
         if function is None:
             raise ComponentError(f"{name} has no method {method!r}, which must return {missing}")
         raise ComponentError(f"{name}.{method} returns no value of {missing}{at}")
+
+
+def line_of(error: BaseException, *others: Path) -> str:
+    """The innermost line of an author that an exception passed through, as ``file.py:12, 'text'``; or nothing.
+
+    Args:
+        error: as caught.
+        others: further folders whose files are never to blame, beside this one and NumPy's.
+    """
+    for frame in reversed(traceback.extract_tb(error.__traceback__)):
+        path = Path(frame.filename)
+        if path.parent not in (_OURS, *others) and not path.is_relative_to(_NUMPY):
+            return f"{path.name}:{frame.lineno}{f', {frame.line!r}' if frame.line else ''}"
+    return ""
+
+
+def place_of(function: Callable[..., Any] | None) -> str:
+    """Where a method is written, as ``file.py:12``; nothing where it is not Python's."""
+    code = getattr(function, "__code__", None)
+    return f"{Path(code.co_filename).name}:{code.co_firstlineno}" if code else ""

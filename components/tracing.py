@@ -10,12 +10,11 @@ from typing import Any
 
 import numpy as np
 
-from .authors import line_of
 from .component import Component, Method, evaluated
 from .declarations import Input, Memory, Output, Parameter, State, Tape
 from .errors import ComponentError
 from .maths import SymbolArray, elementwise
-from .returned import check_returned, due
+from .returned import check_returned, due, line_of
 
 Names = frozenset[str]
 

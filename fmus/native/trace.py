@@ -16,12 +16,11 @@ from typing import Any, NoReturn
 import casadi as ca
 import numpy as np
 
-from ...components.authors import line_of
 from ...components.component import Component, Method, Slot, evaluated
 from ...components.declarations import Memory, Output, State, Tape
 from ...components.errors import ComponentError
 from ...components.maths import SymbolArray, elementwise
-from ...components.returned import check_returned, due
+from ...components.returned import check_returned, due, line_of
 from ...components.tracing import TracingError
 from ..variables import scalar_variables
 from .ccode import function
