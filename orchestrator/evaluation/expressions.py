@@ -78,10 +78,11 @@ class Expression:
         """
         if not self.uses_index or not any(reference.uses_index for reference in self.references):
             return ()
-        names, key = Names.of(names), tuple(reference.key for reference in self.references)
-        if key not in names.instances:
-            names.instances[key] = self._indices(names)
-        return names.instances[key]
+        names, key = Names.of(names), ("i", *(reference.key for reference in self.references))
+        if key not in names.known:
+            names.known[key] = self._indices(names)
+        found: tuple[int, ...] = names.known[key]
+        return found
 
     def _indices(self, names: Names) -> tuple[int, ...]:
         last = min(2 * names.largest + 1, _MAX_INDEX + len(names))
@@ -99,7 +100,7 @@ class Expression:
 
     def resolve(self, names: Collection[str], index: int | None = None) -> list[list[str]]:
         """For each reference the full names it stands for."""
-        binding = self.bound(Plan(names), index)
+        binding = self.bound(Plan.of(names), index)
         return [binding.found(reference) for reference in self.references]
 
     def check(self, names: Collection[str], constants: Collection[str] = ()) -> list[Problem]:
@@ -123,7 +124,7 @@ class Expression:
         if not instances:
             return [Problem(f"'{self.text}'", "there is no i for which all of its signals exist", "mend the indices")]
         try:
-            self.evaluate(Rehearsal(names), instances[0], **dict.fromkeys(constants, 1.0))
+            self.evaluate(Prepared(Plan.of(names), Rehearsal(names)), instances[0], **dict.fromkeys(constants, 1.0))
         except WindowError:
             pass  # the rehearsal is shorter than the run
         except ExpressionError as error:

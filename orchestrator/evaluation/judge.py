@@ -36,8 +36,8 @@ class Judge:
         *,
         steady: bool = True,
     ) -> None:
-        self._names, self._parameters, self._steady = Names.of(names), parameters, steady
-        self._plan = Plan(self._names)
+        self._names, self._parameters, self._steady = Names(names), parameters, steady
+        self._plan = Plan.of(self._names)
         self._texts = dict(metrics)
         self._metrics = {name: _read(parse, text, FUNCTIONS) for name, text in metrics.items()}
         self._requirements = {name: _read(parse_requirement, name, text) for name, text in requirements.items()}

@@ -58,16 +58,16 @@ class Part:
     """A run at some of its points.
 
     Attributes:
-        whole: all of it. columns: the signals, and `time`, at these points.
+        whole: all of it. columns: the signals, and `time`, at these points. first: the number of the first point.
         overlap: how many of the first points are those of the part before. beyond: how many of the last are those of
-            the next one. first: the number of the first point.
+            the next one.
     """
 
     whole: Signals
     columns: Mapping[str, NDArray[Any]]
-    overlap: int
-    beyond: int
-    first: int = 0
+    first: int
+    overlap: int = 0
+    beyond: int = 0
 
     @cached_property
     def time(self) -> NDArray[np.float64]:
@@ -132,7 +132,7 @@ def parts_of(signals: Signals, beyond: int = 0) -> Iterator[Part]:
     for first in range(0, count, BLOCK):
         last, overlap = min(first + BLOCK, count), int(first > 0)
         end = min(last + beyond, count)
-        yield Part(signals, signals.part(first - overlap, end), overlap, end - last, first - overlap)
+        yield Part(signals, signals.part(first - overlap, end), first - overlap, overlap, end - last)
 
 
 class Rehearsal:

@@ -84,6 +84,13 @@ class Plan:
         """All reductions by how many reducers stand inside them."""
         self._terms: dict[Hashable, Term] = {}
 
+    @classmethod
+    def of(cls, names: Collection[str]) -> "Plan":
+        """The one that goes with names which were made ready, else a new one."""
+        names = Names.of(names)
+        plan: Plan = names.known.setdefault("plan", cls(names))
+        return plan
+
     def term(self, key: Hashable, calculate: "Callable[[Frame], Value]", *of: Term) -> Term:
         """The one term with this key."""
         term = self._terms.get(key)

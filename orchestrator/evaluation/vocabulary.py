@@ -1,9 +1,9 @@
 """The names that expressions may speak of, and which of them a reference stands for."""
 
 import re
-from collections.abc import Collection, Iterable, Iterator, Sequence
+from collections.abc import Collection, Hashable, Iterable, Iterator, Sequence
 from functools import cached_property
-from typing import TypeAlias
+from typing import Any, TypeAlias
 
 from ..names import INDEX, plainly
 from ..problems import Problem, suggestion
@@ -26,8 +26,8 @@ class Names(Collection[str]):
     def __init__(self, names: Iterable[str]) -> None:
         self._names = frozenset(names)
         self._counts: dict[str, int] = {}
-        self.instances: dict[object, tuple[int, ...]] = {}
-        """The values of `i` for which references exist together, by these."""
+        self.known: dict[Hashable, Any] = {}
+        """What others found out about them."""
 
     @classmethod
     def of(cls, names: Collection[str]) -> "Names":

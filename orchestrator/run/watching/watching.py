@@ -82,7 +82,8 @@ class Watching:
         found = list(self._crossings.findings())
         everything = self._system.stepping.record in (None, self._system.stepping.step)
         count = recorded.points
-        last = Part(recorded, recorded.part(max(0, count - _LAST), count), 0, 0)
+        first = max(0, count - _LAST)
+        last = Part(recorded, recorded.part(first, count), first)
         seen: tuple[Points, ...] = (last,) if everything else (last, self._tail)
         diverging = explain_divergence(self._system, self._interfaces, self._links, seen, error)
         found += [] if diverging is None else [diverging]
