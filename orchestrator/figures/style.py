@@ -58,6 +58,7 @@ def page(
     path: Path,
     *,
     size: tuple[float, float],
+    columns: int = 1,
     title_size: float = 11.5,
     share_x: bool = False,
     dpi: float | None = None,
@@ -66,9 +67,10 @@ def page(
 
     Args:
         title: above all panels.
-        panels: how many axes stand above one another.
+        panels: how many axes there are.
         path: the file.
         size: width and height in inches.
+        columns: how many of them stand beside one another, in rows from the top.
         title_size: in points.
         share_x: whether all panels have the x axis of the last.
         dpi: dots per inch, `DPI` by default; of a vector format it only matters to what it shows as an image.
@@ -81,7 +83,10 @@ def page(
         figure = Figure(figsize=size, dpi=dpi or DPI, layout="constrained")
         FigureCanvasAgg(figure)
         figure.suptitle(wrapped(title, size[0], title_size), x=0.01, ha="left", fontsize=title_size, fontweight="bold")
-        yield list(figure.subplots(panels, 1, sharex=share_x, squeeze=False)[:, 0])
+        made = figure.subplots(-(-panels // columns), columns, sharex=share_x, squeeze=False).ravel()
+        for ax in made[panels:]:
+            ax.remove()
+        yield list(made[:panels])
         drawn = io.BytesIO()  # of a figure that cannot be drawn, no file is begun
         figure.savefig(drawn, format=path.suffix[1:], metadata=_NAMELESS[path.suffix])
         world.write_bytes(path, drawn.getvalue())

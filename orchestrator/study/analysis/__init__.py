@@ -1,6 +1,7 @@
 """What a study says: summary, sensitivity and figures, of its table and its plan."""
 
 from .intervals import Estimate
+from .pictures import draw_study
 from .sensitivity import Influence, Sensitivity, outputs_of, sensitivity
 from .summary import SHARES, Kept, Spread, Summary, summarize
 
@@ -12,6 +13,7 @@ __all__ = [
     "Sensitivity",
     "Spread",
     "Summary",
+    "draw_study",
     "outputs_of",
     "sensitivity",
     "summarize",

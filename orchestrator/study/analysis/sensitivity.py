@@ -204,7 +204,7 @@ def _correlation(x: Array, y: Array, level: float) -> Estimate:
         return UNKNOWN
     from scipy import stats  # noqa: PLC0415
 
-    value = float(np.corrcoef(stats.rankdata(x), stats.rankdata(y))[0, 1])
+    value = float(np.clip(np.corrcoef(stats.rankdata(x), stats.rankdata(y))[0, 1], -1, 1))
     half = NormalDist().inv_cdf((1 + level) / 2) * math.sqrt((1 + value**2 / 2) / (len(y) - 3))
     centre = math.atanh(max(-1 + 1e-15, min(1 - 1e-15, value)))
     return Estimate(value, math.tanh(centre - half), math.tanh(centre + half))
