@@ -27,7 +27,7 @@ ORDER = (
     ("fmi",),
     ("system",),
     ("errors",),
-    ("leftovers", "problems"),
+    ("leftovers", "markup", "problems"),
     ("names", "times"),
     ("world",),
 )

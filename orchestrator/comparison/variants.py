@@ -16,6 +16,7 @@ from .. import world
 from ..errors import FmuError, RailcosimError, ScenarioError
 from ..figures import remarked, remove_drawn
 from ..fmi import Kind
+from ..markup import escaped, number, table
 from ..problems import Problem
 from ..run import Progress, Run, execute, swaps
 from ..scenario import load
@@ -108,6 +109,19 @@ class Comparison:
     def __repr__(self) -> str:
         names = ", ".join(variant.name for variant in self.variants)
         return f"<Comparison of {names}: {len(self.rows)} rows>"
+
+    def _repr_html_(self) -> str:
+        """What a notebook shows: metrics side by side, the best in bold, and the verdicts."""
+        rows = [
+            [
+                escaped(row.name),
+                *(f"<b>{number(x)}</b>" if k in row.winners else number(x) for k, x in enumerate(row.values)),
+                escaped(row.unit),
+            ]
+            for row in self.rows
+        ]
+        verdicts = [[escaped(name), *map(escaped, found), ""] for name, found in self.verdicts().items()]
+        return table(["", *self.names, "unit"], [*rows, *verdicts], "Metrics and requirements")
 
     @property
     def names(self) -> list[str]:

@@ -1,6 +1,6 @@
 from .checking import check_figures
 from .curves import Curve, bracketed, curves_of
-from .drawing import draw, draw_curves, file_name, remove_drawn
+from .drawing import draw, draw_curves, file_name, plot, remove_drawn
 from .marks import filled_title
 from .palette import Palette, member_colour, ranks
 from .panels import FIGURE_KEYS, FORMATS, PANEL_KEYS, heading, panels_of, remarked, share_x, texts_of, written_as
@@ -28,6 +28,7 @@ __all__ = [
     "member_colour",
     "page",
     "panels_of",
+    "plot",
     "ranks",
     "remarked",
     "remove_drawn",

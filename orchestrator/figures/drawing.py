@@ -11,14 +11,15 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from .. import world
-from ..errors import ExpressionError, FigureError
+from ..errors import ExpressionError, FigureError, ScenarioError
 from ..evaluation import Signals
 from ..problems import Problem
+from .checking import check_figures
 from .curves import Curve, curves_of, x_label_of, y_label_of
 from .marks import draw_marks, filled_title, number
 from .palette import Palette, member_colour, ranks
 from .panels import FORMATS, bands_of, heading, panels_of, share_x
-from .style import DASHES, colour_and_dashes, legend, page, room, wrapped
+from .style import DASHES, colour, colour_and_dashes, legend, page, room, wrapped
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -111,6 +112,32 @@ def _legend(
     if len(styles) > 1 or "label" in panel:
         legend(ax)
     return said
+
+
+def plot(expressions: Sequence[str], signals: Signals, ax: "Axes | None" = None) -> "Axes":
+    """Draw expressions over time, as a panel of a figure would show them.
+
+    Args:
+        expressions: of signals.
+        signals: the run.
+        ax: to draw into; those of a new figure by default.
+
+    Raises:
+        ScenarioError: an expression speaks of what is not there.
+    """
+    panel: dict[str, Any] = {"y": list(expressions)}
+    problems = check_figures([{"title": "plot", **panel}], [*signals.names(), *signals.parameters])
+    if problems:
+        raise ScenarioError(problems)
+    if ax is None:
+        from matplotlib import pyplot  # noqa: PLC0415
+
+        ax = pyplot.subplots()[1]
+    curves = curves_of(panel, signals)
+    styles = ({"color": colour(k, len(curves))} for k in range(len(curves)))
+    draw_curves(ax, panel, zip(curves, styles, strict=True), signals, x_label=True)
+    ax.legend()
+    return ax
 
 
 def draw_curves(

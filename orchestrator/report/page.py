@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import html
 import importlib.util
 import json
 from collections.abc import Sequence
@@ -11,6 +10,7 @@ from typing import Any
 
 from .. import world
 from ..errors import RailcosimError
+from ..markup import escaped, number
 from . import tables
 from .content import Columns, Content, read_content, shown
 from .wiring import draw_wiring
@@ -86,7 +86,7 @@ def _page(contents: Sequence[Content], names: Sequence[str], columns: Columns, s
             "<meta http-equiv=\"Content-Security-Policy\" content=\"default-src 'none'; script-src 'unsafe-inline'; "
             "style-src 'unsafe-inline'; img-src data: blob:; font-src data:\">",
             '<meta name="viewport" content="width=device-width, initial-scale=1">',
-            f"<title>{html.escape(contents[0].title)}</title><style>{style}</style></head><body>",
+            f"<title>{escaped(contents[0].title)}</title><style>{style}</style></head><body>",
             _head(contents, names),
             "<main>",
             _verdicts(contents, names),
@@ -117,12 +117,12 @@ def _head(contents: Sequence[Content], names: Sequence[str]) -> str:
     links = "".join(f'<a href="#{place}">{name}</a>' for place, name in parts.items())
     lines = [
         f'<p><span class="{"holds" if content.record.get("status") == "completed" else "broken"}">'
-        f"{tables.escaped(content.record.get('status', ''))}</span> {tables.escaped(name)}</p>"
+        f"{escaped(content.record.get('status', ''))}</span> {escaped(name)}</p>"
         for content, name in zip(contents, names, strict=True)
     ]
     return (
         '<a class="skip" href="#verdicts">Skip to the content</a>'
-        f"<header><h1>{tables.escaped(contents[0].title)}</h1>{''.join(lines)}"
+        f"<header><h1>{escaped(contents[0].title)}</h1>{''.join(lines)}"
         f'<nav aria-label="Parts">{links}</nav></header>'
     )
 
@@ -144,16 +144,16 @@ def _wirings(contents: Sequence[Content], names: Sequence[str]) -> str:
     for content, name in zip(contents, names, strict=True):
         drawn.setdefault(draw_wiring(content.record), []).append(name)
     several = len(contents) > 1
-    parts = [f"{f'<h3>{tables.escaped(chr(44).join(of))}</h3>' if several else ''}{svg}" for svg, of in drawn.items()]
+    parts = [f"{f'<h3>{escaped(chr(44).join(of))}</h3>' if several else ''}{svg}" for svg, of in drawn.items()]
     return f'<section id="wiring"><h2>Wiring</h2>{"".join(parts)}</section>'
 
 
 def _provenance(contents: Sequence[Content], names: Sequence[str], loss: float) -> str:
     parts = []
     for content, name in zip(contents, names, strict=True):
-        parts += [f"<h3>{tables.escaped(name)}</h3>" if len(contents) > 1 else "", tables.provenance(content)]
+        parts += [f"<h3>{escaped(name)}</h3>" if len(contents) > 1 else "", tables.provenance(content)]
     lost = (
-        f"<p>Curves are drawn in single precision, at most {tables.number(loss)} off in their unit; all digits are in "
+        f"<p>Curves are drawn in single precision, at most {number(loss)} off in their unit; all digits are in "
         "results.csv of the run.</p>"
     )
     return f'<section id="made"><h2>Provenance</h2>{"".join(parts)}{lost}</section>'

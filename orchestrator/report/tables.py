@@ -1,38 +1,22 @@
-"""The parts of a page that need no script: verdicts, metrics, published values, provenance.
-
-Everything that comes from a scenario or an FMU is escaped here, and nowhere else is text put into the page.
-"""
+"""The parts of a page that need no script: verdicts, metrics, published values, provenance."""
 
 from __future__ import annotations
 
-import html
 from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
 
+from .. import markup
+from ..markup import escaped, number
 from .content import Content
 
 _VERDICTS = {"pass": "holds", "fail": "broken", "inconclusive": "open"}
 _MARKS = {"pass": "✓", "fail": "✗", "inconclusive": "?"}
 
 
-def escaped(text: object) -> str:
-    """Text that came from outside, as markup that shows it."""
-    return html.escape(str(text), quote=True)
-
-
-def number(value: object) -> str:
-    """A number as a table shows it."""
-    return "–" if value is None else f"{value:.6g}" if isinstance(value, float) else escaped(value)
-
-
 def table(heads: Sequence[str], rows: Iterable[Sequence[str]], caption: str) -> str:
-    """A table that can be sorted; cells are markup."""
-    head = "".join(f'<th scope="col">{name}</th>' for name in heads)
-    body = "".join(f"<tr>{''.join(f'<td>{cell}</td>' for cell in row)}</tr>" for row in rows)
-    return (
-        f'<div class="wide" tabindex="0" role="region" aria-label="{escaped(caption)}"><table class="sortable">'
-        f"<caption>{escaped(caption)}</caption><thead><tr>{head}</tr></thead><tbody>{body}</tbody></table></div>"
-    )
+    """A table that can be sorted, and moved sideways where it is wider than the page."""
+    made = markup.table(heads, rows, caption, "sortable")
+    return f'<div class="wide" tabindex="0" role="region" aria-label="{escaped(caption)}">{made}</div>'
 
 
 def requirements(contents: Sequence[Content], names: Sequence[str]) -> str:
@@ -76,7 +60,7 @@ def metrics(contents: Sequence[Content], names: Sequence[str]) -> str:
         ]
         for (name, index), values in found.items()
     ]
-    values = [escaped(name) for name in names] if len(names) > 1 else ["value"]
+    values = list(names) if len(names) > 1 else ["value"]
     return table(["metric", *values, "unit", "expression"], rows, "Metrics") if rows else ""
 
 

@@ -9,7 +9,7 @@ from typing import Any
 
 import networkx as nx
 
-from .tables import escaped
+from ..markup import escaped
 
 _WIDTH, _HEIGHT, _ACROSS, _DOWN, _EDGE = 150, 34, 250, 54, 20
 _LATE = re.compile(r"^(\S+) receives (\S+) ")

@@ -5,17 +5,22 @@ from __future__ import annotations
 from collections.abc import Collection, Iterator, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any, Literal
+from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import RunError
 from ..evaluation import BAD, ComparedValue, Metric, Verdict
+from ..markup import escaped, number, table
 from ..system import System
 from .checking import Checked
 from .recording import Results
 from .watching import Finding
+
+if TYPE_CHECKING:
+    import pandas
+    from matplotlib.axes import Axes
 
 _SHOWN, _LONGEST = 3, 1500
 """Findings, and characters of what is said of a run, that its representation has."""
@@ -98,6 +103,34 @@ class Run(Mapping[str, NDArray[Any]]):
         facts += [f"files in {self.directory}"] if self.directory else []
         text = "; ".join(facts)
         return f"<Run of {name}: {text if len(text) <= _LONGEST else text[:_LONGEST] + '...'}; {self.results!r}>"
+
+    def _repr_html_(self) -> str:
+        """What a notebook shows: how it ended, what was found, requirements, metrics."""
+        name = " ".join(filter(None, (self.system.provenance.name, self.system.provenance.preset)))
+        said = [escaped(text) for text in (*([self.error] if self.error else []), *self.findings)]
+        verdicts = [
+            [escaped(v.verdict), escaped(v.name), number(v.margin), number(v.time), f"<code>{escaped(v.text)}</code>"]
+            for v in self.requirements
+        ]
+        values = [
+            [escaped(m.name if k is None else f"{m.name}[{k}]"), number(value), escaped(m.unit)]
+            for m in self.metrics
+            for k, value in m.values.items()
+        ]
+        parts = [f"<p><b>{escaped(name)}</b>: {escaped(self.status)}</p>"]
+        parts += [f"<ul>{''.join(f'<li>{text}</li>' for text in said)}</ul>"] if said else []
+        heads = ["verdict", "name", "margin", "at t [s]", "requirement"]
+        parts += [table(heads, verdicts, "Requirements")] if verdicts else []
+        parts += [table(["metric", "value", "unit"], values, "Metrics")] if values else []
+        return "".join(parts)
+
+    def frame(self) -> pandas.DataFrame:
+        """All signals as `Results.frame` gives them."""
+        return self.results.frame()
+
+    def plot(self, *expressions: str, ax: Axes | None = None) -> Axes:
+        """Draw signals or expressions over time, as `Results.plot` does."""
+        return self.results.plot(*expressions, ax=ax)
 
     def names(self) -> Collection[str]:
         """All recorded signals."""

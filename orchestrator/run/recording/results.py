@@ -2,22 +2,31 @@
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Collection, Iterator, Mapping, Sequence
 from functools import cached_property
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from ...errors import ScenarioError, SignalError
+from ...errors import RailcosimError, ScenarioError, SignalError
+from ...figures import plot
+from ...markup import escaped, number, table
 from ...times import digits
 from .columns import Columns, InMemory
 from .missing import missing_signal, shortened
 from .stored import read_stored
 from .told import read_json
 
+if TYPE_CHECKING:
+    import pandas
+    from matplotlib.axes import Axes
+
 _TIME = "time"
+_LISTED = 20
+"""Signals that a notebook shows of results."""
 
 
 class Results(Mapping[str, NDArray[Any]]):
@@ -104,11 +113,51 @@ class Results(Mapping[str, NDArray[Any]]):
     __hash__ = object.__hash__
 
     def __repr__(self) -> str:
-        span = ""
-        if self.points:
-            first, last = (self.part(k, k + 1)[_TIME][0] for k in (0, self.points - 1))
-            span = f" from {digits(float(first))} to {digits(float(last))} s"
-        return f"<Results of {len(self)} signals at {self.points} points{span}: {shortened(self)}>"
+        return f"<Results of {len(self)} signals at {self.points} points{self._span}: {shortened(self)}>"
+
+    @property
+    def _span(self) -> str:
+        """Of time, in words."""
+        if not self.points:
+            return ""
+        first, last = (self.part(k, k + 1)[_TIME][0] for k in (0, self.points - 1))
+        return f" from {digits(float(first))} to {digits(float(last))} s"
+
+    def _repr_html_(self) -> str:
+        """What a notebook shows: each signal with its unit, its end and its extremes."""
+        rows = [
+            [f"<code>{escaped(name)}</code>", escaped(self.units.get(name, "")), *_extremes(self[name])]
+            for name in itertools.islice(self, _LISTED)
+        ]
+        more = f", of which {_LISTED} are listed" if len(self) > _LISTED else ""
+        caption = f"Results of {len(self)} signals at {self.points} points{self._span}{more}"
+        return table(["signal", "unit", "last", "least", "greatest"], rows, caption)
+
+    def plot(self, *expressions: str, ax: Axes | None = None) -> Axes:
+        """Draw signals over time, or expressions of them.
+
+        Args:
+            expressions: such as ``"train[:].speed"`` or ``"train[i-1].position - train[i].position"``.
+            ax: to draw into; those of a new figure by default.
+
+        Raises:
+            ScenarioError: an expression speaks of what is not there.
+        """
+        return plot(expressions, self, ax)
+
+    def frame(self) -> pandas.DataFrame:
+        """All signals as a pandas DataFrame over time in s; their units stand in ``attrs["units"]``.
+
+        Raises:
+            RailcosimError: pandas is not installed.
+        """
+        try:
+            import pandas  # noqa: PLC0415
+        except ImportError as error:
+            raise RailcosimError("a frame is of pandas, which is not installed: pip install pandas") from error
+        made = pandas.DataFrame({name: self[name] for name in self}, index=pandas.Index(self.time, name=_TIME))
+        made.attrs["units"] = {name: self.units[name] for name in self if name in self.units}
+        return made
 
     @classmethod
     def load(cls, directory: str | Path) -> Results:
@@ -158,3 +207,12 @@ def _check_record(record: Mapping[str, Any]) -> None:
         wrong.append("figures_wanted")
     if wrong:
         raise ValueError(f"its {wrong[0]} in run.json is not what a run writes there")
+
+
+def _extremes(values: NDArray[Any]) -> list[str]:
+    """The last, the least and the greatest of a signal, as cells; of texts the last."""
+    if not len(values):
+        return ["–"] * 3
+    if values.dtype.kind not in "fiub":
+        return [escaped(values[-1]), "–", "–"]
+    return [number(float(value)) for value in (values[-1], np.nanmin(values), np.nanmax(values))]
