@@ -78,21 +78,30 @@ class Expression:
         """
         if not self.uses_index or not any(reference.uses_index for reference in self.references):
             return ()
-        names, key = Names.of(names), ("i", *(reference.key for reference in self.references))
+        names, key = Names.of(names), tuple(reference.key for reference in self.references)
         if key not in names.known:
             names.known[key] = self._indices(names)
         found: tuple[int, ...] = names.known[key]
         return found
 
     def _indices(self, names: Names) -> tuple[int, ...]:
-        last = min(2 * names.largest + 1, _MAX_INDEX + len(names))
         first = 1
         if not any(reference.counts_instances for reference in self.references):
             begins = tuple(f"{reference.array}[" for reference in self.references if reference.uses_index)
             first = max(min(numbers_of(name for name in names if name.startswith(begins)), default=1), -_MAX_INDEX)
-        plan, count = Plan(names), self.count(names)
-        bindings = ((i, self._bound(plan, {"i": i, "count": count})) for i in range(min(first, 1), last + 1))
-        return tuple(i for i, binding in bindings if all(binding.found(reference) for reference in self.references))
+        found = [self._places(reference, names, min(first, 1)) for reference in self.references]
+        return tuple(sorted(found[0].intersection(*found[1:])))
+
+    def _places(self, reference: Reference, names: Names, first: int) -> frozenset[int]:
+        """Every i, from the first one on, for which a reference exists."""
+        count = self.count(names)
+        key = ("i", reference.key, first, count)
+        if key not in names.known:
+            plan, last = Plan.of(names), min(2 * names.largest + 1, _MAX_INDEX + len(names))
+            bindings = ((i, self._bound(plan, {"i": i, "count": count})) for i in range(first, last + 1))
+            names.known[key] = frozenset(i for i, binding in bindings if binding.found(reference))
+        found: frozenset[int] = names.known[key]
+        return found
 
     def instances(self, names: Collection[str]) -> tuple[int | None, ...]:
         """The indices to evaluate it for: `indices`, or (None,) when it has no free index."""
@@ -124,7 +133,7 @@ class Expression:
         if not instances:
             return [Problem(f"'{self.text}'", "there is no i for which all of its signals exist", "mend the indices")]
         try:
-            self.evaluate(Prepared(Plan.of(names), Rehearsal(names)), instances[0], **dict.fromkeys(constants, 1.0))
+            self.evaluate(Plan.of(names).rehearsal, instances[0], **dict.fromkeys(constants, 1.0))
         except WindowError:
             pass  # the rehearsal is shorter than the run
         except ExpressionError as error:
@@ -147,7 +156,7 @@ class Expression:
     def _exists(self, reference: Reference, names: Collection[str]) -> bool:
         """Whether it stands for something, for some i at least."""
         alone = Expression(reference.text, reference)
-        return any(any(alone.resolve(names, index)) for index in alone.instances(names))
+        return bool(alone.indices(names)) if reference.uses_index else any(alone.resolve(names))
 
     def _bound(self, plan: Plan, constants: Mapping[str, Any]) -> Binding:
         every = {**CONSTANTS, **constants}

@@ -59,10 +59,13 @@ class Function:
 
 def logical(operation: Callable[..., Value], *operands: Value) -> Value:
     """A comparison or logical operation whose result is NaN wherever an operand is."""
-    numbers = np.broadcast_arrays(*(np.asarray(x, dtype=np.float64) for x in operands))
-    unknown = np.logical_or.reduce([np.isnan(x) for x in numbers])
+    numbers = [np.asarray(x, dtype=np.float64) for x in operands]
     result = operation(*numbers)
-    return np.where(unknown, np.nan, result) if unknown.any() else np.asarray(result)
+    for x in numbers:
+        unknown = np.isnan(x)
+        if unknown.any():
+            result = np.where(unknown, np.nan, result)
+    return np.asarray(result)
 
 
 def where(condition: Value, then: Value, otherwise: Value) -> Value:

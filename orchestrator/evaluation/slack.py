@@ -3,6 +3,7 @@
 Numbers that differ by rounding are equal: their slack is 0.
 """
 
+from functools import reduce
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -61,19 +62,16 @@ def _size(node: Node, scope: Scope) -> NDArray[np.float64]:
             parts = [_size(argument, scope) for argument in arguments]
         case _:
             return np.abs(np.asarray(evaluate(node, scope), dtype=np.float64))
-    return np.asarray(np.maximum.reduce(np.broadcast_arrays(*parts)))
+    return np.asarray(reduce(np.maximum, parts))
 
 
 def _compare(operator: str, left: NDArray[Any], right: NDArray[Any], rounding: NDArray[np.float64]) -> Slack:
     a, b = np.asarray(left, dtype=np.float64), np.asarray(right, dtype=np.float64)
-    equal = (a == b) | (np.abs(b - a) <= np.where(np.isfinite(rounding), rounding, 0.0))
-    difference = np.where(equal, 0.0, b - a)  # inf - inf would be NaN
-    slack, holds = {
-        "<": (difference, (a < b) & ~equal),
-        "<=": (difference, (a <= b) | equal),
-        ">": (-difference, (a > b) & ~equal),
-        ">=": (-difference, (a >= b) | equal),
-        "==": (-np.abs(difference), equal),
-        "!=": (np.abs(difference), ~equal & ~np.isnan(difference)),
-    }[operator]
-    return Slack(np.asarray(holds), np.asarray(slack))
+    gap = b - a
+    equal = (a == b) | (np.abs(gap) <= np.where(np.isfinite(rounding), rounding, 0.0))
+    difference = np.where(equal, 0.0, gap)  # inf - inf would be NaN
+    if operator in ("==", "!="):
+        size = np.abs(difference)
+        return Slack(equal, -size) if operator == "==" else Slack(~equal & ~np.isnan(size), size)
+    slack = difference if operator in ("<", "<=") else -difference
+    return Slack(slack > 0.0 if operator in ("<", ">") else slack >= 0.0, slack)

@@ -5,6 +5,7 @@ at it together.
 """
 
 from collections.abc import Callable, Collection, Hashable, Mapping
+from functools import cached_property
 from typing import Any, TypeAlias
 
 import numpy as np
@@ -13,7 +14,7 @@ from numpy.typing import NDArray
 from ..errors import ExpressionError, WindowError
 from .functions import Function, Value
 from .reducers import Fold, Selection, Span, Window, nothing_in_window, scalar, span_of
-from .signals import Part, Signals, parts_of
+from .signals import Part, Rehearsal, Signals, parts_of
 from .vocabulary import Names
 
 
@@ -90,6 +91,11 @@ class Plan:
         names = Names.of(names)
         plan: Plan = names.known.setdefault("plan", cls(names))
         return plan
+
+    @cached_property
+    def rehearsal(self) -> "Prepared":
+        """A run that is made up, to see what can go wrong in one."""
+        return Prepared(self, Rehearsal(self.names))
 
     def term(self, key: Hashable, calculate: "Callable[[Frame], Value]", *of: Term) -> Term:
         """The one term with this key."""
@@ -318,7 +324,8 @@ class _Look:
                 except WindowError as error:
                     self._found[member.key] = error
         for member in self._members:
-            self._found.setdefault(member.key, WindowError(nothing_in_window()))
+            if member.key not in self._found:
+                self._found[member.key] = WindowError(nothing_in_window())
 
 
 def _flat(argument: Argument) -> list[Term]:
