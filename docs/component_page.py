@@ -298,8 +298,8 @@ def _excited(component: Component) -> tuple[dict[str, Any], list[list[Slot]]]:
 
 
 def _svg(result: Mapping[str, Any], panels: list[list[Slot]], across: Slot | None = None) -> str:
-    import matplotlib as mpl  # noqa: PLC0415 (slow)
-    from matplotlib.figure import Figure  # noqa: PLC0415
+    import matplotlib as mpl
+    from matplotlib.figure import Figure
 
     x = result[across.name if across else "time"]
     label = f"{across.name} in {across.unit}" if across else "time in s"

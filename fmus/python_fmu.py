@@ -8,15 +8,11 @@ from __future__ import annotations
 
 from pathlib import Path
 
-import pythonfmu
-
 from ..components.component import Component
 from .description import write
 from .documentation import files as documentation
 from .embed import embedded_files
 from .identity import digest_of, given_values
-
-_WRAPPERS = Path(pythonfmu.__file__).parent / "resources" / "binaries"
 
 
 def contents(component: Component, digest: str) -> dict[str, bytes]:
@@ -29,6 +25,9 @@ def contents(component: Component, digest: str) -> dict[str, bytes]:
     Raises:
         ComponentError: the component cannot be embedded.
     """
+    import pythonfmu
+
+    wrappers = Path(pythonfmu.__file__).parent / "resources" / "binaries"
     cls = type(component)
     files, module = embedded_files(cls)
     arguments = given_values(component)
@@ -39,7 +38,7 @@ def contents(component: Component, digest: str) -> dict[str, bytes]:
     archive = {f"resources/{package}/{name}": text.encode() for name, text in files.items()}
     archive[f"resources/{slave}.py"] = _slave_module(package, module, cls.__qualname__, arguments).encode()
     archive["resources/slavemodule.txt"] = slave.encode()
-    for library in sorted(_WRAPPERS.glob("*/*pythonfmu-export.*")):
+    for library in sorted(wrappers.glob("*/*pythonfmu-export.*")):
         archive[f"binaries/{library.parent.name}/{cls.__name__}{library.suffix}"] = library.read_bytes()
     archive["modelDescription.xml"] = write(component, "python", digest)
     return archive | documentation(component, "python")

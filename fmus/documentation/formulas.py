@@ -64,8 +64,8 @@ class Formulas:
 @functools.cache
 def _laid_out(latex: str) -> tuple[list[Any], dict[str, str], list[str], str, tuple[float, ...]]:
     """Letters with their places, outlines by letter, bars, the box, and width, height and depth; the same each time."""
-    from matplotlib.font_manager import FontProperties  # noqa: PLC0415 (slow; a cache hit does not need it)
-    from matplotlib.textpath import TextToPath  # noqa: PLC0415
+    from matplotlib.font_manager import FontProperties
+    from matplotlib.textpath import TextToPath
 
     font, text = FontProperties(math_fontfamily="cm"), TextToPath()
     try:
@@ -83,7 +83,7 @@ def _laid_out(latex: str) -> tuple[list[Any], dict[str, str], list[str], str, tu
 
 
 def _path(points: Any, codes: Any) -> str:
-    from matplotlib.path import Path  # noqa: PLC0415
+    from matplotlib.path import Path
 
     pieces = []
     for flat, code in Path(points, codes).iter_segments(simplify=False):

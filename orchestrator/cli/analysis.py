@@ -8,10 +8,6 @@ from typing import Annotated, Any
 import typer
 
 from .. import world
-from ..comparison import compare as compare_systems
-from ..comparison import read_directions, variants
-from ..figures import remove_drawn
-from ..report import REPORT_FILE, check_drawable, write_report
 from .options import (
     FAILED,
     FMU_FAILED,
@@ -33,7 +29,6 @@ from .options import (
     interrupted,
     load_system,
 )
-from .printing import and_figures, open_console, say, show_comparison, show_page, show_progress
 
 Scenarios = Annotated[
     list[str], typer.Argument(metavar="SCENARIO...", help="Shipped scenarios (see 'orchestrate list'), or .toml files.")
@@ -74,6 +69,11 @@ def compare(
     variant are parted by commas: --swap cruise=A,train=B. Exit codes: 0 fine; 1 a requirement failed in a variant; 2
     the input is wrong; 3 a variant failed; 130 interrupted by Ctrl-C, 143 by SIGTERM, 129 by SIGHUP.
     """
+    from ..comparison import compare as compare_systems
+    from ..comparison import read_directions, variants
+    from ..report import REPORT_FILE, check_drawable, write_report
+    from .printing import show_comparison, show_page, show_progress
+
     if report:
         check_drawable()
     systems = variants(
@@ -145,15 +145,17 @@ def linearize(
 
     Exit codes: 0 stable (string stability is told, not judged); 1 not stable; 2 the input is wrong; 3 an FMU failed.
     """
-    # SciPy, which only this command needs, would slow every other one down.
-    from ..linearization import (  # noqa: PLC0415
+    from ..figures import remove_drawn
+    from ..linearization import (
         draw_linear,
         stability,
         string_stability,
         write_linear,
     )
-    from ..linearization import linearize as linearize_system  # noqa: PLC0415
-    from .printing.linear import show_linear  # noqa: PLC0415
+    from ..linearization import linearize as linearize_system
+    from .lines import and_figures
+    from .printing import open_console, say, show_progress
+    from .printing.linear import show_linear
 
     if duration is not None and not 0.0 < duration < float("inf"):
         raise typer.BadParameter("it must be a positive time in s.", param_hint="'--duration'")

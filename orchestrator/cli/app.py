@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import importlib.metadata
 import logging
 from collections.abc import Sequence
 from typing import Annotated
@@ -13,8 +12,8 @@ from ...components.errors import ComponentError
 from .. import world
 from ..errors import FmuError, RailcosimError, RunError, ScenarioError
 from . import analysis, models, reports, runs, scenarios
+from .lines import Log, folded, tell
 from .options import FMU_FAILED, OK, WRONG_INPUT
-from .printing import Log, folded, tell
 from .streams import flush_streams, secure_streams
 from .supervision import supervised
 
@@ -67,6 +66,8 @@ def _fail(messages: Sequence[str], code: int) -> int:
 
 def _version(wanted: bool) -> None:
     if wanted:
+        import importlib.metadata
+
         print(f"railcosim {importlib.metadata.version('railcosim')}")
         raise typer.Exit()
 

@@ -8,21 +8,11 @@ from typing import Annotated
 
 import typer
 
-from ...components import CATALOGUE
-from ...fmus.annotation import Annotation
-from ...fmus.build import package
-from ...fmus.release import default_directory, release
 from ..errors import ScenarioError
-from ..fmi import Workspace, is_fmu_name, load_fmu
-from ..packing import pack as pack_system
-from ..problems import Problem, suggestion
-from ..scenario import shipped
-from ..times import digits
-from ..validation import TIMEOUT
-from ..validation import validate as validate_fmu
 from .options import (
     FAILED,
     OK,
+    PROBE_SECONDS,
     Algorithm,
     PackagingName,
     Preset,
@@ -37,17 +27,6 @@ from .options import (
     build_arguments,
     load_system,
 )
-from .printing import (
-    open_console,
-    say,
-    show_compilations,
-    show_interface,
-    show_notes,
-    show_report,
-    show_system,
-    tell,
-)
-from .skeleton import write_skeleton
 
 
 def describe(
@@ -65,6 +44,15 @@ def describe(
     it comes from, and the kind that a run takes. Of a scenario its source, presets, instances, connections, and what is
     judged and drawn; nothing that it names is imported. A component's file is.
     """
+    from ...components import CATALOGUE
+    from ...fmus.annotation import Annotation
+    from ...fmus.build import package
+    from ..fmi import Workspace, is_fmu_name, load_fmu
+    from ..problems import Problem, suggestion
+    from ..scenario import shipped
+    from ..times import digits
+    from .printing import open_console, say, show_compilations, show_interface, show_system
+
     arguments = build_arguments(builds)
     is_scenario = name.endswith(".toml") or name in dict(shipped())
     # Any other file is told for what it is: an SSP, a folder with an unpacked FMU.
@@ -125,6 +113,11 @@ def build(
     quiet: Quiet = False,
 ) -> None:
     """Build FMUs to keep, for other tools or for --swap; prints the files it wrote."""
+    from ...components import CATALOGUE
+    from ...fmus.release import default_directory, release
+    from .lines import tell
+    from .printing import show_compilations
+
     wanted = [*(names or []), *(CATALOGUE if every else [])]
     if not wanted:
         raise ScenarioError(f"name the components to build, or --all; there is {', '.join(CATALOGUE)}")
@@ -163,6 +156,9 @@ def pack(
     trust: Trust = False,
 ) -> None:
     """Write one FMU that holds a whole scenario, for another tool to run as a block."""
+    from ..packing import pack as pack_system
+    from .printing import open_console, say, show_compilations, show_notes
+
     system = load_system(scenario, preset, settings, builds, swaps, stop=stop, step=step, algorithm=algorithm)
     with show_compilations(quiet=False):
         packed = pack_system(system, output, expose=expose or (), platforms=(platforms or "").split(","), trusted=trust)
@@ -174,7 +170,7 @@ def pack(
 
 def validate(
     fmu: Annotated[Path, typer.Argument(help="Any FMI co-simulation FMU, ours or not.")],
-    timeout: Annotated[float, typer.Option(min=0.1, help="Longest time for one probe, in s.")] = TIMEOUT,
+    timeout: Annotated[float, typer.Option(min=0.1, help="Longest time for one probe, in s.")] = PROBE_SECONDS,
 ) -> None:
     """Check any FMU: archive, description, and probes that cannot take this program down.
 
@@ -182,6 +178,9 @@ def validate(
 
     Exit codes: 0 nothing failed; 1 something did; 2 the file is no FMU that could be used.
     """
+    from ..validation import validate as validate_fmu
+    from .printing import open_console, show_compilations, show_report
+
     with show_compilations(quiet=False, doing=f"reading and trying {fmu}"):
         report = validate_fmu(fmu, timeout=timeout)
     show_report(open_console(), report)
@@ -190,5 +189,7 @@ def validate(
 
 def new(path: Annotated[Path, typer.Argument(help="The file to write, such as my_controller.py.")]) -> None:
     """Write a commented controller to start from; it runs."""
+    from .skeleton import write_skeleton
+
     name = write_skeleton(path)
     print(f"{path} written. Try it:\n  orchestrate run comfort_cruise --swap cruise={shlex.quote(f'{path}:{name}')}")

@@ -3,15 +3,14 @@
 from __future__ import annotations
 
 from enum import StrEnum
-from typing import Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
 from ..errors import ScenarioError
-from ..figures import written_as
-from ..master import ALGORITHMS
-from ..scenario import load, parse_value
-from ..system import System
+
+if TYPE_CHECKING:
+    from ..system import System
 
 OK, FAILED, WRONG_INPUT, FMU_FAILED = 0, 1, 2, 3
 
@@ -53,8 +52,10 @@ Swap = Annotated[
 ]
 Stop = Annotated[float | None, typer.Option(help="Stop time in s.")]
 Step = Annotated[float | None, typer.Option(help="Communication step in s; sample times equal to it follow.")]
+ALGORITHM_NAMES = ("adaptive", "gauss-seidel", "iterative", "jacobi")
+"""Those of `master.ALGORITHMS`, as the command line needs them."""
 Algorithm = Annotated[
-    str | None, typer.Option(metavar=f"<{'|'.join(ALGORITHMS)}>", help="How the instances exchange values.")
+    str | None, typer.Option(metavar=f"<{'|'.join(ALGORITHM_NAMES)}>", help="How the instances exchange values.")
 ]
 Kind = Annotated[
     KindName,
@@ -99,11 +100,15 @@ Report = Annotated[
     bool,
     typer.Option("--report", help="Make report.html as well, a page to zoom and play in (extra 'report')."),
 ]
+PROBE_SECONDS = 60.0
+"""`validation.TIMEOUT`, as the command line needs it."""
 Quiet = Annotated[bool, typer.Option("--quiet", "-q", help="Print only errors, what was found, and what failed.")]
 
 
 def build_arguments(builds: list[str] | None) -> dict[str, Any]:
     """``carriages=8`` as on every command line: the value is TOML, or text."""
+    from ..scenario import parse_value
+
     arguments: dict[str, Any] = {}
     for text in builds or []:
         name, equals, value = text.partition("=")
@@ -125,6 +130,8 @@ def load_system(
     algorithm: str | None = None,
 ) -> System:
     """The scenario as the options of a command change it."""
+    from ..scenario import load
+
     return load(
         scenario,
         preset=preset,
@@ -139,4 +146,6 @@ def load_system(
 
 def draw_as(system: System, format: FormatName | None, dpi: float | None) -> None:
     """Let the figures of a system be written as the options say."""
+    from ..figures import written_as
+
     system.judged.figures = written_as(system.judged.figures, format and format.value, dpi)

@@ -7,8 +7,6 @@ from typing import Annotated
 
 import typer
 
-from ..report import write_report
-
 
 def report(
     results: Annotated[list[Path], typer.Argument(help="The directory of a run; of several, to see them together.")],
@@ -20,4 +18,6 @@ def report(
 
     The page is a file that opens in any browser, from disk and without a network. Needs the extra 'report'.
     """
+    from ..report import write_report
+
     print(write_report([path.parent if path.is_file() else path for path in results], output))

@@ -4,32 +4,12 @@ from __future__ import annotations
 
 from collections import Counter
 from pathlib import Path
-from typing import Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
 from .. import world
-from ..comparison import published_cases
 from ..errors import ScenarioError
-from ..evaluation import BAD, ComparedValue
-from ..figures import check_figures, draw, written_as
-from ..isolation import isolate
-from ..report import check_drawable, write_report
-from ..run import (
-    ROWS_FILE,
-    Finding,
-    Results,
-    Run,
-    StepCheck,
-    add_step_check,
-    at_half_the_step,
-    check_step,
-    execute,
-    go_on,
-    read_checkpoint,
-    recover_rows,
-)
-from ..scenario import load
 from .options import (
     FAILED,
     OK,
@@ -51,18 +31,10 @@ from .options import (
     interrupted,
     load_system,
 )
-from .printing import (
-    in_one_line,
-    open_console,
-    say,
-    show_cases,
-    show_findings,
-    show_page,
-    show_progress,
-    show_run,
-    show_values,
-    summary,
-)
+
+if TYPE_CHECKING:
+    from ..evaluation import ComparedValue
+    from ..run import Finding, Run, StepCheck
 
 
 def run(
@@ -124,6 +96,12 @@ def run(
     130 interrupted by Ctrl-C, 143 by SIGTERM, 129 by SIGHUP (what was computed is on disk). A second Ctrl-C ends it at
     once, also where an FMU does not return.
     """
+    from ..isolation import isolate
+    from ..report import check_drawable, write_report
+    from ..run import add_step_check, check_step, execute, go_on, read_checkpoint
+    from ..scenario import load
+    from .printing import show_page, show_progress, show_run
+
     if report:
         check_drawable()
     how: Any = {"figures": not no_figures, "threads": threads, "checkpoint_every": checkpoint_every}
@@ -170,6 +148,9 @@ def run(
 
 def _at_half_the_step(outcome: Run, kind: KindName, quiet: bool) -> Run | None:
     """The same run at half the step, in memory; None where there is nothing to compare it with."""
+    from ..run import at_half_the_step, execute
+    from .printing import show_progress
+
     if outcome.status != "completed":
         return None
     system = outcome.system
@@ -199,6 +180,11 @@ def reproduce(
     With --quiet only what failed, and one line. Exit code 1 if a value was missed, or one that is known to depart does
     so no more.
     """
+    from ..comparison import published_cases
+    from ..evaluation import BAD
+    from ..run import execute
+    from .printing import in_one_line, open_console, say, show_cases, show_findings, show_values, summary
+
     published: dict[str, list[ComparedValue]] = {}
     failed: dict[str, list[ComparedValue]] = {}
     every: list[ComparedValue] = []
@@ -252,6 +238,9 @@ def plot(
 
     Of a run that was killed, or still goes on, it writes results.csv as well.
     """
+    from ..figures import check_figures, draw, written_as
+    from ..run import ROWS_FILE, Results, recover_rows
+
     results = results.parent if results.is_file() else results
     loaded = Results.load(results)
     problems = [] if signals else check_figures(loaded.figures, [*loaded.names(), *loaded.parameters])

@@ -2,21 +2,17 @@
 
 from __future__ import annotations
 
-from ...components import CATALOGUE
-from ...fmus.description import summary
-from ..fmi import Workspace
-from ..master import ALGORITHMS
-from ..run import check as check_system
-from ..run import describe_stepping
-from ..scenario import load, shipped
-from ..times import digits
-from ..wiring import describe_topology
 from .options import Algorithm, Preset, Scenario, Set, Step, Stop, Swap, Trust, With, load_system
-from .printing import counted, open_console, say, show_compilations, show_notes
 
 
 def list_all() -> None:
     """List the shipped scenarios, components and master algorithms."""
+    from ...components import CATALOGUE
+    from ...fmus.description import summary
+    from ..master import ALGORITHMS
+    from ..scenario import load, shipped
+    from .printing import open_console, say
+
     out = open_console()
     say(out, "Scenarios (orchestrate run NAME)", "bold")
     for name, title in shipped():
@@ -49,6 +45,14 @@ def check(
 
     Of an FMU nothing is executed. The file of a Python component is, because it is imported.
     """
+    from ..fmi import Workspace
+    from ..run import check as check_system
+    from ..run import describe_stepping
+    from ..times import digits
+    from ..wiring import describe_topology
+    from .lines import counted
+    from .printing import open_console, say, show_compilations, show_notes
+
     system = load_system(scenario, preset, settings, builds, swaps, stop=stop, step=step, algorithm=algorithm)
     out = open_console()
     with Workspace() as workspace, show_compilations(quiet=False, doing="reading what it is made of"):

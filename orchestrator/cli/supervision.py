@@ -14,9 +14,8 @@ from pathlib import Path
 from .. import world
 from ..fmi.guard import NOTES, described, share_notes
 from ..isolation import CRASHES, end_with_parent, signal_name
-from ..run import conclude
+from .lines import tell
 from .options import FMU_FAILED, interrupted
-from .printing import tell
 
 _ASKING = {signal.SIGINT, signal.SIGTERM, *({signal.SIGHUP} if os.name == "posix" else ())}
 """Signals that ask for an end; `Interruption` listens to the same."""
@@ -121,6 +120,8 @@ def _interrupted(child: int, number: int) -> int:
 
 
 def _conclude(child: int, status: str, why: str) -> None:
+    from ..run import conclude
+
     if NOTES.directory:
         conclude(Path(NOTES.directory), child, status, why)
 

@@ -141,7 +141,7 @@ def _style(variant: int, colour: Any, by_variant: bool) -> dict[str, Any]:
 
 def _legend(ax: Axes, labels: Mapping[str, Any], names: Sequence[str], drawn: set[int], by_variant: bool) -> None:
     """Curves by colour, then variants by dashes; variants by colour where there is one curve each."""
-    from matplotlib.lines import Line2D  # noqa: PLC0415
+    from matplotlib.lines import Line2D
 
     handles = []
     if not by_variant:

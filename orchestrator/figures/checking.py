@@ -75,8 +75,8 @@ def _formula_problems(table: Mapping[str, Any]) -> Iterator[Problem]:
 def _formula_error(text: str) -> str:
     if "$" not in text:
         return ""
-    from matplotlib.cbook import is_math_text  # noqa: PLC0415 (which takes a third of a second)
-    from matplotlib.mathtext import MathTextParser  # noqa: PLC0415
+    from matplotlib.cbook import is_math_text
+    from matplotlib.mathtext import MathTextParser
 
     try:
         if is_math_text(text):

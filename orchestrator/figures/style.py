@@ -75,9 +75,9 @@ def page(
         share_x: whether all panels have the x axis of the last.
         dpi: dots per inch, `DPI` by default; of a vector format it only matters to what it shows as an image.
     """
-    import matplotlib as mpl  # noqa: PLC0415
-    from matplotlib.backends.backend_agg import FigureCanvasAgg  # noqa: PLC0415
-    from matplotlib.figure import Figure  # noqa: PLC0415
+    import matplotlib as mpl
+    from matplotlib.backends.backend_agg import FigureCanvasAgg
+    from matplotlib.figure import Figure
 
     with mpl.rc_context(_STYLE):
         figure = Figure(figsize=size, dpi=dpi or DPI, layout="constrained")
@@ -104,7 +104,7 @@ def colour(k: int, count: int) -> Any:
     """The colour of one of `count` curves: of a palette, or along a scale where there are more than it has."""
     if count <= len(COLOURS):
         return COLOURS[k]
-    import matplotlib as mpl  # noqa: PLC0415
+    import matplotlib as mpl
 
     return mpl.colormaps["viridis"](0.92 * k / (count - 1))
 

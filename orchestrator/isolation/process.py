@@ -268,6 +268,6 @@ _KILL = 9
 
 def _default_limit() -> float:
     """Half of the memory that the machine has, in MiB."""
-    import psutil  # noqa: PLC0415 (which only those need who isolate an FMU)
+    import psutil
 
     return float(psutil.virtual_memory().total) / 2**21

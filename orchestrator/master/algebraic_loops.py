@@ -10,13 +10,12 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable, Mapping, Sequence
 
-import networkx as nx
 import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import FmuError
 from ..fmi import Interface, Slave
-from ..wiring import Link, is_direct
+from ..wiring import Link, circles, graph_of, is_direct, leading_to
 from .exchange import Exchange
 
 _DIFFERENCE = 1e-7
@@ -38,11 +37,11 @@ def find_loops(
         links: scalar connections.
         doubtful: whether every output without a list counts as dependent on all inputs, as the standard has it.
     """
-    graph = nx.DiGraph()
     links = [link for link in links if not link.delay]
     inputs: dict[str, set[str]] = {}
+    edges: list[tuple[tuple[str, str, str], tuple[str, str, str]]] = []
     for link in links:
-        graph.add_edge(("output", *link.source), ("input", *link.target))
+        edges.append((("output", *link.source), ("input", *link.target)))
         inputs.setdefault(link.target[0], set()).add(link.target[1])
     for instance, name in {link.source for link in links}:
         interface = interfaces[instance]
@@ -52,10 +51,10 @@ def find_loops(
         listed = output.dependencies
         fed = inputs.get(instance, set())
         depends = (fed if interface.annotation or doubtful else set()) if listed is None else fed & listed
-        graph.add_edges_from((("input", instance, i), ("output", instance, name)) for i in depends)
-    order = {link.source: k for k, link in reversed(list(enumerate(links)))}
+        edges += ((("input", instance, i), ("output", instance, name)) for i in depends)
+    order = {tuple(link.source): k for k, link in reversed(list(enumerate(links)))}
     found = []
-    for members in nx.strongly_connected_components(graph):
+    for members in circles(graph_of(edges)):
         outputs = sorted((node[1:] for node in members if node[0] == "output"), key=order.__getitem__)
         if len(members) > 1:
             found.append(tuple(".".join(output) for output in outputs))
@@ -74,9 +73,8 @@ def find_feeders(interfaces: Mapping[str, Interface], links: Iterable[Link], mem
         and is_direct(interfaces[link.source[0]], interfaces[link.source[0]].variables[link.source[1]])
         and not interfaces[link.source[0]].sampled
     ]
-    graph = nx.DiGraph((link.source[0], link.target[0]) for link in links)
     within = set(members)
-    return {name for member in within & set(graph) for name in nx.ancestors(graph, member)} - within
+    return leading_to(graph_of((link.source[0], link.target[0]) for link in links), within) - within
 
 
 class LoopSolver:
@@ -145,7 +143,7 @@ class LoopSolver:
         found = given + self._mismatch(given, time)
         left = _relative(found - given, found)
         if not left <= _SETTLED:
-            from scipy import optimize  # noqa: PLC0415 (a heavy import for a rare case)
+            from scipy import optimize
 
             self.solutions += 1
             with np.errstate(all="ignore"):

@@ -10,15 +10,14 @@ it is asked first is left alone from then on, and told.
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from typing import Any
-
-import networkx as nx
+from typing import Any, TypeAlias
 
 from ..errors import FmuError, LostError
 from ..fmi import Interface
-from ..wiring import Link
+from ..wiring import Link, condensed, generations
 from .exchange import Exchange
 
+_Output: TypeAlias = tuple[str, str]
 _REFUSALS = ("error", "discard")
 """Statuses by which an FMU says that it does not do this, and still lives."""
 
@@ -101,13 +100,12 @@ class Refresher:
 def _stages(interfaces: Mapping[str, Interface], links: Sequence[Link]) -> list[tuple[list[str], bool]]:
     """Instances with direct outputs in the order to visit them, and whether a stage's go round in a circle."""
     graph, rank = _graph(interfaces, links), {name: k for k, name in enumerate(interfaces)}
-    condensed = nx.condensation(graph)
     found: list[tuple[list[str], bool]] = []
-    for generation in nx.topological_generations(condensed):
+    for generation in generations(condensed(graph)):
         single: set[str] = set()
-        for members in (condensed.nodes[group]["members"] for group in generation):
+        for members in generation:
             names = {output[0] for output in members}
-            if len(members) > 1 or any(graph.has_edge(output, output) for output in members):
+            if len(members) > 1 or any(output in graph[output] for output in members):
                 found.append((sorted(names, key=rank.__getitem__), True))
             else:
                 single |= names
@@ -116,22 +114,22 @@ def _stages(interfaces: Mapping[str, Interface], links: Sequence[Link]) -> list[
     return found
 
 
-def _graph(interfaces: Mapping[str, Interface], links: Sequence[Link]) -> nx.DiGraph:
+def _graph(interfaces: Mapping[str, Interface], links: Sequence[Link]) -> dict[_Output, dict[_Output, None]]:
     """Outputs that may depend directly on a connected input, each before those that depend on it."""
     fed: dict[str, set[str]] = {}
     for link in links:
         fed.setdefault(link.target[0], set()).add(link.target[1])
-    graph = nx.DiGraph()
+    graph: dict[_Output, dict[_Output, None]] = {}
     receivers: dict[tuple[str, str], list[tuple[str, str]]] = {}
     for instance in (name for name in fed if not interfaces[name].sampled):
         for output in interfaces[instance].of("output"):
             listed = output.dependencies
             on = fed[instance] if listed is None else fed[instance] & listed
             if on:
-                graph.add_node((instance, output.name))
+                graph[instance, output.name] = {}
             for name in on:
                 receivers.setdefault((instance, name), []).append((instance, output.name))
     for link in links:
         if not link.delay and link.source in graph:
-            graph.add_edges_from((link.source, one) for one in receivers.get(link.target, ()))
+            graph[link.source].update(dict.fromkeys(receivers.get(link.target, ())))
     return graph

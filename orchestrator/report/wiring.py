@@ -7,9 +7,8 @@ from collections import Counter, defaultdict
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-import networkx as nx
-
 from ..markup import escaped
+from ..wiring import condensed, generations, graph_of
 
 _WIDTH, _HEIGHT, _ACROSS, _DOWN, _EDGE = 150, 34, 250, 54, 20
 _LATE = re.compile(r"^(\S+) receives (\S+) ")
@@ -60,18 +59,13 @@ def _places(
     boxes: Sequence[str], wires: Sequence[tuple[str, str]], delayed: set[tuple[str, str]]
 ) -> dict[str, tuple[int, int]]:
     """Column and row of each box: a box stands right of all that it listens to in the same step."""
-    graph = nx.DiGraph()
-    graph.add_nodes_from(boxes)
-    graph.add_edges_from(pair for pair in wires if pair not in delayed)
-    whole = nx.condensation(graph)
-    depth: dict[int, int] = {}
-    for node in nx.topological_sort(whole):
-        depth[node] = 1 + max((depth[before] for before in whole.predecessors(node)), default=-1)
+    graph = graph_of((pair for pair in wires if pair not in delayed), boxes)
     column: dict[str, int] = {}
-    for node in whole:
-        members = sorted(whole.nodes[node]["members"], key=boxes.index)
-        for k, name in enumerate(members):  # a loop is laid out along its order
-            column[name] = depth[node] + k % 2 * (len(members) > 1)
+    for depth, generation in enumerate(generations(condensed(graph))):
+        for group in generation:
+            members = sorted(group, key=boxes.index)
+            for k, name in enumerate(members):  # a loop is laid out along its order
+                column[name] = depth + k % 2 * (len(members) > 1)
     rows: dict[int, int] = defaultdict(int)
     found = {}
     for name in boxes:

@@ -4,8 +4,6 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-import psutil
-
 from ..system import System
 
 _VALUE = 8
@@ -51,6 +49,8 @@ def size_of(system: System, signals: int) -> Size:
 
 def tell_size(system: System, signals: int) -> str:
     """One sentence where results will be large for any machine, or for this one; nothing otherwise."""
+    import psutil
+
     size, free = size_of(system, signals), float(psutil.virtual_memory().available)
     if size.memory <= min(_LARGE, _SHARE * free):
         return ""

@@ -1,3 +1,4 @@
+from .graphs import circles, condensed, generations, graph_of, in_sequence, leading_to
 from .inputs import unmet_samples
 from .links import Link, Wiring, described, is_direct
 from .order import Order, derive_order
@@ -15,13 +16,19 @@ __all__ = [
     "Train",
     "Wiring",
     "bounded",
+    "circles",
+    "condensed",
     "derive_order",
     "describe_topology",
     "described",
     "find_controls",
     "find_followings",
     "find_trains",
+    "generations",
+    "graph_of",
+    "in_sequence",
     "is_direct",
+    "leading_to",
     "unmet_samples",
     "wire",
 ]

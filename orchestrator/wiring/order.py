@@ -9,9 +9,9 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
+from graphlib import CycleError
 
-import networkx as nx
-
+from .graphs import condensed, generations, graph_of, in_sequence
 from .links import Link
 
 
@@ -49,15 +49,11 @@ def _before(link: Link) -> tuple[str, str]:
 
 def _sort(instances: Sequence[str], links: Sequence[Link]) -> tuple[str, ...]:
     rank = {name: k for k, name in enumerate(instances)}
-    graph = nx.DiGraph()
-    graph.add_nodes_from(instances)
-    graph.add_edges_from(_before(link) for link in links)
-    condensed = nx.condensation(graph)
-    groups = {g: sorted(condensed.nodes[g]["members"], key=rank.__getitem__) for g in condensed}
     sequence: list[str] = []
-    for generation in nx.topological_generations(condensed):
-        for group in sorted(generation, key=lambda g: rank[groups[g][0]]):
-            sequence.extend(_sort_cycle(groups[group], links, rank))
+    for generation in generations(condensed(graph_of(map(_before, links), instances))):
+        groups = [sorted(group, key=rank.__getitem__) for group in generation]
+        for group in sorted(groups, key=lambda members: rank[members[0]]):
+            sequence.extend(_sort_cycle(group, links, rank))
     return tuple(sequence)
 
 
@@ -66,12 +62,11 @@ def _sort_cycle(members: list[str], links: Sequence[Link], rank: dict[str, int])
     if len(members) == 1:
         return members
     inside = set(members)
-    graph = nx.DiGraph()
-    graph.add_nodes_from(members)
-    graph.add_edges_from(_before(x) for x in links if x.direct and inside >= {x.source[0], x.target[0]})
-    if not nx.is_directed_acyclic_graph(graph):
+    edges = (_before(x) for x in links if x.direct and inside >= {x.source[0], x.target[0]})
+    try:
+        return in_sequence(graph_of(edges, members), key=rank.__getitem__)
+    except CycleError:
         return members
-    return list(nx.lexicographical_topological_sort(graph, key=rank.__getitem__))
 
 
 def _late(sequence: Sequence[str], links: Sequence[Link]) -> Iterable[str]:

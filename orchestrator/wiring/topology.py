@@ -10,11 +10,11 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 
-import networkx as nx
 import numpy as np
 from numpy.typing import NDArray
 
 from ..fmi import Interface
+from .graphs import circles, graph_of
 from .links import Link, Wiring
 
 SIDES = ("ahead", "behind", "leader")
@@ -102,11 +102,11 @@ def topologies(interfaces: Mapping[str, Interface], wiring: Wiring) -> list[Topo
             and (source := _origin(_source(side, fed[controller], interfaces[controller]), known, feeders)) is not None
             and source != own
         }
-    graph = nx.Graph()
-    graph.add_nodes_from(heard)
-    graph.add_edges_from((own, other) for own, neighbours in heard.items() for other in neighbours.values())
+    edges = [(own, other) for own, neighbours in heard.items() for other in neighbours.values()]
+    graph = graph_of([*edges, *((other, own) for own, other in edges)], heard)
     rank = {name: k for k, name in enumerate(heard)}
-    groups = [sorted(group, key=rank.__getitem__) for group in nx.connected_components(graph) if len(group) > 1]
+    groups = [sorted(group, key=rank.__getitem__) for group in circles(graph) if len(group) > 1]
+    groups.sort(key=lambda group: rank[group[0]])
     return [Topology(tuple(group), tuple(heard[name] for name in group)) for group in groups]
 
 

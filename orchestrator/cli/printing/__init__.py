@@ -1,6 +1,6 @@
 """What the commands print: on a terminal in colour, in a pipe or file without.
 
-`linear` and `study` are for the commands that need them to import: they bring SciPy and what is known of studies.
+`linear` is for the command that needs it to import: it brings SciPy.
 """
 
 from ....components.doors import hang_door

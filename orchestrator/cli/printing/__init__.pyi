@@ -1,5 +1,5 @@
 from .comparison import show_comparison
-from .console import Log, and_figures, counted, folded, open_console, say, show_notes, show_page, tell
+from .console import open_console, say, show_notes, show_page
 from .findings import show_findings
 from .interface import show_interface
 from .outcome import show_run
@@ -9,10 +9,6 @@ from .validation import show_report
 from .verdicts import in_one_line, show_values, summary
 
 __all__ = [
-    "Log",
-    "and_figures",
-    "counted",
-    "folded",
     "in_one_line",
     "open_console",
     "say",
@@ -29,5 +25,4 @@ __all__ = [
     "show_system",
     "show_values",
     "summary",
-    "tell",
 ]

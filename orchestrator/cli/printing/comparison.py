@@ -9,7 +9,8 @@ from rich.table import Table
 from rich.text import Text
 
 from ...comparison import Comparison
-from .console import and_figures, open_console, say, show_notes
+from ..lines import and_figures
+from .console import open_console, say, show_notes
 from .findings import show_findings
 from .tables import fits, number, prefixed, show_reasons, table, verdict
 

@@ -8,7 +8,7 @@ from rich.cells import cell_len
 from rich.console import Console
 from rich.text import Text
 
-from .console import printable
+from ..lines import printable
 
 _GAP = "  "
 _NARROWEST = 10

@@ -11,7 +11,8 @@ from ....fmus.references import file_and_class
 from ...evaluation import compare_metrics
 from ...run import CHECKPOINT_FILE, Finding, Run, StepChange, StepCheck
 from ...times import digits
-from .console import and_figures, counted, open_console, say, show_notes
+from ..lines import and_figures, counted
+from .console import open_console, say, show_notes
 from .findings import show_findings
 from .metrics import show_metrics
 from .tables import prefixed

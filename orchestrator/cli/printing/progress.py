@@ -14,7 +14,8 @@ from ....fmus import toolchain
 from ...run import CSV_FILE, Telling
 from ...run import Progress as OnProgress
 from ...times import digits
-from .console import open_console, printable, tell
+from ..lines import printable, tell
+from .console import open_console
 
 
 class Shown:

@@ -12,7 +12,8 @@ from ...names import SignalName
 from ...scenario import import_notes
 from ...system import Connection, Event, Instance, Provenance, System
 from ...times import digits
-from .console import counted, say, show_notes
+from ..lines import counted
+from .console import say, show_notes
 from .tables import table
 
 

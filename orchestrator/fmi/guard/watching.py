@@ -11,8 +11,6 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import Any, Protocol
 
-import fmpy
-
 from ...errors import FmuError
 from .notes import NOTES, described
 
@@ -156,6 +154,8 @@ def loading(path: Path) -> Iterator[None]:
 def unload(handle: int) -> None:
     """Take a library out of memory, while others use the interpreter, too."""
     if _CLOSE is None:
+        import fmpy  # noqa: PLC0415 (a parent that waits for a command to end takes no library out)
+
         fmpy.freeLibrary(handle)
     else:
         _CLOSE(handle)

@@ -16,14 +16,13 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
-import networkx as nx
 import numpy as np
 
 from ...errors import CouplingError, FmuError, StoppedError
 from ...fmi import Interface
 from ...system import System
 from ...times import digits
-from ...wiring import Link, Wiring, derive_order
+from ...wiring import Link, Wiring, condensed, derive_order, graph_of, in_sequence
 from ..coupling import Coupling
 from .acceleration import ACCELERATIONS, Vector
 from .algorithm import Fit, FixedStep
@@ -48,20 +47,14 @@ def find_blocks(interfaces: Mapping[str, Interface], links: Iterable[Link]) -> B
     links = [link for link in links if not link.delay]
     inner = [link for link in links if {link.source[0], link.target[0]} <= set(sampled)]
     sweep = derive_order(sampled, inner).sequence
-    graph = nx.DiGraph()
-    graph.add_nodes_from(name for name in interfaces if name not in sweep)
+    others = dict.fromkeys(name for name in interfaces if name not in sweep)
     ends = [(link.source[0], link.target[0]) for link in links]
-    graph.add_edges_from((a, b) for a, b in ends if a in graph and b in graph)
+    graph = graph_of(((a, b) for a, b in ends if a in others and b in others), others)
     rank = {name: k for k, name in enumerate(interfaces)}
-    condensed = nx.condensation(graph)
-    groups = [
-        tuple(sorted(condensed.nodes[g]["members"], key=rank.__getitem__))
-        for g in nx.lexicographical_topological_sort(
-            condensed, key=lambda g: min(rank[n] for n in condensed.nodes[g]["members"])
-        )
-    ]
-    cyclic = frozenset(n for group in groups for n in group if len(group) > 1 or graph.has_edge(n, n))
-    return Blocks(sweep, tuple(groups), cyclic)
+    sequence = in_sequence(condensed(graph), key=lambda group: min(rank[name] for name in group))
+    groups = tuple(tuple(sorted(group, key=rank.__getitem__)) for group in sequence)
+    cyclic = frozenset(n for group in groups for n in group if len(group) > 1 or n in graph[n])
+    return Blocks(sweep, groups, cyclic)
 
 
 @dataclass

@@ -13,7 +13,6 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import TypeAlias
 
-import networkx as nx
 import numpy as np
 from numpy.typing import NDArray
 
@@ -24,7 +23,7 @@ from ...master import ALGORITHMS, find_loops
 from ...names import SignalName
 from ...system import System
 from ...times import digits
-from ...wiring import Link
+from ...wiring import Link, circles, graph_of
 from .finding import Finding
 from .swings import find_swings
 from .tail import Tail
@@ -125,8 +124,8 @@ def _finding(found: Mapping[str, Growth], signals: Points, how: str, advice: str
 
 def _cycles(links: Sequence[Link]) -> list[list[Link]]:
     """The connections within each group of instances that act on each other, or of one that acts on itself."""
-    graph = nx.DiGraph((link.source[0], link.target[0]) for link in links)
-    groups = {name: k for k, names in enumerate(nx.strongly_connected_components(graph)) for name in names}
+    graph = graph_of((link.source[0], link.target[0]) for link in links)
+    groups = {name: k for k, names in enumerate(circles(graph)) for name in names}
     inner: dict[int, list[Link]] = {}
     for link in links:
         if groups[link.source[0]] == groups[link.target[0]]:

@@ -47,7 +47,7 @@ def mean(values: NDArray[np.float64], independent: float, level: float) -> Estim
     centre = float(values.mean())
     if independent < 2:
         return Estimate(centre)
-    from scipy import stats  # noqa: PLC0415
+    from scipy import stats
 
     half = float(stats.t.ppf((1 + level) / 2, independent - 1) * values.std(ddof=1) / math.sqrt(independent))
     return Estimate(centre, centre - half, centre + half)
@@ -66,7 +66,7 @@ def quantile(ordered: NDArray[np.float64], share: float, independent: float, lev
     value = float(np.quantile(ordered, share, method="inverted_cdf"))
     if not independent:
         return Estimate(value)
-    from scipy import stats  # noqa: PLC0415
+    from scipy import stats
 
     trials = max(1, round(independent))
     below = int(stats.binom.ppf((1 - level) / 2, trials, share))

@@ -149,7 +149,7 @@ def _indices(
 
 
 def _of_samples(x: Array, y: Array, level: float) -> Estimate:
-    from SALib.analyze import rbd_fast  # noqa: PLC0415 (an extra)
+    from SALib.analyze import rbd_fast
 
     made = rbd_fast.analyze({"num_vars": 1, "names": ["x"]}, x[:, None], y, conf_level=level, seed=1)
     return _around(made["S1"][0], made["S1_conf"][0])
@@ -171,7 +171,7 @@ def _corrected(x: Array, y: Array) -> float:
 
 def _saltelli(runs: Any, y: Array, width: int, level: float) -> tuple[list[tuple[Estimate, Estimate]], str]:
     """Indices of the blocks that are whole: one run that failed takes its block along."""
-    from SALib.analyze import sobol  # noqa: PLC0415 (an extra)
+    from SALib.analyze import sobol
 
     rows = width + 2
     table = np.full((int(runs.max()) // rows + 1) * rows, np.nan)
@@ -202,7 +202,7 @@ def _correlation(x: Array, y: Array, level: float) -> Estimate:
     """Spearman's rank correlation, with the interval of Bonett and Wright (2000)."""
     if len(y) < 4 or np.ptp(x) == 0 or np.ptp(y) == 0:
         return UNKNOWN
-    from scipy import stats  # noqa: PLC0415
+    from scipy import stats
 
     value = float(np.clip(np.corrcoef(stats.rankdata(x), stats.rankdata(y))[0, 1], -1, 1))
     half = NormalDist().inv_cdf((1 + level) / 2) * math.sqrt((1 + value**2 / 2) / (len(y) - 3))
@@ -217,7 +217,7 @@ def _regression(x: Array, y: Array, ordered: list[bool], level: float) -> tuple[
     freedom = len(y) - len(used) - 1
     if not used or freedom < 1 or np.ptp(y) == 0:
         return found, math.nan
-    from scipy import stats  # noqa: PLC0415
+    from scipy import stats
 
     a = np.column_stack([stats.zscore(stats.rankdata(x[:, k])) for k in used])
     b = stats.zscore(stats.rankdata(y))

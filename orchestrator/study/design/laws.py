@@ -34,37 +34,37 @@ class _Kind:
 
 
 def _uniform(low: float, high: float) -> Any:
-    from scipy import stats  # noqa: PLC0415
+    from scipy import stats
 
     return stats.uniform(low, high - low)
 
 
 def _loguniform(low: float, high: float) -> Any:
-    from scipy import stats  # noqa: PLC0415
+    from scipy import stats
 
     return stats.loguniform(low, high)
 
 
 def _normal(mean: float, sd: float) -> Any:
-    from scipy import stats  # noqa: PLC0415
+    from scipy import stats
 
     return stats.norm(mean, sd)
 
 
 def _triangular(low: float, mode: float, high: float) -> Any:
-    from scipy import stats  # noqa: PLC0415
+    from scipy import stats
 
     return stats.triang((mode - low) / (high - low), low, high - low)
 
 
 def _truncnormal(mean: float, sd: float, low: float, high: float) -> Any:
-    from scipy import stats  # noqa: PLC0415
+    from scipy import stats
 
     return stats.truncnorm((low - mean) / sd, (high - mean) / sd, mean, sd)
 
 
 def _integers(low: float, high: float) -> Any:
-    from scipy import stats  # noqa: PLC0415
+    from scipy import stats
 
     return stats.randint(int(low), int(high) + 1)
 

@@ -46,7 +46,7 @@ def table(design: str, seed: int, count: int, width: int) -> NDArray[np.float64]
         return _saltelli(seed, count // (width + 2), width)
     if design == "sobol":
         return _sobol(seed, count, width)
-    from scipy.stats import qmc  # noqa: PLC0415
+    from scipy.stats import qmc
 
     drawn: NDArray[np.float64] = qmc.LatinHypercube(width, rng=_generator(seed)).random(count)
     return kept_inside(drawn)
@@ -54,7 +54,7 @@ def table(design: str, seed: int, count: int, width: int) -> NDArray[np.float64]
 
 def _sobol(seed: int, count: int, width: int) -> NDArray[np.float64]:
     """The first points of a scrambled sequence, drawn to a power of two, without which SciPy warns."""
-    from scipy.stats import qmc  # noqa: PLC0415
+    from scipy.stats import qmc
 
     drawn: NDArray[np.float64] = qmc.Sobol(width, bits=_BITS, rng=_generator(seed)).random_base2(
         (count - 1).bit_length()

@@ -4,8 +4,10 @@ import json
 
 import pytest
 from railcosim.orchestrator.cli.app import call
-from railcosim.orchestrator.cli.options import FormatName
+from railcosim.orchestrator.cli.options import ALGORITHM_NAMES, PROBE_SECONDS, FormatName
 from railcosim.orchestrator.figures import FORMATS
+from railcosim.orchestrator.master import ALGORITHMS
+from railcosim.orchestrator.validation import TIMEOUT
 
 SCENARIO = """
 [simulation]
@@ -32,6 +34,11 @@ def drawn(folder):
 
 def test_the_formats_of_the_command_line_are_those_of_the_figures():
     assert tuple(FormatName) == FORMATS
+
+
+def test_what_the_command_line_says_without_loading_it_is_what_there_is():
+    assert sorted(ALGORITHM_NAMES) == sorted(ALGORITHMS)
+    assert PROBE_SECONDS == TIMEOUT
 
 
 def test_run_compare_and_plot_take_the_format_of_the_option_then_that_of_the_scenario(scenario, tmp_path):

@@ -3,7 +3,8 @@
 import logging
 
 import pytest
-from railcosim.orchestrator.cli.printing import Log, folded, open_console, say, tell
+from railcosim.orchestrator.cli.lines import Log, folded, tell
+from railcosim.orchestrator.cli.printing import open_console, say
 from railcosim.orchestrator.cli.printing.tables import table
 from railcosim.orchestrator.names import SignalName
 from railcosim.orchestrator.problems import Problem
