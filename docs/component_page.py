@@ -21,9 +21,10 @@ from railcosim.components import CATALOGUE, Component, Simulation, simulate
 from railcosim.components.component import Slot
 from railcosim.components.declarations import Data, Input, Memory, Parameter, Size, State
 from railcosim.components.tracing import TracingError, feedthrough
-from railcosim.fmus.description import default_step, summary
+from railcosim.fmus.description import default_step
 from railcosim.fmus.documentation import stepping
 from railcosim.fmus.documentation.reference_signals import EXCITATION, STEPS, reference_signals
+from railcosim.fmus.references import summary
 
 EXPERIMENTS = tomllib.loads((Path(__file__).parent / "experiments.toml").read_text(encoding="utf-8"))
 _COLOURS = ("#3f7fd0", "#d9772b", "#2f9e63", "#b0559e", "#b8952a", "#5ba7b5")

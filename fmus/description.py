@@ -25,6 +25,7 @@ from ..components.tracing import (
 from .annotation import TOOL, Annotation
 from .annotation import write as write_annotation
 from .kinds import NOTE_OF_KIND, FmuKind
+from .references import summary
 from .units import BASE, parse
 from .variables import ScalarVariable, scalar_variables
 
@@ -149,11 +150,6 @@ def default_step(component: Component) -> float:
     """The communication step in s for whoever has no other wish."""
     values = component.present_values
     return float(type(component).recommended_step or values.get("sample_time") or values.get("max_step") or 0.1)
-
-
-def summary(cls: type[Component]) -> str:
-    """First line of the class's docstring."""
-    return ((cls.__doc__ or "").strip() or cls.__name__).splitlines()[0]
 
 
 def arguments(component: Component) -> str:

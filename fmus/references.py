@@ -50,6 +50,11 @@ def resolve(reference: str, folder: Path | None = None) -> type[Component]:
     return own[name]
 
 
+def summary(cls: type[Component]) -> str:
+    """First line of the class's docstring."""
+    return ((cls.__doc__ or "").strip() or cls.__name__).splitlines()[0]
+
+
 def file_and_class(reference: str) -> tuple[str, str]:
     """``"file.py:Class"`` in two; the file is empty where the reference names none."""
     path, _, name = reference.rpartition(":")

@@ -14,8 +14,9 @@ from ...components.component import Component
 from ...components.declarations import State
 from ...components.errors import ComponentError
 from ...components.tracing import TracingError, feedthrough
-from ..description import arguments, summary
+from ..description import arguments
 from ..kinds import NOTE_OF_KIND, FmuKind
+from ..references import summary
 from ..variables import scalar_variables
 from .formulas import Formulas
 from .reference_signals import EXCITATION, STEPS, reference_signals

@@ -8,18 +8,16 @@ from .options import Algorithm, Preset, Scenario, Set, Step, Stop, Swap, Trust, 
 def list_all() -> None:
     """List the shipped scenarios, components and master algorithms."""
     from ...components import CATALOGUE
-    from ...fmus.description import summary
+    from ...fmus.references import summary
     from ..master import ALGORITHMS
-    from ..scenario import load, shipped
+    from ..scenario import listed
     from .printing import open_console, say
 
     out = open_console()
     say(out, "Scenarios (orchestrate run NAME)", "bold")
-    for name, title in shipped():
-        say(out, f"  {name}: {title}")
-        origin = load(name).provenance
-        for preset in origin.presets:
-            what = origin.preset_descriptions.get(preset) or ("as it stands" if preset == origin.default_preset else "")
+    for scenario in listed():
+        say(out, f"  {scenario.name}: {scenario.title}")
+        for preset, what in scenario.presets.items():
             say(out, f"      --preset {preset}" + (f": {what}" if what else ""), "dim")
     say(out, "Components (orchestrate describe NAME)", "bold")
     for name, component in CATALOGUE.items():

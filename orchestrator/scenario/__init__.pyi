@@ -1,6 +1,7 @@
 from .changes import split_assignment
-from .loading import load, shipped
+from .loading import load
 from .patterns import NAME
+from .shipped import listed, shipped
 from .toml_source import parse_value
 from .trust import import_notes, untrusted_code
 from .values import SEED, assignment, changed, is_structural
@@ -12,6 +13,7 @@ __all__ = [
     "changed",
     "import_notes",
     "is_structural",
+    "listed",
     "load",
     "parse_value",
     "shipped",

@@ -9,14 +9,11 @@ from __future__ import annotations
 
 import copy
 import os
-import tomllib
 from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
-
-from railcosim import models
 
 from .. import world
 from ..errors import ScenarioError
@@ -28,30 +25,13 @@ from .events import draft_events, expand_events, read_events
 from .groups import Draft, Entry, expand_group
 from .patterns import connect
 from .reader import Reader
+from .shipped import MODELS, shipped, title_of
 from .simulation import TOLERANCES, read_simulation, spread_tolerances
 from .toml_source import Source, parse_value
 from .varied import read_study
 from .writer import dump
 
-__all__ = ["dump", "find", "load", "loads", "preset_names", "shipped"]
-
-MODELS = Path(os.path.abspath(models.__file__ or "")).parent
-"""Where the shipped scenarios are, wherever the package is installed."""
-
-
-def shipped() -> list[tuple[str, str]]:
-    """Name and title of every scenario that comes with the package, by name."""
-    titles = {path.stem: _title(path) for path in sorted(world.glob(MODELS, "*.toml"))}
-    return [(name, title) for name, title in titles.items() if title is not None]
-
-
-def _title(path: Path) -> str | None:
-    """Title of the scenario in a file; None for what is no scenario, and for what cannot be read."""
-    try:
-        data = tomllib.loads(world.read_text(path, encoding="utf-8"))
-    except (OSError, ValueError):  # listing the others is more useful than failing on one
-        return None
-    return str(data.get("title", "")) if "instances" in data else None
+__all__ = ["dump", "find", "load", "loads", "preset_names"]
 
 
 def find(name_or_path: str | os.PathLike[str]) -> Path:
@@ -61,7 +41,7 @@ def find(name_or_path: str | os.PathLike[str]) -> Path:
         ScenarioError: there is none; the message suggests the nearest name.
     """
     text = os.fspath(name_or_path)
-    if os.path.basename(text) == text and _title(MODELS / f"{text}.toml") is not None:
+    if os.path.basename(text) == text and title_of(MODELS / f"{text}.toml") is not None:
         return MODELS / f"{text}.toml"
     if os.path.isfile(text) and text.endswith(".toml"):
         return Path(text)

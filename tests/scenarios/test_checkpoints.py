@@ -6,7 +6,7 @@ import pytest
 from railcosim.orchestrator import load
 from railcosim.orchestrator.run import checkpoint
 from railcosim.orchestrator.run.execution import go_on, run
-from railcosim.orchestrator.scenario.loading import shipped
+from railcosim.orchestrator.scenario import shipped
 from railcosim.orchestrator.system import Event
 
 SHORT, TRIPS = 40.0, 450.0

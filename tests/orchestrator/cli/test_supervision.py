@@ -6,6 +6,7 @@ import signal
 import subprocess
 import sys
 import time
+from importlib import import_module
 
 import psutil
 import pytest
@@ -104,7 +105,9 @@ def seen(monkeypatch):
     monkeypatch.setattr(supervision.NOTES, "under_way", lambda: found)
     supervision.NOTES.directory = "out"
     told = []
-    monkeypatch.setattr(supervision, "conclude", lambda *arguments: told.append(arguments))
+    monkeypatch.setattr(
+        import_module("railcosim.orchestrator.run"), "conclude", lambda *arguments: told.append(arguments)
+    )
     return told
 
 

@@ -15,7 +15,8 @@ from hypothesis import strategies as st
 from railcosim.orchestrator.errors import RailcosimError, ScenarioError
 from railcosim.orchestrator.fmi.archive import Workspace
 from railcosim.orchestrator.run.checking import check
-from railcosim.orchestrator.scenario.loading import MODELS, dump, load, loads
+from railcosim.orchestrator.scenario.loading import dump, load, loads
+from railcosim.orchestrator.scenario.shipped import MODELS
 from railcosim.orchestrator.scenario.toml_source import Source
 
 SMALL = """

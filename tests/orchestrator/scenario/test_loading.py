@@ -8,7 +8,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from railcosim.orchestrator.errors import ScenarioError
-from railcosim.orchestrator.scenario.loading import MODELS, dump, find, load, loads, preset_names, shipped
+from railcosim.orchestrator.scenario.loading import dump, find, load, loads, preset_names
+from railcosim.orchestrator.scenario.shipped import MODELS, shipped
 
 DOCS = Path(__file__).parents[3] / "docs" / "scenarios.md"
 EXAMPLE = Path(__file__).with_name("two_trains.toml").read_text(encoding="utf-8")

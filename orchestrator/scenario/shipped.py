@@ -1,0 +1,59 @@
+"""The scenarios that come with the package, as a list has them: read, not checked."""
+
+from __future__ import annotations
+
+import os
+import tomllib
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from railcosim import models
+
+from .. import world
+
+MODELS = Path(os.path.abspath(models.__file__ or "")).parent
+"""Where the shipped scenarios are, wherever the package is installed."""
+
+
+@dataclass(frozen=True)
+class Listed:
+    """A shipped scenario: its name and title, and what its presets say of themselves, the default one first."""
+
+    name: str
+    title: str
+    presets: dict[str, str]
+
+
+def listed() -> list[Listed]:
+    """Every scenario that comes with the package, by name."""
+    read = {path.stem: _read(path) for path in sorted(world.glob(MODELS, "*.toml"))}
+    return [Listed(name, _title(data), _presets(data)) for name, data in read.items() if data is not None]
+
+
+def shipped() -> list[tuple[str, str]]:
+    """Name and title of every scenario that comes with the package, by name."""
+    return [(each.name, each.title) for each in listed()]
+
+
+def title_of(path: Path) -> str | None:
+    """Title of the scenario in a file; None for what is no scenario, and for what cannot be read."""
+    data = _read(path)
+    return None if data is None else _title(data)
+
+
+def _read(path: Path) -> dict[str, Any] | None:
+    try:
+        data = tomllib.loads(world.read_text(path, encoding="utf-8"))
+    except (OSError, ValueError):  # listing the others is more useful than failing on one
+        return None
+    return data if "instances" in data else None
+
+
+def _title(data: dict[str, Any]) -> str:
+    return str(data.get("title", ""))
+
+
+def _presets(data: dict[str, Any]) -> dict[str, str]:
+    default = {str(name): "as it stands"} if (name := data.get("default_preset")) else {}
+    return default | {name: str(table.get("description", "")) for name, table in data.get("presets", {}).items()}
