@@ -130,7 +130,7 @@ def plot(expressions: Sequence[str], signals: Signals, ax: "Axes | None" = None)
     if problems:
         raise ScenarioError(problems)
     if ax is None:
-        from matplotlib import pyplot  # noqa: PLC0415
+        from matplotlib import pyplot
 
         ax = pyplot.subplots()[1]
     curves = curves_of(panel, signals)

@@ -152,7 +152,7 @@ class Results(Mapping[str, NDArray[Any]]):
             RailcosimError: pandas is not installed.
         """
         try:
-            import pandas  # noqa: PLC0415
+            import pandas
         except ImportError as error:
             raise RailcosimError("a frame is of pandas, which is not installed: pip install pandas") from error
         made = pandas.DataFrame({name: self[name] for name in self}, index=pandas.Index(self.time, name=_TIME))

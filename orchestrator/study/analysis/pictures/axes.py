@@ -97,7 +97,7 @@ def name_axis(ax: Axes, side: Literal["x", "y"], name: str, *, small: bool) -> N
 
 def _count_by_tens(ax: Axes, side: Literal["x", "y"]) -> None:
     """A logarithmic scale whose ticks are 1, 2 and 5 of each power of ten, as plain numbers."""
-    from matplotlib.ticker import FuncFormatter, LogLocator, NullLocator  # noqa: PLC0415
+    from matplotlib.ticker import FuncFormatter, LogLocator, NullLocator
 
     getattr(ax, f"set_{side}scale")("log")
     axis = getattr(ax, f"{side}axis")

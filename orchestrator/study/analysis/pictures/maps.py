@@ -213,14 +213,14 @@ def _extend(values: Array, colours: dict[str, Any]) -> str:
 
 def _shares() -> Any:
     """From all broken over grey to all pass."""
-    from matplotlib.colors import LinearSegmentedColormap  # noqa: PLC0415
+    from matplotlib.colors import LinearSegmentedColormap
 
     return LinearSegmentedColormap.from_list("shares", [FAIL, "#f2f2f2", PASS])
 
 
 def _patches(means: Array) -> list[Any]:
     """What the colours of cells mean that have but one verdict each."""
-    from matplotlib.patches import Patch  # noqa: PLC0415
+    from matplotlib.patches import Patch
 
     return [
         Patch(color=colour, label=name)
