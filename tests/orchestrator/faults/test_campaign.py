@@ -28,9 +28,9 @@ def test_what_is_promised_holds_whatever_fails(bench, begin):
 
 
 @pytest.mark.long
-@pytest.mark.parametrize("begin", range(200, 3200, 500))
+@pytest.mark.parametrize("begin", range(200, 3200, 50))  # short ones: workers end together
 def test_what_is_promised_holds_whatever_fails_three_thousand_times(bench, begin):
-    survey(bench, range(begin, begin + 500))
+    survey(bench, range(begin, begin + 50))
 
 
 @pytest.mark.campaign
