@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
+from itertools import islice
 
 from rich.console import Console
 from rich.table import Table
@@ -19,13 +20,13 @@ _NAME = 16
 """Letters that a name has at least, in a narrow terminal too."""
 
 
-def show_summary(out: Console, summary: Summary, sensitivities: Sequence[Sensitivity] = ()) -> None:
+def show_summary(out: Console, summary: Summary, sensitivities: Iterable[Sensitivity] = ()) -> None:
     """The summary of a study, and what its parameters do to what came out.
 
     Args:
         out: where to.
         summary: of the study.
-        sensitivities: the outputs of interest first; the first few are shown.
+        sensitivities: the outputs of interest first; only the first few are taken.
     """
     statuses = ", ".join(f"{count} {status}" for status, count in summary.statuses.items())
     say(out, f"{summary.runs} runs: {statuses}" if summary.runs else "no runs", "bold")
@@ -40,7 +41,7 @@ def show_summary(out: Console, summary: Summary, sensitivities: Sequence[Sensiti
         _say_lacking(out, "without a value", {one.name: one.missing for one in summary.metrics})
     if summary.requirements or summary.metrics:
         say(out, summary.note, "dim")
-    for made in [made for made in sensitivities if made.influences][:_MOST_OUTPUTS]:
+    for made in islice((made for made in sensitivities if made.influences), _MOST_OUTPUTS):
         out.print(_influences(made))
         left = len(made.influences) - _MOST_PARAMETERS
         explained = "" if math.isnan(made.explained) else f"ranks explain {made.explained:.0%} of its variance"

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from ....figures import FORMATS, file_name, legend, page
 from ...design import Plan
 from ..intervals import numbers
-from ..sensitivity import Sensitivity, outputs_of, sensitivity
+from ..sensitivity import outputs_of, sensitivity
 from ..summary import Summary, summarize
 from .axes import Axis
 from .bands import draw_bands
@@ -29,6 +29,8 @@ if TYPE_CHECKING:
 
 _MOST_PANELS = 12
 _MOST_COLUMNS = 5
+_MOST_IN_MATRIX = 5000
+"""Runs that a scatter matrix shows: of more, all its panels are full."""
 _MOST_SIGNALS = 8
 _MOST_INFLUENCED = 4
 _WIDTH = 8.5
@@ -96,14 +98,11 @@ class _Study:
         varied = [one for one in plan.dimensions if one.law or len(one.values) > 1]
         self.axes = {one.name: Axis(frame, one) for one in varied}
         self.outputs = outputs_of(frame)
+        self.ranks: dict[str, list[Axis]] = {}
 
     @cached_property
     def summary(self) -> Summary:
         return summarize(self.frame, self.plan)
-
-    @cached_property
-    def sensitivities(self) -> dict[str, Sensitivity]:
-        return {output: sensitivity(self.frame, self.plan, output) for output in self.outputs}
 
     def verdicts(self, name: str) -> NDArray[Any]:
         found: NDArray[Any] = self.frame[f"verdict.{name}"].astype(object).to_numpy()
@@ -120,9 +119,12 @@ class _Study:
 
     def strongest(self, output: str) -> list[Axis]:
         """The parameters in the order of their influence on an output; of two, in the order they were given."""
-        if len(self.axes) > 2 and output in self.sensitivities:
-            return [self.axes[one.name] for one in self.sensitivities[output].influences if one.name in self.axes]
-        return list(self.axes.values())
+        if len(self.axes) < 3 or output not in self.outputs:
+            return list(self.axes.values())
+        if output not in self.ranks:
+            found = sensitivity(self.frame, self.plan, output, sure=False).influences
+            self.ranks[output] = [self.axes[one.name] for one in found if one.name in self.axes]
+        return self.ranks[output]
 
     def label(self, column: str) -> str:
         group, _, name = column.partition(".") if column.startswith(("metric.", "margin.")) else ("", "", column)
@@ -181,15 +183,18 @@ class _Study:
             return
         output = self.outputs[0]
         axes = self.strongest(output)[:_MOST_COLUMNS]
-        columns = columns_of(axes, [(self.label(output), numbers(self.frame[output]))])
-        count = len(columns)
+        few = self.frame[:_MOST_IN_MATRIX]
+        columns = columns_of([Axis(few, one.dimension) for one in axes], [(self.label(output), numbers(few[output]))])
+        count, runs = len(columns), len(self.frame)
         size = max(4.5, min(_WIDTH, 1.75 * count + 0.6))
-        with self.pages(f"Every parameter with every other{self.others(len(axes))}", count**2, size, count) as panels:
-            draw_matrix(panels, columns, self.overall())
+        which = f"; the first {_MOST_IN_MATRIX} of {runs} runs" if runs > _MOST_IN_MATRIX else ""
+        heading = f"Every parameter with every other{self.others(len(axes))}{which}"
+        with self.pages(heading, count**2, size, count) as panels:
+            draw_matrix(panels, columns, self.overall()[:_MOST_IN_MATRIX])
 
     def draw_influences(self) -> None:
-        known = [one for one in self.sensitivities.values() if len(one.influences) > 1 and one.influences[0].strength]
-        found = known[:_MOST_INFLUENCED]
+        made = (sensitivity(self.frame, self.plan, output) for output in self.outputs[:_MOST_INFLUENCED])
+        found = [one for one in made if len(one.influences) > 1 and one.influences[0].strength]
         if found:
             method = found[0].method
             how = f"shares of the variance, by {method}" if method else "rank correlation"

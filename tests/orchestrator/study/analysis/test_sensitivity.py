@@ -40,6 +40,23 @@ def test_first_order_indices_of_given_runs(studied, design):
         assert math.isnan(one.total.value)
 
 
+@pytest.mark.parametrize("design", ["random", "saltelli"])
+def test_values_alone_are_had_without_intervals(studied, design):
+    frame, plan = studied(ISHIGAMI, {"metric.y": ishigami}, 500, design)
+    known, quick = (sensitivity(frame, plan, "metric.y", sure=sure).influences for sure in (True, False))
+    assert [(a.name, a.first.value) for a in known] == [(b.name, b.first.value) for b in quick]
+    assert all(math.isnan(one.first.low) and math.isnan(one.total.low) for one in quick)
+
+
+def test_of_very_many_runs_the_first_are_enough(studied, monkeypatch):
+    monkeypatch.setattr("railcosim.orchestrator.study.analysis.sensitivity.MOST", 200)
+    frame, plan = studied(ISHIGAMI, {"metric.y": ishigami}, 500)
+    made = sensitivity(frame, plan, "metric.y")
+    assert made.method == "RBD-FAST of the first 200 runs"
+    fewer = sensitivity(frame[:200], plan, "metric.y")
+    assert {one.name: one.first for one in made.influences} == {one.name: one.first for one in fewer.influences}
+
+
 def test_texts_and_switches_have_indices_too(studied):
     vary = {"c": ["A", "B", "C", "D"], "on": [True, False], "x": "0:1"}
     effect = {"A": 0.0, "B": 3.0, "C": -1.0, "D": 0.5}

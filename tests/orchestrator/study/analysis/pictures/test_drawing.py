@@ -67,6 +67,13 @@ def test_of_many_parameters_the_strongest_two(drawn):
     assert made["what-matters.png"][0] == "What matters; rank correlation"
 
 
+def test_a_scatter_matrix_of_very_many_runs_shows_the_first(drawn, monkeypatch):
+    monkeypatch.setattr(drawing, "_MOST_IN_MATRIX", 30)
+    heading, panels = drawn(PAIR, OUTPUTS, 40)["every-parameter-with-every-other.png"]
+    assert heading == "Every parameter with every other; the first 30 of 40 runs"
+    assert sum(len(marks.get_offsets()) for marks in panels[3].collections) == 30
+
+
 def test_a_grid_has_no_scatter_matrix(drawn):
     made = drawn({"a.x": "0:1:4", "b.y": "0:1:3"}, {f"margin.r{k}": lambda x, y: x - y for k in range(5)}, 12, "grid")
     assert "every-parameter-with-every-other.png" not in made
