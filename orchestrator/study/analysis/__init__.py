@@ -1,8 +1,8 @@
 """What a study says: summary, sensitivity and figures, of its table and its plan."""
 
+from .influence import Influence, Sensitivity, outputs_of, sensitivity
 from .intervals import Estimate
 from .pictures import draw_study
-from .sensitivity import Influence, Sensitivity, outputs_of, sensitivity
 from .summary import SHARES, Kept, Spread, Summary, summarize
 
 __all__ = [

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...design import Dimension
-from ..sensitivity import codes
+from ..influence import codes
 
 if TYPE_CHECKING:
     import pandas as pd

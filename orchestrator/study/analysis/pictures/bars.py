@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ....figures import COLOURS
-from ..sensitivity import Influence, Sensitivity
+from ..influence import Influence, Sensitivity
 from ..summary import Kept
 from .axes import FAIL, PASS, folded
 

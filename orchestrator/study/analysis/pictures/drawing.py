@@ -14,8 +14,8 @@ from numpy.typing import NDArray
 
 from ....figures import FORMATS, file_name, legend, page
 from ...design import Plan
+from ..influence import outputs_of, sensitivity
 from ..intervals import numbers
-from ..sensitivity import outputs_of, sensitivity
 from ..summary import Summary, summarize
 from .axes import Axis
 from .bands import draw_bands

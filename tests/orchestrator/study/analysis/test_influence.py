@@ -49,7 +49,7 @@ def test_values_alone_are_had_without_intervals(studied, design):
 
 
 def test_of_very_many_runs_the_first_are_enough(studied, monkeypatch):
-    monkeypatch.setattr("railcosim.orchestrator.study.analysis.sensitivity.MOST", 200)
+    monkeypatch.setattr("railcosim.orchestrator.study.analysis.influence.MOST", 200)
     frame, plan = studied(ISHIGAMI, {"metric.y": ishigami}, 500)
     made = sensitivity(frame, plan, "metric.y")
     assert made.method == "RBD-FAST of the first 200 runs"
