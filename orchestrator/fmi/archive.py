@@ -55,10 +55,16 @@ class Workspace:
         except BaseException:
             world.rmtree(self._place, ignore_errors=True)
             raise
-        self._unpacked: dict[str, tuple[Path, tuple[str, ...]]] = {}
+        self._unpacked: dict[tuple[str, bool], tuple[Path, tuple[str, ...]]] = {}
 
-    def unpack(self, path: Path) -> Unpacked:
-        """Unpack an FMU file."""
+    def unpack(self, path: Path, *, to_run: bool = False) -> Unpacked:
+        """Unpack an FMU file.
+
+        Args:
+            path: of the file.
+            to_run: whether to leave out what only people and compilers read. That is for FMUs made here: one of another
+                tool may look for anything beside its resources.
+        """
         if path.is_dir():
             raise FmuFileError(
                 f"{path} is a folder, not an FMU file; zip what is in it, modelDescription.xml at the top"
@@ -68,10 +74,10 @@ class Workspace:
                 digest = hashlib.file_digest(stream, "sha256").hexdigest()
         except OSError as error:
             raise FmuFileError(f"{path} cannot be read: {error.strerror or error}") from error
-        if digest not in self._unpacked:
+        if (digest, to_run) not in self._unpacked:
             target = self.folder / f"fmu{len(self._unpacked)}_{digest[:12]}"
-            self._unpacked[digest] = target, _extract(path, target)
-        folder, notes = self._unpacked[digest]
+            self._unpacked[digest, to_run] = target, _extract(path, target, to_run=to_run)
+        folder, notes = self._unpacked[digest, to_run]
         return Unpacked(folder, digest, tuple(f"{path}: {note}" for note in notes))
 
     def write_description(self, description: bytes) -> Path:
@@ -110,12 +116,12 @@ def _plain_folder() -> Path:
     )
 
 
-def _extract(path: Path, target: Path) -> tuple[str, ...]:
+def _extract(path: Path, target: Path, *, to_run: bool) -> tuple[str, ...]:
     """Unpack a file; what was put right on the way."""
     try:
         with world.open(path, "rb") as stream, zipfile.ZipFile(stream) as archive:
             members = list_members(path, archive)
-            extract(archive, members, target)
+            extract(archive, members.needed() if to_run else members, target)
     except FmuFileError:
         world.rmtree(target, ignore_errors=True)
         raise

@@ -11,7 +11,7 @@ import stat
 import zipfile
 from collections import Counter
 from collections.abc import Collection, Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path, PurePosixPath, PureWindowsPath
 
 from .. import world
@@ -54,6 +54,11 @@ class Members:
 
     files: dict[str, zipfile.ZipInfo]
     notes: tuple[str, ...]
+
+    def needed(self) -> Members:
+        """Without what a run does not need of an FMU that is made here: all but its binaries and its resources."""
+        kept = (_DESCRIPTION, "binaries/", "resources/")
+        return replace(self, files={name: entry for name, entry in self.files.items() if name.startswith(kept)})
 
 
 def list_members(path: Path, archive: zipfile.ZipFile) -> Members:

@@ -106,11 +106,11 @@ def _load(instance: Instance, workspace: Workspace, kind: Kind) -> Model:
 
 
 def load_fmu(path: Path, workspace: Workspace, kind: ModelKind = "fmu") -> Model:
-    """Unpack and read one FMU file.
+    """Unpack and read one FMU file; of one that is made here what a run needs.
 
     Raises:
         FmuFileError: missing, hostile or unusable.
     """
-    folder, digest, notes = workspace.unpack(path)
+    folder, digest, notes = workspace.unpack(path, to_run=kind != "fmu")
     interface = read_interface(folder, str(path))
     return Model(replace(interface, warnings=(*notes, *interface.warnings)), kind, folder, path, digest)

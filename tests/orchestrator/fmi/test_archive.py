@@ -27,6 +27,20 @@ def test_an_archive_is_unpacked_once_however_often_it_is_asked_for(workspace, tm
     assert folder.is_relative_to(workspace.folder)
 
 
+def test_what_only_people_and_compilers_read_can_stay_in_the_archive(workspace, tmp_path, xml):
+    read = {"sources/all.c": "x", "documentation/index.html": "x", "model.png": "x"}
+    run = {"modelDescription.xml", "binaries/linux64/a.so", "resources/data.txt"}
+    path = xml["write_archive"](tmp_path / "a.fmu", DESCRIPTION | read | dict.fromkeys(run - {*DESCRIPTION}, "x"))
+
+    def files(folder):
+        return {found.relative_to(folder).as_posix() for found in folder.rglob("*") if found.is_file()}
+
+    lean, whole = workspace.unpack(path, to_run=True), workspace.unpack(path)
+    assert files(lean.folder) == run
+    assert files(whole.folder) == run | {*read}
+    assert lean.digest == whole.digest
+
+
 def test_a_workspace_leaves_nothing(tmp_path, xml):
     with Workspace() as workspace:
         workspace.unpack(xml["write_archive"](tmp_path / "a.fmu", DESCRIPTION))

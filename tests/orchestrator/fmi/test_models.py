@@ -110,3 +110,11 @@ def test_a_wrong_build_argument_is_told_where_it_was_given(workspace, name):
     assert told.startswith("s.toml:7: instance 'a': Schedule")
     (told,) = problems(loads(text.replace("= 2", "= 0"), "s.toml"), workspace)
     assert told.startswith("s.toml:3: instance 'a': Schedule")
+
+
+def test_of_a_component_what_a_run_needs_is_unpacked_and_of_a_file_all(workspace):
+    path = build("Gust", kind="python")
+    models = load_models(system(component="Gust", file=str(path)), workspace, "python")
+    assert not (models["component"].folder / "documentation").exists()
+    assert (models["component"].folder / "resources").is_dir()
+    assert (models["file"].folder / "documentation").is_dir()
