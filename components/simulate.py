@@ -21,13 +21,13 @@ from typing import Any, Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from .component import Component, Slot, convert, evaluated, pack
+from .component import Component, Slot, convert, pack
 from .declarations import Input, Memory, Output, Parameter, State, Tape
 from .errors import ComponentError, nearest
 from .methods import Methods
 from .sampling import SampleClock
 from .tape import TapeDeck
-from .tracing import TracingError, feedthrough, initial_dependencies
+from .tracing import TracingError, computed_starts, feedthrough, start_name
 
 Phase = Literal["instantiated", "initialization", "running", "terminated"]
 
@@ -52,7 +52,10 @@ class Simulation:
         self._given = {name: self._values[name] for name in component.slots if name in self._values}
         self._held_names = self._feedthrough_names() if component.is_sampled else frozenset()
         self._clock = SampleClock(component, self._methods) if component.is_sampled else None
-        self._computed_starts = self._computed_start_names()
+        self._computed_starts = computed_starts(component)
+        kept = [slot.name for slot in component.of(State, Memory) if slot.name not in self._computed_starts]
+        self._started = {start_name(name): name for name in kept}
+        self._starts = {name: self._given[name] for name in kept}
         self._deck: TapeDeck | None = None
         self._prepared = False
         self._fresh: dict[str, Any] | None = None
@@ -73,6 +76,8 @@ class Simulation:
         self._expect("start", "initialization")
         for slot in self.component.of(Parameter):
             self._check_bounds(slot, self._values[slot.name])
+        for name, value in self._starts.items():
+            self._check_bounds(self.component.slots[name], value)
         self._prepare()
         self.phase = "running"
         self._fresh = None
@@ -103,6 +108,7 @@ class Simulation:
     def reset(self) -> None:
         """Back to the state after construction; a rerun gives the same bits."""
         self._values.update(self._given)
+        self._starts.update((name, self._given[name]) for name in self._starts)
         self.phase = "instantiated"
         self._deck = None
         self.time = 0.0
@@ -121,7 +127,12 @@ class Simulation:
         self.invalidate()
 
     def get(self, name: str) -> Any:
-        """A variable's value, outputs evaluated with the inputs as they now are."""
+        """A variable's value, outputs evaluated with the inputs as they now are.
+
+        ``x_start`` is the start value of a state or memory ``x`` that ``initial`` does not compute.
+        """
+        if name in self._started:
+            return self._starts[self._started[name]]
         slot = self._slot(name)
         if self.phase == "initialization":
             self._prepare()
@@ -132,17 +143,31 @@ class Simulation:
         return self._values[name]
 
     def set(self, name: str, value: Any) -> None:
-        """Set an input or a tunable parameter at any time; a fixed parameter or a start value before the run begins."""
-        slot = self._slot(name)
-        self.check_settable(slot)
+        """Set an input or a tunable parameter at any time; a fixed parameter or a start value before the run begins.
+
+        A start value may be called by the name of its state or memory as well.
+        """
+        slot = self._slot(self._started.get(name, name))
+        self._check_settable(slot)
         converted = convert(slot, value, self.name)
         if self.phase == "running" and isinstance(slot.declaration, Parameter):
             self._check_bounds(slot, converted)
-        self._values[name] = converted
+        self._values[slot.name] = converted
+        if slot.name in self._starts:
+            self._starts[slot.name] = converted
         self.invalidate()
 
-    def check_settable(self, slot: Slot) -> None:
-        """Raise unless the variable may be set in the present phase."""
+    def settable(self, name: str) -> Any:
+        """The present value of what may be set in the present phase, start values as they were given.
+
+        Raises:
+            ComponentError: it may not be set.
+        """
+        slot = self._slot(self._started.get(name, name))
+        self._check_settable(slot)
+        return self._values[slot.name]
+
+    def _check_settable(self, slot: Slot) -> None:
         declaration = slot.declaration
         if isinstance(declaration, Output | Tape) or slot.name in self._computed_starts:
             raise ComponentError(f"{self.name}.{slot.name} is computed and cannot be set")
@@ -168,6 +193,7 @@ class Simulation:
             "seen": self._values["time"],
             "clock": None if self._clock is None else self._clock.state(),
             "values": {name: _plain(self._values[name]) for name in self._given},
+            "starts": {name: _plain(value) for name, value in self._starts.items()},
             "fresh": None if self._fresh is None else {name: _plain(value) for name, value in self._fresh.items()},
             "tape": None if self._deck is None else self._deck.state(),
         }
@@ -187,6 +213,7 @@ class Simulation:
         except ValueError:
             raise ComponentError(f"a saved state of {state['component']} does not fit this {self.name}") from None
         self._values.update(values)
+        self._starts.update((name, pack(slots[name], value)) for name, value in state["starts"].items())
         self.phase = state["phase"]
         self.time = state["time"]
         self._values["time"] = state["seen"]
@@ -255,17 +282,6 @@ class Simulation:
             duration=values["tape_duration"],
             cutoff=values["tape_cutoff"],
         )
-
-    def _computed_start_names(self) -> frozenset[str]:
-        """The states and memory that ``initial`` computes."""
-        if not hasattr(type(self.component), "initial"):
-            return frozenset()
-        try:
-            computed, _ = initial_dependencies(self.component)
-        except TracingError:
-            return frozenset(evaluated(self.component, "initial"))
-        kept = self.component.of(State, Memory)
-        return frozenset(slot.name for slot in kept if not computed.keys().isdisjoint(slot.scalars))
 
     # ---------------------------------------------------------------- checks
 

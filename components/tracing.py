@@ -95,6 +95,23 @@ def initial_dependencies(component: Component) -> tuple[dict[str, Names], dict[s
     return computed, _collect(probe, "outputs", Output)
 
 
+def computed_starts(component: Component) -> Names:
+    """The states and memory, by the names of their slots, that ``initial`` computes."""
+    if not hasattr(type(component), "initial"):
+        return frozenset()
+    try:
+        returned = _run(_sourced_copy(component), "initial")
+    except TracingError:
+        returned = evaluated(component, "initial")
+    return frozenset(slot.name for slot in component.of(State, Memory) if slot.name in returned)
+
+
+def start_name(name: str) -> str:
+    """What the start value of a state or memory is called, or that of an element of one."""
+    array, bracket, index = name.partition("[")
+    return f"{array}_start{bracket}{index}"
+
+
 def used_inputs(component: Component) -> Names:
     """The scalar inputs that something is computed from: an output, a rate, a start value, or what a sample leaves."""
     probe = _sourced_copy(component)

@@ -30,6 +30,7 @@ class Annotation:
         flags: for inputs that are read only where a boolean input is true, its name.
         beside: for inputs that come from where another input comes, unless they are connected, its name.
         rising: names of array parameters whose elements must rise.
+        started: names of states and memory, scalars and arrays, whose start value is a parameter.
         unused_inputs: names of inputs that nothing is computed from: a port has them, this component does without.
         recommended_step: longest advisable communication step in s.
         sampled: whether it acts at samples.
@@ -47,6 +48,7 @@ class Annotation:
     flags: Mapping[str, str] = field(default_factory=dict)
     beside: Mapping[str, str] = field(default_factory=dict)
     rising: tuple[str, ...] = ()
+    started: tuple[str, ...] = ()
     unused_inputs: tuple[str, ...] = ()
     recommended_step: float | None = None
     sampled: bool = False
@@ -68,6 +70,7 @@ def write(annotation: Annotation, root: Any) -> None:
         "flags": json.dumps(annotation.flags) if annotation.flags else "",
         "beside": json.dumps(annotation.beside) if annotation.beside else "",
         "rising": " ".join(annotation.rising),
+        "started": " ".join(annotation.started),
         "unusedInputs": " ".join(annotation.unused_inputs),
         "recommendedStep": "" if step is None else repr(float(step)),
         "sampled": "true" if annotation.sampled else "",
@@ -99,6 +102,7 @@ def read(root: Any) -> Annotation | None:
         flags=_names(element.get("flags", "{}")),
         beside=_names(element.get("beside", "{}")),
         rising=tuple(element.get("rising", "").split()),
+        started=tuple(element.get("started", "").split()),
         unused_inputs=tuple(element.get("unusedInputs", "").split()),
         recommended_step=float(step) if step else None,
         sampled=element.get("sampled") == "true",

@@ -11,8 +11,8 @@ from typing import Any
 import numpy as np
 from lxml import etree
 
-from ..components.component import Component, evaluated
-from ..components.declarations import Input, Memory, Parameter, State
+from ..components.component import Component
+from ..components.declarations import Input, Parameter, State
 from ..components.errors import ComponentError
 from ..components.tracing import (
     Names,
@@ -20,6 +20,7 @@ from ..components.tracing import (
     dependencies,
     initial_dependencies,
     rate_dependencies,
+    start_name,
     used_inputs,
 )
 from .annotation import TOOL, Annotation
@@ -47,14 +48,12 @@ class Structure:
         direct: for each scalar output, the inputs and states it depends on at one instant.
         rates: the same for the rate of each scalar state.
         initial: for each scalar that is computed at the start, what it follows from.
-        computed: scalars of State and Memory that ``initial`` computes.
         used: the inputs that anything is computed from at all.
     """
 
     direct: Mapping[str, Names] | None
     rates: Mapping[str, Names] | None
     initial: Mapping[str, Names] | None
-    computed: frozenset[str]
     used: Names | None
 
 
@@ -64,13 +63,11 @@ def structure(component: Component) -> Structure:
         computed, initial = initial_dependencies(component)
         rates = rate_dependencies(component)
         started = {**computed, **initial}
-        return Structure(dependencies(component), rates, started, frozenset(computed), _used(component))
+        return Structure(dependencies(component), rates, started, _used(component))
     except TracingError:
         if not component.requires:
             raise
-        returned = evaluated(component, "initial")
-        names = frozenset(n for s in component.of(State, Memory) if s.name in returned for n in s.scalars)
-        return Structure(None, None, None, names, None)
+        return Structure(None, None, None, None)
 
 
 def _used(component: Component) -> Names | None:
@@ -138,7 +135,7 @@ def write(component: Component, kind: FmuKind, digest: str) -> bytes:
     write_annotation(_annotation(component, kind, digest, depends.used), root)
     block = etree.SubElement(root, "ModelVariables")
     for variable in variables:
-        _write_variable(block, variable, component, depends)
+        _write_variable(block, variable, component)
     for rate in rates:
         _write_rate(block, rate)
     _write_structure(root, variables, rates, depends)
@@ -183,6 +180,7 @@ def _annotation(component: Component, kind: FmuKind, digest: str, used: Names | 
         flags={n: d.flag.name for s, d in inputs if isinstance(d, Input) and d.flag for n in s.scalars},
         beside={s.name: d.beside.name for s, d in inputs if isinstance(d, Input) and d.beside},
         rising=tuple(s.name for s in component.of(Parameter) if getattr(s.declaration, "rising", False)),
+        started=tuple(dict.fromkeys(v.slot.name for v in scalar_variables(component) if v.is_start)),
         unused_inputs=() if used is None else tuple(name for name in every if name not in used),
         recommended_step=cls.recommended_step,
         sampled=component.is_sampled,
@@ -209,7 +207,7 @@ class Rate:
 
 
 def _rates(variables: tuple[ScalarVariable, ...]) -> tuple[Rate, ...]:
-    states = (v for v in variables if isinstance(v.slot.declaration, State))
+    states = (v for v in variables if isinstance(v.slot.declaration, State) and not v.is_start)
     return tuple(Rate(state, len(variables) + k) for k, state in enumerate(states))
 
 
@@ -240,28 +238,24 @@ def _write_units(root: Any, names: set[str]) -> None:
         etree.SubElement(etree.SubElement(block, "Unit", name=name), "BaseUnit", **exponents, **scale, **shift)
 
 
-def initial_kind(variable: ScalarVariable, depends: Structure) -> str | None:
-    """FMI ``initial``: only parameters and states that nothing computes are exact; inputs have none."""
+def initial_kind(variable: ScalarVariable) -> str | None:
+    """FMI ``initial``: parameters are exact, start values among them; inputs have none."""
     declaration = variable.slot.declaration
     if isinstance(declaration, Input):
         return None
-    if isinstance(declaration, Parameter):
-        return "exact"
-    if isinstance(declaration, State | Memory) and variable.name not in depends.computed:
-        return "exact"
-    return "calculated"
+    return "exact" if variable.is_parameter else "calculated"
 
 
-def _write_variable(block: Any, variable: ScalarVariable, component: Component, depends: Structure) -> None:
+def _write_variable(block: Any, variable: ScalarVariable, component: Component) -> None:
     declaration, slot = variable.slot.declaration, variable.slot
     attributes = {
         "name": variable.name,
         "valueReference": str(variable.reference),
-        "description": declaration.description,
+        "description": variable.description,
         "causality": variable.causality,
         "variability": variable.variability,
     }
-    initial = initial_kind(variable, depends)
+    initial = initial_kind(variable)
     if initial is not None:
         attributes["initial"] = initial
     element = etree.SubElement(
@@ -286,8 +280,9 @@ def _write_structure(
     index = {v.name: str(v.reference + 1) for v in variables} | {rate.name: str(rate.reference + 1) for rate in rates}
     inputs = {v.name for v in variables if v.causality == "input"}
     states = {rate.state.name for rate in rates}
-    exact = {v.name for v in variables if initial_kind(v, depends) == "exact"}
-    computed = [v.name for v in variables if initial_kind(v, depends) == "calculated"]
+    exact = {v.name for v in variables if v.is_parameter}
+    computed = [v.name for v in variables if initial_kind(v) == "calculated"]
+    started = {v.name: start_name(v.name) for v in variables if v.is_kept and start_name(v.name) in exact}
     shown = [v.name for v in variables if v.causality == "output"]
     of_rates = None if depends.rates is None else {f"der({name})": names for name, names in depends.rates.items()}
     unknowns = [name for name in computed if name in shown or name in states]
@@ -302,8 +297,13 @@ def _write_structure(
         parent = etree.SubElement(block, tag)
         for name in members:
             entry = etree.SubElement(parent, "Unknown", index=index[name])
-            if sources is not None:
-                known = sources.get(name, frozenset()) & knowns
+            if tag == "InitialUnknowns" and name in started:
+                entry.set("dependencies", index[started[name]])
+            elif sources is not None:
+                from_what = sources.get(name, frozenset())
+                if tag == "InitialUnknowns":
+                    from_what = frozenset(started.get(source, source) for source in from_what)
+                known = from_what & knowns
                 entry.set("dependencies", " ".join(sorted((index[n] for n in known), key=int)))
 
 

@@ -18,7 +18,9 @@ from typing import Any, ClassVar, ParamSpec, TypeVar
 
 from ..components.component import Component
 from ..components.declarations import Input, ScalarType
+from ..components.errors import ComponentError
 from ..components.simulate import Simulation
+from ..components.tracing import start_name
 from .variables import scalar_variables
 
 P = ParamSpec("P")
@@ -74,9 +76,13 @@ class Fmi2Slave:
         self.simulation.time = 0.0
         self._places: dict[ScalarType, dict[int, tuple[str, int | None]]] = {float: {}, int: {}, bool: {}, str: {}}
         self._real_inputs: dict[int, str] = {}
+        self._kept: set[int] = set()
         for variable in scalar_variables(self.simulation.component):
             slot = variable.slot
-            self._places[slot.type][variable.reference] = slot.name, variable.element
+            name = start_name(slot.name) if variable.is_start else slot.name
+            self._places[slot.type][variable.reference] = name, variable.element
+            if variable.is_kept:
+                self._kept.add(variable.reference)
             if slot.type is float and variable.element is None and isinstance(slot.declaration, Input):
                 self._real_inputs[variable.reference] = slot.name
 
@@ -136,12 +142,13 @@ class Fmi2Slave:
         arrays: dict[str, Any] = {}
         for reference, value in zip(references, values, strict=True):
             name, element = self._place(reference, kind)
+            if reference in self._kept:
+                raise ComponentError(f"{self.component.__name__}.{name} is computed and cannot be set")
             if element is None:
                 self.simulation.set(name, kind(value))
             else:
                 if name not in arrays:
-                    self.simulation.check_settable(self.simulation.component.slots[name])
-                    arrays[name] = self.simulation.component.present_values[name].copy()
+                    arrays[name] = self.simulation.settable(name).copy()
                 arrays[name].flat[element] = kind(value)
         for name, array in arrays.items():
             self.simulation.set(name, array)

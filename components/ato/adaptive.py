@@ -27,10 +27,10 @@ class AdaptiveAto(AtoController):
     )
     recommended_step = 0.02
 
-    feedback_gain = Parameter("N.s/m", 1e5, minimum=0.0, description="g_0")
-    decay = Parameter("1/s", 1.0, minimum=0.0, description="g_1")
-    adaptation_gain = Parameter("1", 20.0, minimum=0.0, description="g_2")
-    smoothing = Parameter("m/s", 0.5, minimum=1e-6, description="epsilon_1")
+    feedback_gain = Parameter("N.s/m", 1e5, tunable=True, minimum=0.0, description="g_0")
+    decay = Parameter("1/s", 1.0, tunable=True, minimum=0.0, description="g_1")
+    adaptation_gain = Parameter("1", 20.0, tunable=True, minimum=0.0, description="g_2")
+    smoothing = Parameter("m/s", 0.5, tunable=True, minimum=1e-6, description="epsilon_1")
 
     robust_gain = Memory("1", 0.0, output=True, description="the adapted gain")
 

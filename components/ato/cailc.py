@@ -50,15 +50,23 @@ class Cailc(LearningAto):
     )
     recommended_step = 0.05
 
-    barrier = Parameter("m/s", 0.1, minimum=1e-6, description="bound v_b of the augmented error")
-    limit_estimate = Parameter("1", True, description="whether the estimates are kept within their bounds")
-    estimate_min = Parameter("1", (-6e4, 0.0, 0.0), shape=(3,), description="lower bounds of the estimates")
-    estimate_max = Parameter("1", (6e4, 100.0, 1.0), shape=(3,), description="upper bounds of the estimates")
+    barrier = Parameter("m/s", 0.1, tunable=True, minimum=1e-6, description="bound v_b of the augmented error")
+    limit_estimate = Parameter(
+        "1", True, tunable=True, description="whether the estimates are kept within their bounds"
+    )
+    estimate_min = Parameter(
+        "1", (-6e4, 0.0, 0.0), tunable=True, shape=(3,), description="lower bounds of the estimates"
+    )
+    estimate_max = Parameter(
+        "1", (6e4, 100.0, 1.0), tunable=True, shape=(3,), description="upper bounds of the estimates"
+    )
     delay = Parameter("1", 0, type=int, minimum=0, maximum=2, description="delay of the loop in samples")
     cruise_speed = Parameter("m/s", 22.2, minimum=0.0, description="speed for which kappa is computed")
-    emergency_deceleration = Parameter("m/s2", 1.2, minimum=0.0, description="deceleration of the emergency brake")
+    emergency_deceleration = Parameter(
+        "m/s2", 1.2, tunable=True, minimum=0.0, description="deceleration of the emergency brake"
+    )
     stop_at_barrier = Parameter(
-        "1", False, description="whether reaching the barrier, too, latches the emergency brake"
+        "1", False, tunable=True, description="whether reaching the barrier, too, latches the emergency brake"
     )
     check_sampling = Parameter("1", True, description="whether to refuse a sampled loop that is unstable")
 

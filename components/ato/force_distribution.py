@@ -25,7 +25,9 @@ class ForceDistribution(Component):
 
     force = Input("N", description="total traction (+) or braking (-) force")
 
-    cost = Parameter("1", 0.1, shape=(vehicles,), minimum=1e-9, description="weight q of a vehicle's squared force")
+    cost = Parameter(
+        "1", 0.1, tunable=True, shape=(vehicles,), minimum=1e-9, description="weight q of a vehicle's squared force"
+    )
 
     vehicle_force = Output("N", shape=(vehicles,), description="force F of each vehicle")
     effective_force = Output("N", shape=(vehicles,), description="mu F of each vehicle, what acts on the train")

@@ -17,9 +17,9 @@ class LearningAto(AtoController, ABC):
     instant, corrected by the present error at once: the learning gain acts as feedback within the trip, too.
     """
 
-    beta = Parameter("N.s/m", 1.1e5, minimum=0.0, description="gain on the augmented error")
+    beta = Parameter("N.s/m", 1.1e5, tunable=True, minimum=0.0, description="gain on the augmented error")
     learning_gain = Parameter(
-        "1", (5e5, 0.01, 0.01), shape=(3,), minimum=0.0, description="gains Gamma of the three estimates"
+        "1", (5e5, 0.01, 0.01), tunable=True, shape=(3,), minimum=0.0, description="gains Gamma of the three estimates"
     )
 
     learned = Tape("1", 0.0, shape=(3,), description="estimates of the trip before at this instant")

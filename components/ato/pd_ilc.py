@@ -23,8 +23,12 @@ class PdIlc(PidFeedback):
     )
     recommended_step = 0.05
 
-    learning_proportional = Parameter("N.s/m", 1.05e5, minimum=0.0, description="learning gain on the speed error")
-    learning_derivative = Parameter("N.s2/m", 1.0, minimum=0.0, description="learning gain on its difference quotient")
+    learning_proportional = Parameter(
+        "N.s/m", 1.05e5, tunable=True, minimum=0.0, description="learning gain on the speed error"
+    )
+    learning_derivative = Parameter(
+        "N.s2/m", 1.0, tunable=True, minimum=0.0, description="learning gain on its difference quotient"
+    )
 
     learned_force = Tape("N", 0.0, description="force of the trip before at this instant")
     driven = Tape("1", 0.0, description="1 where a trip has been driven, 0 where nothing is learned yet")

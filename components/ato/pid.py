@@ -14,10 +14,12 @@ from .port import AtoController, Errors
 class PidFeedback(AtoController, ABC):
     """The PID law on the speed error, for controllers that use it."""
 
-    proportional_gain = Parameter("N.s/m", 300201.0, minimum=0.0, description="gain on the speed error")
-    integral_gain = Parameter("N/m", 1.0, minimum=0.0, description="gain on the integral of the speed error")
+    proportional_gain = Parameter("N.s/m", 300201.0, tunable=True, minimum=0.0, description="gain on the speed error")
+    integral_gain = Parameter(
+        "N/m", 1.0, tunable=True, minimum=0.0, description="gain on the integral of the speed error"
+    )
     derivative_gain = Parameter(
-        "N.s2/m", 10.0, minimum=0.0, description="gain on the speed error's difference quotient"
+        "N.s2/m", 10.0, tunable=True, minimum=0.0, description="gain on the speed error's difference quotient"
     )
 
     integral = Memory("m", 0.0, description="integral of reference speed less speed on this trip")

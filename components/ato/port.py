@@ -38,7 +38,9 @@ class AtoController(Component, ABC):
     sample_time = Parameter("s", 0.01, minimum=1e-6, description="sample period")
     tape_duration = Parameter("s", 200.0, minimum=0.0, description="longest trip the tape can hold")
     mass = Parameter("kg", 194295.0, minimum=1.0, description="mass of the train as the controller knows it")
-    alpha = Parameter("1/s", 8.0, minimum=0.0, description="weight of the position error in the augmented error")
+    alpha = Parameter(
+        "1/s", 8.0, tunable=True, minimum=0.0, description="weight of the position error in the augmented error"
+    )
 
     force = Output("N", description="force for the train")
     position_error = Output("m", description="position less reference; 0 while waiting")

@@ -44,13 +44,23 @@ class ComfortCruise(GuardedCruise):
     )
     recommended_step = 0.1
 
-    alpha = Parameter("1/s", 4.8 / 140.0, minimum=0.0, description="gain on the error to the target speed")
-    beta = Parameter("1/s", 4.8 / 140.0, minimum=0.0, description="gain on speed differences to the neighbours")
-    gamma = Parameter("m4/s2", 1e8, minimum=0.0, description="gain on the potential field (0.1 (m/s2) km3)")
-    gap_min = Parameter("m", 15e3, minimum=0.0, description="lower bound of the gap, front to front")
-    gap_max = Parameter("m", 20e3, minimum=0.0, description="upper bound of the gap, front to front")
-    comfort_layer = Parameter("1", True, description="whether the tanh layer acts; without it the bottom layer alone")
-    acceleration_limit = Parameter("m/s2", 1.0, minimum=1e-6, description="bound of the comfort layer, a_max")
+    alpha = Parameter(
+        "1/s", 4.8 / 140.0, tunable=True, minimum=0.0, description="gain on the error to the target speed"
+    )
+    beta = Parameter(
+        "1/s", 4.8 / 140.0, tunable=True, minimum=0.0, description="gain on speed differences to the neighbours"
+    )
+    gamma = Parameter(
+        "m4/s2", 1e8, tunable=True, minimum=0.0, description="gain on the potential field (0.1 (m/s2) km3)"
+    )
+    gap_min = Parameter("m", 15e3, tunable=True, minimum=0.0, description="lower bound of the gap, front to front")
+    gap_max = Parameter("m", 20e3, tunable=True, minimum=0.0, description="upper bound of the gap, front to front")
+    comfort_layer = Parameter(
+        "1", True, tunable=True, description="whether the tanh layer acts; without it the bottom layer alone"
+    )
+    acceleration_limit = Parameter(
+        "m/s2", 1.0, tunable=True, minimum=1e-6, description="bound of the comfort layer, a_max"
+    )
 
     def derivatives(self) -> Values:
         return self._caution_rates()

@@ -65,15 +65,19 @@ class ConsistCruise(Estimator, ABC):
     ahead_acceleration = Input("m/s2", description="estimated acceleration of the carriage in front of the head")
     ahead_jerk = Input("m/s3", description="jerk command of the carriage in front of the head")
 
-    k1 = Parameter("1/s", 0.6, minimum=1e-6, description="backstepping gain on the spacing error")
-    k2 = Parameter("1/s", 0.8, minimum=1e-6, description="backstepping gain on the speed error")
-    k3 = Parameter("1/s", 1.2, minimum=1e-6, description="backstepping gain on the acceleration error")
+    k1 = Parameter("1/s", 0.6, tunable=True, minimum=1e-6, description="backstepping gain on the spacing error")
+    k2 = Parameter("1/s", 0.8, tunable=True, minimum=1e-6, description="backstepping gain on the speed error")
+    k3 = Parameter("1/s", 1.2, tunable=True, minimum=1e-6, description="backstepping gain on the acceleration error")
     emergency_distance = Parameter("m", 2560.0, minimum=0.0, description="least distance of trains, d_e")
-    service_distance = Parameter("m", 3200.0, minimum=0.0, description="distance the trains settle at, d_s")
+    service_distance = Parameter(
+        "m", 3200.0, tunable=True, minimum=0.0, description="distance the trains settle at, d_s"
+    )
     radio_distance = Parameter("m", 3700.0, minimum=0.0, description="largest distance, reach of the radio, d_c")
     closing_limit = Parameter("m/s", 10.0, minimum=0.0, description="how much slower the train in front may be, a_v")
     opening_limit = Parameter("m/s", 12.0, minimum=0.0, description="how much faster the train in front may be, b_v")
-    rho = Parameter("1/s", 0.014, minimum=0.0, description="rate at which distances settle, in z = e_v + rho e")
+    rho = Parameter(
+        "1/s", 0.014, tunable=True, minimum=0.0, description="rate at which distances settle, in z = e_v + rho e"
+    )
     late_action = Parameter(
         "1", False, description="whether commands act one sample late, as where all instances step at once (jacobi)"
     )

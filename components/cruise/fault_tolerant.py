@@ -34,14 +34,17 @@ _BARRIER = (
 class BarrierCruise(ConsistCruise, ABC):
     """Heads hold distance and speed difference inside their ranges by a barrier-transformed law (eqs. 34-37)."""
 
-    k_z = Parameter("1/s", 0.25, minimum=1e-6, description="gain on the transformed combined error")
-    k_e = Parameter("1/s2", 1e-6, minimum=0.0, description="gain on the transformed distance error")
-    k_a = Parameter("1/s", 1.2, minimum=1e-6, description="gain on the acceleration error")
-    gamma = Parameter("1/s2", 0.01, minimum=1e-9, description="weight that cancels the coupling of z and acceleration")
-    k_d = Parameter("s", 0.02, minimum=1e-9, description="nonlinear damping against estimation errors")
+    k_z = Parameter("1/s", 0.25, tunable=True, minimum=1e-6, description="gain on the transformed combined error")
+    k_e = Parameter("1/s2", 1e-6, tunable=True, minimum=0.0, description="gain on the transformed distance error")
+    k_a = Parameter("1/s", 1.2, tunable=True, minimum=1e-6, description="gain on the acceleration error")
+    gamma = Parameter(
+        "1/s2", 0.01, tunable=True, minimum=1e-9, description="weight that cancels the coupling of z and acceleration"
+    )
+    k_d = Parameter("s", 0.02, tunable=True, minimum=1e-9, description="nonlinear damping against estimation errors")
     clip_fraction = Parameter(
         "1",
         0.9,
+        tunable=True,
         minimum=0.01,
         maximum=0.999,
         description="safe action: fraction of the ranges at which errors are held before they are transformed",

@@ -30,11 +30,17 @@ class FixedDistanceCruise(PairwiseCruise):
     note = "Reconstructed: gains, weight rho and compensation at the own speed are ours, fitted to a published table."
     recommended_step = 0.1
 
-    k = Parameter("1/s", 0.0065, minimum=0.0, description="gain on the error to the target speed (reconstructed)")
-    alpha = Parameter("1/s", 0.037, minimum=0.0, description="gain on speed differences of neighbours (reconstructed)")
-    rho = Parameter("1", 2.0 / 3.0, minimum=0.0, description="weight of the train behind (reconstructed)")
-    gap_gain = Parameter("1/s2", 7.7e-3, minimum=0.0, description="gain on the gap's error, kappa (reconstructed)")
-    desired_gap = Parameter("m", 7.4e3, minimum=0.0, description="gap to keep, front to front")
+    k = Parameter(
+        "1/s", 0.0065, tunable=True, minimum=0.0, description="gain on the error to the target speed (reconstructed)"
+    )
+    alpha = Parameter(
+        "1/s", 0.037, tunable=True, minimum=0.0, description="gain on speed differences of neighbours (reconstructed)"
+    )
+    rho = Parameter("1", 2.0 / 3.0, tunable=True, minimum=0.0, description="weight of the train behind (reconstructed)")
+    gap_gain = Parameter(
+        "1/s2", 7.7e-3, tunable=True, minimum=0.0, description="gain on the gap's error, kappa (reconstructed)"
+    )
+    desired_gap = Parameter("m", 7.4e3, tunable=True, minimum=0.0, description="gap to keep, front to front")
 
     def derivatives(self) -> Values:
         return self._caution_rates()

@@ -38,16 +38,30 @@ class GuardedCruise(CruiseController, ABC):
     outside ``acceleration_limit``, which holds for the law alone: safety goes before comfort.
     """
 
-    fallback = Parameter("1", True, description="whether anything is done about old data")
-    guard = Parameter("1", False, description="whether the safe bound acts at all times, where fallback is on")
-    age_limit = Parameter("s", 0.25, minimum=0.0, description="age from which a neighbour's position is extrapolated")
-    degraded_age = Parameter("s", 1.0, minimum=0.0, description="age from which the train falls back")
-    rejoin_time = Parameter("s", 10.0, minimum=0.1, description="time constant of rejoining after an outage")
-    braking = Parameter("m/s2", 0.6, minimum=1e-3, description="braking the own train is sure to reach, b")
-    ahead_braking = Parameter("m/s2", 1.0, minimum=1e-3, description="hardest braking expected of the train ahead, b_a")
-    reaction_time = Parameter("s", 1.0, minimum=1e-3, description="time before the own brakes act, T")
+    fallback = Parameter("1", True, tunable=True, description="whether anything is done about old data")
+    guard = Parameter(
+        "1", False, tunable=True, description="whether the safe bound acts at all times, where fallback is on"
+    )
+    age_limit = Parameter(
+        "s", 0.25, tunable=True, minimum=0.0, description="age from which a neighbour's position is extrapolated"
+    )
+    degraded_age = Parameter("s", 1.0, tunable=True, minimum=0.0, description="age from which the train falls back")
+    rejoin_time = Parameter(
+        "s", 10.0, tunable=True, minimum=0.1, description="time constant of rejoining after an outage"
+    )
+    braking = Parameter(
+        "m/s2", 0.6, tunable=True, minimum=1e-3, description="braking the own train is sure to reach, b"
+    )
+    ahead_braking = Parameter(
+        "m/s2", 1.0, tunable=True, minimum=1e-3, description="hardest braking expected of the train ahead, b_a"
+    )
+    reaction_time = Parameter("s", 1.0, tunable=True, minimum=1e-3, description="time before the own brakes act, T")
     standstill_gap = Parameter(
-        "m", 250.0, minimum=0.0, description="gap to keep at rest, front to front: train length and margin, s"
+        "m",
+        250.0,
+        tunable=True,
+        minimum=0.0,
+        description="gap to keep at rest, front to front: train length and margin, s",
     )
 
     caution_ahead = State("1", 0.0, description="how much the safe bound still counts, 0 to 1")

@@ -168,9 +168,14 @@ class StateFaultEstimator(Estimator, ABC):
     """
 
     observer_poles = Parameter(
-        "1/s", 2.0, shape=(5,), minimum=1e-3, description="speed at which each mode of the observer's error decays"
+        "1/s",
+        2.0,
+        tunable=True,
+        shape=(5,),
+        minimum=1e-3,
+        description="speed at which each mode of the observer's error decays",
     )
-    position_pole = Parameter("1/s", 2.0, minimum=0.0, description="the same of the position's estimate")
+    position_pole = Parameter("1/s", 2.0, tunable=True, minimum=0.0, description="the same of the position's estimate")
     omega = Parameter("rad/s", 0.5, minimum=1e-3, description="angular frequency of the periodic faults")
 
     observed_position = Memory("m", 0.0, shape=(_carriages,), description="estimated position")

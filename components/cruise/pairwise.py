@@ -21,11 +21,19 @@ class PairwiseCruise(GuardedCruise, ABC):
     A subclass gives P, the speed at which the resistance R is compensated, and the gaps it is made for.
     """
 
-    k = Parameter("1/s", 0.01, minimum=0.0, description="gain on the error to the target speed (reconstructed)")
-    alpha = Parameter("1/s", 0.03, minimum=0.0, description="gain on speed differences of neighbours (reconstructed)")
-    rho = Parameter("1", 1.0, minimum=0.0, description="weight of the train behind (reconstructed)")
+    k = Parameter(
+        "1/s", 0.01, tunable=True, minimum=0.0, description="gain on the error to the target speed (reconstructed)"
+    )
+    alpha = Parameter(
+        "1/s", 0.03, tunable=True, minimum=0.0, description="gain on speed differences of neighbours (reconstructed)"
+    )
+    rho = Parameter("1", 1.0, tunable=True, minimum=0.0, description="weight of the train behind (reconstructed)")
     acceleration_limit = Parameter(
-        "m/s2", 0.0, minimum=0.0, description="hard bound of the law's demand; 0 is none, as in the source's runs"
+        "m/s2",
+        0.0,
+        tunable=True,
+        minimum=0.0,
+        description="hard bound of the law's demand; 0 is none, as in the source's runs",
     )
 
     def outputs(self) -> Values:

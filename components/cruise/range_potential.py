@@ -41,20 +41,38 @@ class RangePotentialCruise(PairwiseCruise):
     note = "Reconstructed: the source's potential is not known here; margins and gains are fitted to prose and a table."
     recommended_step = 0.1
 
-    k = Parameter("1/s", 0.008, minimum=0.0, description="gain on the error to the target speed (reconstructed)")
-    alpha = Parameter("1/s", 0.082, minimum=0.0, description="gain on speed differences of neighbours (reconstructed)")
-    field_gain = Parameter("m/s2", 1.23, minimum=0.0, description="gain on the field, kappa (reconstructed)")
+    k = Parameter(
+        "1/s", 0.008, tunable=True, minimum=0.0, description="gain on the error to the target speed (reconstructed)"
+    )
+    alpha = Parameter(
+        "1/s", 0.082, tunable=True, minimum=0.0, description="gain on speed differences of neighbours (reconstructed)"
+    )
+    field_gain = Parameter(
+        "m/s2", 1.23, tunable=True, minimum=0.0, description="gain on the field, kappa (reconstructed)"
+    )
     field_rho = Parameter(
-        "1", 0.345, minimum=0.0, description="weight of the field of the train behind, beside rho (reconstructed)"
+        "1",
+        0.345,
+        tunable=True,
+        minimum=0.0,
+        description="weight of the field of the train behind, beside rho (reconstructed)",
     )
     low_margin = Parameter(
-        "m", 770.0, minimum=0.0, description="where the field begins above the lower bound (reconstructed)"
+        "m",
+        770.0,
+        tunable=True,
+        minimum=0.0,
+        description="where the field begins above the lower bound (reconstructed)",
     )
     high_margin = Parameter(
-        "m", 422.0, minimum=0.0, description="where the field begins below the upper bound (reconstructed)"
+        "m",
+        422.0,
+        tunable=True,
+        minimum=0.0,
+        description="where the field begins below the upper bound (reconstructed)",
     )
-    gap_min = Parameter("m", 6.5e3, minimum=0.0, description="lower bound of the gap, front to front")
-    gap_max = Parameter("m", 8.0e3, minimum=0.0, description="upper bound of the gap, front to front")
+    gap_min = Parameter("m", 6.5e3, tunable=True, minimum=0.0, description="lower bound of the gap, front to front")
+    gap_max = Parameter("m", 8.0e3, tunable=True, minimum=0.0, description="upper bound of the gap, front to front")
 
     def derivatives(self) -> Values:
         return self._caution_rates()

@@ -40,18 +40,38 @@ class TunablePotentialCruise(PairwiseCruise):
     note = "Reconstructed: the source's formulas and most of its parameters are lost; law and gains are ours."
     recommended_step = 0.1
 
-    k = Parameter("1/s", 0.0094, minimum=0.0, description="gain on the error to the target speed (reconstructed)")
-    alpha = Parameter("1/s", 0.035, minimum=0.0, description="gain on speed differences of neighbours (reconstructed)")
-    rho = Parameter("1", 2.0 / 3.0, minimum=0.0, description="weight of the train behind (reconstructed)")
-    pull_limit = Parameter("m/s2", 2.3, minimum=0.0, description="largest pull of a gap, kappa (reconstructed)")
-    gap_tolerance = Parameter(
-        "m", 50.0, minimum=0.0, description="half width of the band of free gaps, delta: the tuning parameter"
+    k = Parameter(
+        "1/s", 0.0094, tunable=True, minimum=0.0, description="gain on the error to the target speed (reconstructed)"
     )
-    gap_width = Parameter("m", 200.0, minimum=1e-3, description="how soon the pull saturates, w (reconstructed)")
-    gap_base = Parameter("m", 1.8e3, minimum=0.0, description="constant part of the desired gap (reconstructed)")
-    gap_time = Parameter("s", 30.0, minimum=0.0, description="part of the desired gap per speed (reconstructed)")
-    gap_braking = Parameter("m/s2", 0.7, minimum=1e-3, description="braking behind the desired gap (reconstructed)")
-    gap_rate = Parameter("m/s", 1.0, minimum=0.0, description="largest rate of the desired gap (reconstructed)")
+    alpha = Parameter(
+        "1/s", 0.035, tunable=True, minimum=0.0, description="gain on speed differences of neighbours (reconstructed)"
+    )
+    rho = Parameter("1", 2.0 / 3.0, tunable=True, minimum=0.0, description="weight of the train behind (reconstructed)")
+    pull_limit = Parameter(
+        "m/s2", 2.3, tunable=True, minimum=0.0, description="largest pull of a gap, kappa (reconstructed)"
+    )
+    gap_tolerance = Parameter(
+        "m",
+        50.0,
+        tunable=True,
+        minimum=0.0,
+        description="half width of the band of free gaps, delta: the tuning parameter",
+    )
+    gap_width = Parameter(
+        "m", 200.0, tunable=True, minimum=1e-3, description="how soon the pull saturates, w (reconstructed)"
+    )
+    gap_base = Parameter(
+        "m", 1.8e3, tunable=True, minimum=0.0, description="constant part of the desired gap (reconstructed)"
+    )
+    gap_time = Parameter(
+        "s", 30.0, tunable=True, minimum=0.0, description="part of the desired gap per speed (reconstructed)"
+    )
+    gap_braking = Parameter(
+        "m/s2", 0.7, tunable=True, minimum=1e-3, description="braking behind the desired gap (reconstructed)"
+    )
+    gap_rate = Parameter(
+        "m/s", 1.0, tunable=True, minimum=0.0, description="largest rate of the desired gap (reconstructed)"
+    )
 
     desired_gap = State("m", 7.4e3, output=True, description="desired gap d*, front to front")
 

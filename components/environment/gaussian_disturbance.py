@@ -21,7 +21,7 @@ class GaussianDisturbance(Component):
 
     carriages = Size(3, description="number of carriages")
 
-    deviation = Parameter("m/s2", 0.02, minimum=0.0, description="standard deviation")
+    deviation = Parameter("m/s2", 0.02, tunable=True, minimum=0.0, description="standard deviation")
     hold = Parameter("s", 0.01, minimum=1e-6, description="how long a value is held")
 
     gauss = Noise(hold, shape=(carriages,), description="one stream for each carriage")

@@ -23,7 +23,7 @@ class Gust(Component):
         r"with acceleration $a$, size $A$, start_time $t_1$ and stop_time $t_2$.",
     )
 
-    size = Parameter("m/s2", 0.5, description="retarding force per mass in the window; negative pushes")
+    size = Parameter("m/s2", 0.5, tunable=True, description="retarding force per mass in the window; negative pushes")
     start_time = Parameter("s", 210.0, description="begin of the window")
     stop_time = Parameter("s", 240.0, description="end of the window")
 

@@ -53,12 +53,22 @@ class RadioLink(Component):
 
     refresh = Parameter("s", 0.1, minimum=1e-6, description="period of the messages; longer than a step, or one a step")
     offset = Parameter("s", 0.0, minimum=0.0, description="time of the first message")
-    delay = Parameter("s", 0.0, minimum=0.0, description="shortest time a message is under way")
-    jitter = Parameter("s", 0.0, minimum=0.0, description="further time under way, uniform from 0 to this")
-    loss = Parameter("1", 0.0, minimum=0.0, maximum=1.0, description="probability of losing a message, channel good")
-    burst_begin = Parameter("1", 0.0, minimum=0.0, maximum=1.0, description="probability of going bad, per message")
-    burst_end = Parameter("1", 0.5, minimum=0.0, maximum=1.0, description="probability of becoming good, per message")
-    burst_loss = Parameter("1", 1.0, minimum=0.0, maximum=1.0, description="probability of a loss, channel bad")
+    delay = Parameter("s", 0.0, tunable=True, minimum=0.0, description="shortest time a message is under way")
+    jitter = Parameter(
+        "s", 0.0, tunable=True, minimum=0.0, description="further time under way, uniform from 0 to this"
+    )
+    loss = Parameter(
+        "1", 0.0, tunable=True, minimum=0.0, maximum=1.0, description="probability of losing a message, channel good"
+    )
+    burst_begin = Parameter(
+        "1", 0.0, tunable=True, minimum=0.0, maximum=1.0, description="probability of going bad, per message"
+    )
+    burst_end = Parameter(
+        "1", 0.5, tunable=True, minimum=0.0, maximum=1.0, description="probability of becoming good, per message"
+    )
+    burst_loss = Parameter(
+        "1", 1.0, tunable=True, minimum=0.0, maximum=1.0, description="probability of a loss, channel bad"
+    )
 
     outage_begin = Parameter("s", 0.0, description="begin of one more outage, to vary without building anew")
     outage_end = Parameter("s", 0.0, description="end of it; not after its begin: none")

@@ -26,7 +26,7 @@ class Schedule(Component):
     points = Size(1, description="number of breakpoints")
 
     times = Parameter("s", 0.0, shape=(points,), rising=True, description="breakpoints, rising")
-    values = Parameter(unit, 0.0, shape=(points,), description="value from each breakpoint on")
+    values = Parameter(unit, 0.0, tunable=True, shape=(points,), description="value from each breakpoint on")
     interpolate = Parameter("1", False, description="straight lines between the breakpoints instead of steps")
 
     value = Output(unit, description="the signal")

@@ -27,11 +27,19 @@ class Sensor(Component):
     true_position = Input("m", description="position of the train")
     true_speed = Input("m/s", description="speed of the train")
 
-    position_noise = Parameter("m", 0.0, minimum=0.0, description="standard deviation of the position's noise")
-    speed_noise = Parameter("m/s", 0.0, minimum=0.0, description="standard deviation of the speed's noise")
+    position_noise = Parameter(
+        "m", 0.0, tunable=True, minimum=0.0, description="standard deviation of the position's noise"
+    )
+    speed_noise = Parameter(
+        "m/s", 0.0, tunable=True, minimum=0.0, description="standard deviation of the speed's noise"
+    )
     noise_hold = Parameter("s", 0.01, minimum=1e-6, description="how long a random value is held")
-    position_resolution = Parameter("m", 0.0, minimum=0.0, description="resolution of the position; 0 is unlimited")
-    speed_resolution = Parameter("m/s", 0.0, minimum=0.0, description="resolution of the speed; 0 is unlimited")
+    position_resolution = Parameter(
+        "m", 0.0, tunable=True, minimum=0.0, description="resolution of the position; 0 is unlimited"
+    )
+    speed_resolution = Parameter(
+        "m/s", 0.0, tunable=True, minimum=0.0, description="resolution of the speed; 0 is unlimited"
+    )
     delay = Parameter("1", 0, type=int, minimum=0, description="delay in samples, at most longest_delay")
 
     gauss = Noise(noise_hold, shape=(2,), description="one stream for the position, one for the speed")

@@ -18,8 +18,8 @@ class Sinusoid(Component):
 
     unit = Data("m/s2", description="unit of the signal")
 
-    mean = Parameter(unit, 0.0, description="value around which it swings")
-    amplitude = Parameter(unit, 1.0, description="amplitude A")
+    mean = Parameter(unit, 0.0, tunable=True, description="value around which it swings")
+    amplitude = Parameter(unit, 1.0, tunable=True, description="amplitude A")
     period = Parameter("s", 60.0, minimum=1e-6, description="period T")
     phase = Parameter("rad", 0.0, description="phase at the begin")
     start_time = Parameter("s", 0.0, description="begin of the window, t0")

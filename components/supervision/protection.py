@@ -47,12 +47,24 @@ class Protection(Component):
 
     mass = Parameter("kg", 194295.0, minimum=1.0, description="mass of the train")
     by_place = Parameter("1", False, description="whether the limit is one over position, not over trip time")
-    intervene = Parameter("1", True, description="whether the brakes act; otherwise they are only reported")
-    warning_margin = Parameter("m/s", 0.1, minimum=0.0, description="how far below the limit the warning begins")
-    emergency_margin = Parameter("m/s", 0.5, minimum=0.0, description="how far above it the emergency brake begins")
-    service_deceleration = Parameter("m/s2", 0.9, minimum=0.0, description="deceleration of the service brake")
-    emergency_deceleration = Parameter("m/s2", 1.2, minimum=0.0, description="deceleration of the emergency brake")
-    release_at_standstill = Parameter("1", False, description="whether the service brake is released at standstill")
+    intervene = Parameter(
+        "1", True, tunable=True, description="whether the brakes act; otherwise they are only reported"
+    )
+    warning_margin = Parameter(
+        "m/s", 0.1, tunable=True, minimum=0.0, description="how far below the limit the warning begins"
+    )
+    emergency_margin = Parameter(
+        "m/s", 0.5, tunable=True, minimum=0.0, description="how far above it the emergency brake begins"
+    )
+    service_deceleration = Parameter(
+        "m/s2", 0.9, tunable=True, minimum=0.0, description="deceleration of the service brake"
+    )
+    emergency_deceleration = Parameter(
+        "m/s2", 1.2, tunable=True, minimum=0.0, description="deceleration of the emergency brake"
+    )
+    release_at_standstill = Parameter(
+        "1", False, tunable=True, description="whether the service brake is released at standstill"
+    )
 
     service_latched = Memory("1", False, description="whether the service brake is applied")
     emergency_latched = Memory("1", False, description="whether the emergency brake is applied")

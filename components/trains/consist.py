@@ -28,8 +28,10 @@ class Carriages(DavisResistance, ABC):
     coupler_damping = Parameter("N.s/m", 5e3, minimum=0.0, description="damping b of a coupler")
     carriage_spacing = Parameter("m", 25.0, minimum=0.0, description="distance l of carriages whose coupler is slack")
     actuator_lag = Parameter("s", 0.4, minimum=1e-3, description="time constant tau of an actuator")
-    limit_force = Parameter("1", False, description="whether commands are cut off at the force limit")
-    force_limit = Parameter("N", 100e3, minimum=0.0, description="largest command to an actuator, where the limit acts")
+    limit_force = Parameter("1", False, tunable=True, description="whether commands are cut off at the force limit")
+    force_limit = Parameter(
+        "N", 100e3, tunable=True, minimum=0.0, description="largest command to an actuator, where the limit acts"
+    )
 
     def _retardation(self, position: Any, speed: Any) -> list[Any]:
         """N of each carriage in m/s2."""

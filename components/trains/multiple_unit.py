@@ -95,16 +95,26 @@ class MultipleUnit(TripTrain, ABC):
         "1", False, description="whether Davis resistance vanishes at standstill, as v / stiction_speed"
     )
     stiction_speed = Parameter("m/s", 0.02, minimum=1e-6, description="speed from which it acts in full, with stiction")
-    limit_force = Parameter("1", False, description="whether the force limits act")
-    traction_limit = Parameter("N", 400e3, minimum=0.0, description="largest traction force, where limits act")
-    braking_limit = Parameter("N", 400e3, minimum=0.0, description="largest braking force, where limits act")
-    limit_power = Parameter("1", False, description="whether the power limits act")
-    traction_power = Parameter("W", 4e6, minimum=0.0, description="largest traction power, where power limits act")
-    braking_power = Parameter("W", 8e6, minimum=0.0, description="largest braking power, where power limits act")
-    limit_adhesion = Parameter("1", False, description="whether adhesion limits each vehicle's force")
-    adhesion = Parameter("1", 0.15, minimum=0.0, description="adhesion coefficient of a driven or braked vehicle")
+    limit_force = Parameter("1", False, tunable=True, description="whether the force limits act")
+    traction_limit = Parameter(
+        "N", 400e3, tunable=True, minimum=0.0, description="largest traction force, where limits act"
+    )
+    braking_limit = Parameter(
+        "N", 400e3, tunable=True, minimum=0.0, description="largest braking force, where limits act"
+    )
+    limit_power = Parameter("1", False, tunable=True, description="whether the power limits act")
+    traction_power = Parameter(
+        "W", 4e6, tunable=True, minimum=0.0, description="largest traction power, where power limits act"
+    )
+    braking_power = Parameter(
+        "W", 8e6, tunable=True, minimum=0.0, description="largest braking power, where power limits act"
+    )
+    limit_adhesion = Parameter("1", False, tunable=True, description="whether adhesion limits each vehicle's force")
+    adhesion = Parameter(
+        "1", 0.15, tunable=True, minimum=0.0, description="adhesion coefficient of a driven or braked vehicle"
+    )
     actuator_lag = Parameter("s", 0.0, minimum=0.0, description="time constant of the drive; 0 is none")
-    disturbance_size = Parameter("m/s2", 0.0, minimum=0.0, description="largest random load disturbance")
+    disturbance_size = Parameter("m/s2", 0.0, tunable=True, minimum=0.0, description="largest random load disturbance")
     disturbance_hold = Parameter("s", 0.01, minimum=1e-6, description="how long a random value is held")
 
     draw = Noise(disturbance_hold, "uniform", description="the random load disturbance")

@@ -31,9 +31,13 @@ class PointMassTrain(DavisResistance, Train):
     )
 
     mass = Parameter("kg", 400e3, minimum=1.0, description="mass of the train")
-    limit_force = Parameter("1", False, description="whether the two force limits act")
-    traction_limit = Parameter("N", 600e3, minimum=0.0, description="largest traction force, where limits act")
-    braking_limit = Parameter("N", 600e3, minimum=0.0, description="largest braking force, where limits act")
+    limit_force = Parameter("1", False, tunable=True, description="whether the two force limits act")
+    traction_limit = Parameter(
+        "N", 600e3, tunable=True, minimum=0.0, description="largest traction force, where limits act"
+    )
+    braking_limit = Parameter(
+        "N", 600e3, tunable=True, minimum=0.0, description="largest braking force, where limits act"
+    )
 
     starting_resistance = Parameter("N/kg", 0.0, minimum=0.0, description=STARTING)
 

@@ -54,7 +54,7 @@ def _page(component: Component, kind: FmuKind, signals: dict[str, str]) -> str:
         f"<tr><td><code>{html.escape(v.name)}</code></td><td>{v.causality}</td><td>{v.variability}</td>"
         f"<td>{html.escape(v.slot.unit) if v.slot.type is float else v.slot.type.__name__}</td>"
         f"<td>{_start(component, v.slot.name, v.element) if v.causality in ('parameter', 'input') else ''}</td>"
-        f"<td>{html.escape(v.slot.declaration.description)}</td></tr>"
+        f"<td>{html.escape(v.description)}</td></tr>"
         for v in scalar_variables(component)
     )
     note = f'<p class="note">{html.escape(cls.note)}</p>' if cls.note else ""

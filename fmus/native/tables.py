@@ -10,7 +10,7 @@ import numpy as np
 from ...components.component import Component
 from ...components.declarations import Input, Output, Parameter, State, Tape
 from ...components.errors import ComponentError
-from ...components.tracing import feedthrough
+from ...components.tracing import feedthrough, start_name
 from ..variables import ScalarVariable, scalar_variables
 from .ccode import number
 from .trace import Traced
@@ -46,7 +46,9 @@ def model_header(component: Component, traced: Traced, guid: str) -> str:
     held = _held(component)
     texts = [v for v in variables if v.slot.type is str]
     real_inputs = [v for v in variables if v.slot.type is float and v.causality == "input"]
-    states = [v for v in variables if isinstance(v.slot.declaration, State)]
+    states = [v for v in variables if isinstance(v.slot.declaration, State) and not v.is_start]
+    starts = [v for v in variables if v.is_start]
+    started = [v.reference for v in variables if v.is_kept and start_name(v.name) in references]
     standstill = [k for k, v in enumerate(states) if isinstance(d := v.slot.declaration, State) and d.standstill]
     numbers = {v.reference: k for members in (texts, real_inputs) for k, v in enumerate(members)}
     scratch = max(
@@ -60,6 +62,8 @@ def model_header(component: Component, traced: Traced, guid: str) -> str:
         "N_GIVEN": sum(v.causality in ("parameter", "input") for v in variables),
         "FIRST_OUTPUT": layout.outputs[0],
         "N_OUTPUTS": layout.outputs[1],
+        "FIRST_START": starts[0].reference if starts else 0,
+        "N_STARTS": len(starts),
         "FIRST_STATE": layout.states[0],
         "N_STATES": layout.states[1],
         "FIRST_MEMORY": layout.memory[0],
@@ -83,11 +87,12 @@ def model_header(component: Component, traced: Traced, guid: str) -> str:
         f'#define MODEL_NAME "{name}"\n#define MODEL_GUID "{guid}"\n',
         *(f"#define {key} {value}\n" for key, value in constants.items()),
         "".join(f"#define MODEL_{f.upper()} {name}_{f}\n" for f in _EQUATIONS),
-        _array("const Variable model_variables", [_variable(v, component, traced, numbers) for v in variables]),
+        _array("const Variable model_variables", [_variable(v, component, numbers) for v in variables]),
         _array("const int model_real_inputs", [str(v.reference) for v in real_inputs], "0"),
         _array("const char *const model_texts", [_text(v, component) for v in texts], '""'),
         _array("const Noise model_noises", _noises(component, layout.noise[0], references), "{0, 0, 0, 0, false}"),
         _array("const int model_initial_targets", [str(references[n]) for n in traced.initial], "0"),
+        _array("const int model_started", map(str, started), "0"),
         _array("const int model_reinitialised", [str(references[n]) for n in traced.reinitialised], "0"),
         _array("const int model_standstill", map(str, standstill), "0"),
         _array("const bool model_held", ["true" if flag else "false" for flag in held], "false"),
@@ -104,7 +109,7 @@ def _held(component: Component) -> list[bool]:
     return [any(direct[s] for s in slot.scalars) for slot in component.of(Output) for _ in slot.scalars]
 
 
-def _variable(v: ScalarVariable, component: Component, traced: Traced, numbers: Mapping[int, int]) -> str:
+def _variable(v: ScalarVariable, component: Component, numbers: Mapping[int, int]) -> str:
     """``numbers`` are those of texts and of real inputs among their like, by value reference."""
     declaration = v.slot.declaration
     low = "-INFINITY" if declaration.minimum is None else number(declaration.minimum)
@@ -114,19 +119,21 @@ def _variable(v: ScalarVariable, component: Component, traced: Traced, numbers: 
     start = "0.0" if v.slot.type is str else number(element)
     among = numbers.get(v.reference, -1)
     text, real_input = (among, -1) if v.slot.type is str else (-1, among)
-    kinds = f"{_TYPES[v.slot.type]}, {_role(v, traced)}"
+    kinds = f"{_TYPES[v.slot.type]}, {_role(v)}"
     return f"{{{_quoted(v.name)}, {kinds}, {start}, {low}, {high}, {text}, {real_input}}}"
 
 
-def _role(v: ScalarVariable, traced: Traced) -> str:
+def _role(v: ScalarVariable) -> str:
     declaration = v.slot.declaration
+    if v.is_start:
+        return "ROLE_FIXED"
     if isinstance(declaration, Parameter):
         return "ROLE_TUNABLE" if declaration.tunable else "ROLE_FIXED"
     if isinstance(declaration, Input):
         return "ROLE_INPUT"
     if isinstance(declaration, Output):
         return "ROLE_OUTPUT"
-    return "ROLE_COMPUTED" if v.name in traced.initial else "ROLE_START"
+    return "ROLE_KEPT"
 
 
 def _noises(component: Component, first: int, references: dict[str, int]) -> Iterable[str]:

@@ -178,7 +178,7 @@ def layout(component: Component) -> Layout:
     variables = scalar_variables(component)
 
     def place(*kinds: type) -> tuple[int, int]:
-        references = [v.reference for v in variables if isinstance(v.slot.declaration, kinds)]
+        references = [v.reference for v in variables if isinstance(v.slot.declaration, kinds) and not v.is_start]
         return (references[0], len(references)) if references else (len(variables), 0)
 
     columns = sum(len(slot.scalars) for slot in component.of(Tape))

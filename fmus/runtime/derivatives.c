@@ -21,12 +21,13 @@ static bool is_kept(fmi2ValueReference reference)
     return kept && model_variables[reference].type == TYPE_REAL;
 }
 
-/* The direction at the present values. In initialization mode a start that is computed moves with what it follows from:
-   that is found where it was computed, at the values before. */
+/* The direction at the present values. In initialization mode states and memory move with their starts, and one that is
+   computed with what it follows from: that is found where it was computed, at the values before. */
 static void complete_direction(Instance *s)
 {
-#if N_INITIAL > 0
     if (s->phase == PHASE_INITIALIZATION) {
+        take_starts(s->direction);
+#if N_INITIAL > 0
         const double clock[2] = {s->time, s->step};
         double computed[N_INITIAL];
         for (int k = 0; k < N_INITIAL; k++) {
@@ -38,10 +39,8 @@ static void complete_direction(Instance *s)
             s->direction[model_initial_targets[k]] = s->scratch[k];
             s->values[model_initial_targets[k]] = computed[k];
         }
-    }
-#else
-    (void)s;
 #endif
+    }
 }
 
 fmi2Status fmi2GetDirectionalDerivative(fmi2Component c, const fmi2ValueReference vUnknown_ref[], size_t nUnknown,
@@ -65,7 +64,7 @@ fmi2Status fmi2GetDirectionalDerivative(fmi2Component c, const fmi2ValueReferenc
         if (known == NULL) {
             return fmi2Error;
         }
-        if (known->role == ROLE_OUTPUT || (known->role == ROLE_COMPUTED && s->phase == PHASE_INITIALIZATION)) {
+        if (known->role == ROLE_OUTPUT || (known->role == ROLE_KEPT && s->phase == PHASE_INITIALIZATION)) {
             return fail(s, "fmi2GetDirectionalDerivative: %s is computed; it is no known", known->name);
         }
         s->direction[vKnown_ref[k]] = dvKnown[k];

@@ -15,8 +15,8 @@
 
 typedef enum { TYPE_REAL, TYPE_INTEGER, TYPE_BOOLEAN, TYPE_STRING } Type;
 
-/* What may be done with a variable: a START is a state or memory whose start value is set from outside. */
-typedef enum { ROLE_FIXED, ROLE_TUNABLE, ROLE_INPUT, ROLE_OUTPUT, ROLE_START, ROLE_COMPUTED } Role;
+/* What may be done with a variable: states and memory are KEPT; what they start from is a fixed parameter, or computed. */
+typedef enum { ROLE_FIXED, ROLE_TUNABLE, ROLE_INPUT, ROLE_OUTPUT, ROLE_KEPT } Role;
 
 typedef struct {
     const char *name;

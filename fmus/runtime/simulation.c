@@ -75,6 +75,14 @@ static fmi2Status evaluate(Instance *s, double elapsed, bool at_sample)
     return fmi2OK;
 }
 
+/* States and memory to their start values, or their directions to those of their start values. */
+static void take_starts(double *values)
+{
+    for (int k = 0; k < N_STARTS; k++) {
+        values[model_started[k]] = values[FIRST_START + k];
+    }
+}
+
 #if N_INITIAL > 0
 static void forget_computed_starts(Instance *s)
 {
@@ -104,6 +112,7 @@ static fmi2Status prepare(Instance *s)
     if (s->prepared) {
         return fmi2OK;
     }
+    take_starts(s->values);
     if (draw(s) != fmi2OK) {
         return fmi2Error;
     }

@@ -127,13 +127,12 @@ static const Variable *settable(Instance *s, fmi2ValueReference reference, Type 
     if (variable == NULL) {
         return NULL;
     }
-    if (variable->role == ROLE_OUTPUT || variable->role == ROLE_COMPUTED) {
+    if (variable->role == ROLE_OUTPUT || variable->role == ROLE_KEPT) {
         fail(s, "%s: %s is computed and cannot be set", call, variable->name);
         return NULL;
     }
-    if ((variable->role == ROLE_FIXED || variable->role == ROLE_START) && s->phase == PHASE_RUNNING) {
-        fail(s, "%s: %s is %s; it can only be set before the run begins", call, variable->name,
-             variable->role == ROLE_FIXED ? "a fixed parameter" : "a start value");
+    if (variable->role == ROLE_FIXED && s->phase == PHASE_RUNNING) {
+        fail(s, "%s: %s is a fixed parameter; it can only be set before the run begins", call, variable->name);
         return NULL;
     }
     return variable;

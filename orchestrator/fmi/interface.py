@@ -217,6 +217,12 @@ class Interface:
         """Array parameters of one of our own FMUs whose elements must rise."""
         return self.annotation.rising if self.annotation else ()
 
+    def start_name(self, name: str) -> str:
+        """What holds the start value of a variable, an array or a part of one: in our FMUs that is a parameter."""
+        array, bracket, index = name.partition("[")
+        started = self.annotation is not None and array in self.annotation.started
+        return f"{array}_start{bracket}{index}" if started else name
+
     @cached_property
     def unused_inputs(self) -> frozenset[str]:
         """Inputs that one of our own FMUs computes nothing from."""

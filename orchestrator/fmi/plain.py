@@ -11,6 +11,7 @@ from pathlib import Path
 from typing import Any, ParamSpec, TypeVar
 
 from ...components.simulate import Simulation
+from ...components.tracing import start_name
 from ..errors import FmuError
 from .interface import Interface, Type
 from .slave import Channel
@@ -159,4 +160,8 @@ def _place(simulation: Simulation, scalar: str) -> tuple[str, int | None, Any]:
     for slot in simulation.component.slots.values():
         if scalar in slot.scalars:
             return slot.name, slot.scalars.index(scalar) if slot.shape else None, slot.type
+        start = start_name(slot.name)
+        if scalar.partition("[")[0] == start:
+            own = slot.name + scalar.removeprefix(start)
+            return start, slot.scalars.index(own) if slot.shape else None, slot.type
     raise KeyError(scalar)

@@ -24,7 +24,8 @@ def find_starts(system: System, instance: Instance, interface: Interface, wiring
     values: dict[str, Any] = {}
     dropped = []
     for name, given in instance.start.items():
-        scalars = interface.scalars(name)
+        held = interface.start_name(name)
+        scalars = interface.scalars(held)
         signal = SignalName(instance.name, name)
         origin = system.provenance.origins.get(str(signal), instance.origin)
         if scalars is None and instance.swapped:
@@ -32,7 +33,9 @@ def find_starts(system: System, instance: Instance, interface: Interface, wiring
             wiring.left.update(_numbers(signal, given))
         elif scalars is None:
             why = interface.why_left_out(name)
-            valid = (v.name for v in interface.variables.values() if v.settable)
+            valid = (
+                v.name for v in interface.variables.values() if v.settable or interface.start_name(v.name) != v.name
+            )
             near = (
                 ""
                 if why
@@ -42,7 +45,9 @@ def find_starts(system: System, instance: Instance, interface: Interface, wiring
             wiring.problems.append(problem.at(origin))
         else:
             try:
-                values.update(_elements(instance, interface, name, scalars, given))
+                if held != name and held in instance.start:
+                    raise ScenarioError(f"it is given twice, as {name} and as {held}")
+                values.update(_elements(instance, interface, held, scalars, given))
             except ScenarioError as error:
                 wiring.problems += [problem.at(origin) for problem in error.at(str(signal), signal)]
     if dropped:

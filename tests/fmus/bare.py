@@ -68,8 +68,10 @@ class Fmu:
 
     def initialize(self, start=0.0, stop=None, **starts):
         self.enter(start, stop)
-        for name, value in starts.items():
-            assert self.set(name, value) == OK, self.said
+        for name, value in starts.items():  # of a state the start value, which is a parameter
+            array, bracket, index = name.partition("[")
+            start = f"{array}_start{bracket}{index}"
+            assert self.set(start if start in self.references else name, value) == OK, self.said
         assert self.ExitInitializationMode() == OK, self.said
         return self
 

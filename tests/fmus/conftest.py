@@ -142,7 +142,8 @@ class Instance:
 
     def enter(self, **starts):
         self.call("setupExperiment")
-        self.set(starts)
+        for name, value in starts.items():  # of a state the start value, which is a parameter
+            self.set({f"{name}_start" if f"{name}_start" in self.variables else name: value})
         self.call("enterInitializationMode")
         return self
 

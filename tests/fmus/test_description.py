@@ -12,6 +12,7 @@ from lxml import etree
 from railcosim.components import ComponentError
 from railcosim.components.component import evaluated
 from railcosim.components.declarations import Input, Memory, Output, Parameter, State, Tape
+from railcosim.components.tracing import start_name
 from railcosim.fmus.build import build
 from railcosim.fmus.references import resolve
 from railcosim.fmus.units import BASE, parse
@@ -63,18 +64,19 @@ def test_the_schema_is_obeyed(reference, model):
 def test_every_declared_scalar_is_there_with_its_type_unit_bounds_and_text(described):
     component, root = described
     found = variables(root)
-    declared = [
-        (name, slot)
-        for kind in (Parameter, Input, Output, State, Memory)
-        for slot in component.of(kind)
-        for name in slot.scalars
-    ]
+    computed = evaluated(component, "initial")
+    kept = [slot for kind in (State, Memory) for slot in component.of(kind)]
+    started = [(start_name(name), slot) for slot in kept if slot.name not in computed for name in slot.scalars]
+    declared = [(name, slot) for slot in component.of(Parameter) for name in slot.scalars] + started
+    declared += [(name, slot) for kind in (Input, Output) for slot in component.of(kind) for name in slot.scalars]
+    declared += [(name, slot) for slot in kept for name in slot.scalars]
     assert list(found) == [name for name, _ in declared]
     for reference, (name, slot) in enumerate(declared):
         entry, declaration = found[name], slot.declaration
         assert entry["valueReference"] == str(reference)
         assert entry["type"] == TYPES[slot.type]
-        assert entry.get("description", "") == declaration.description
+        assert entry.get("description", "").endswith(declaration.description)
+        assert entry.get("description", "").startswith("start value of ") == (name not in slot.scalars)
         assert entry.get("unit", "1") == (slot.unit if slot.type is float else "1")
         for attribute, bound in (("min", declaration.minimum), ("max", declaration.maximum)):
             shown = entry.get(attribute)
@@ -98,18 +100,21 @@ def test_causality_and_variability(described):
                 assert variability == ("continuous" if smooth else "discrete")
 
 
-def test_only_parameters_and_states_that_nothing_computes_are_exact(described):
+def test_only_parameters_are_exact_and_states_that_nothing_computes_begin_at_one(described):
     component, root = described
-    computed = evaluated(component, "initial")
-    for name, entry in variables(root).items():
-        declaration = component.slots[name.partition("[")[0]].declaration
-        if isinstance(declaration, Input):
-            assert "initial" not in entry
-        elif isinstance(declaration, Output) or declaration.name in computed:
-            assert entry["initial"] == "calculated"
-        else:
-            assert entry["initial"] == "exact"
-        assert ("start" in entry) == (entry.get("initial") != "calculated")
+    computed, found = evaluated(component, "initial"), variables(root)
+    for entry in found.values():
+        expected = {"input": None, "parameter": "exact"}.get(entry["causality"], "calculated")
+        assert entry.get("initial") == expected
+        assert ("start" in entry) == (expected != "calculated")
+    for slot in component.of(State, Memory):
+        for name in slot.scalars:
+            assert (start_name(name) in found) == (slot.name not in computed)
+            if slot.name not in computed:
+                assert (found[start_name(name)]["causality"], found[start_name(name)]["variability"]) == (
+                    "parameter",
+                    "fixed",
+                )
 
 
 def test_initial_unknowns_are_exactly_the_calculated_outputs(described):
@@ -129,6 +134,8 @@ def test_known_dependencies_hold_at_a_few_points(described):
     cls, found = type(component), variables(root)
     direct, initial = unknowns(root, "Outputs"), unknowns(root, "InitialUnknowns")
     random = np.random.default_rng(1)
+    bases = {name.partition("[")[0] for name in found}
+    kept = {slot.name for slot in component.of(State, Memory)}
 
     def value(slot):
         if slot.type is str:
@@ -152,6 +159,7 @@ def test_known_dependencies_hold_at_a_few_points(described):
         }
 
     settable = [s for s in component.slots.values() if s.scalars[0] in found and not isinstance(s.declaration, Output)]
+    settable = [s for s in settable if not isinstance(s.declaration, State | Memory) or start_name(s.name) in bases]
     for _ in range(3):
         base = {slot.name: value(slot) for slot in settable}
         for slot in settable:
@@ -163,7 +171,8 @@ def test_known_dependencies_hold_at_a_few_points(described):
                         output = component.slots[name.partition("[")[0]]
                         k = output.scalars.index(name)
                         if output.name != slot.name and before[output.name][k] != after[output.name][k]:
-                            assert sources & set(slot.scalars), (name, slot.name)
+                            named = {start_name(n) if slot.name in kept else n for n in slot.scalars}
+                            assert sources & named, (name, slot.name)
 
 
 def test_direct_dependencies_name_inputs_and_initial_ones_nothing_calculated(described):
@@ -225,9 +234,11 @@ def test_point_mass_train_by_hand(model):
     assert initial == {
         "acceleration": {
             *("force", "disturbance", "line_resistance", "curve_resistance"),
-            *("mass", "c0", "c1", "c2", "starting_resistance", "speed", *limits),
+            *("mass", "c0", "c1", "c2", "starting_resistance", "speed_start", *limits),
         },
         "applied_force": {"force", *limits},
+        "position": {"position_start"},
+        "speed": {"speed_start"},
     }
     assert found["position"] == {
         "name": "position",
@@ -235,11 +246,22 @@ def test_point_mass_train_by_hand(model):
         "description": "position of the front, growing in the running direction",
         "causality": "output",
         "variability": "continuous",
+        "initial": "calculated",
+        "unit": "m",
+        "type": "Real",
+        "index": found["position"]["index"],
+    }
+    assert found["position_start"] == {
+        "name": "position_start",
+        "valueReference": found["position_start"]["valueReference"],
+        "description": "start value of position: position of the front, growing in the running direction",
+        "causality": "parameter",
+        "variability": "fixed",
         "initial": "exact",
         "unit": "m",
         "start": "0.0",
         "type": "Real",
-        "index": found["position"]["index"],
+        "index": found["position_start"]["index"],
     }
     assert found["limit_force"]["start"] == "false"
     assert found["max_step"]["causality"] == "parameter"
@@ -276,8 +298,9 @@ def test_arrays_have_structured_names_and_their_own_dependencies(model, sample):
         direct
     )
     assert direct["tension[1]"] == set()
-    assert initial["tension[2]"] == {"stiffness[2]", "position[2]", "position[3]"}
-    assert initial["momentum"] == {"mass", "speed[1]", "speed[2]", "speed[3]", "speed[4]"}
+    assert initial["tension[2]"] == {"stiffness[2]", "position_start[2]", "position_start[3]"}
+    assert initial["momentum"] == {"mass", *(f"speed_start[{k}]" for k in range(1, 5))}
+    assert initial["position[3]"] == {"position_start[3]"}
 
 
 def test_an_array_of_two_axes(model, write_component):
@@ -335,6 +358,21 @@ def test_a_sampled_block_says_its_step(model, sample):
 
 
 # ---------------------------------------------------------------- what cannot be described
+
+
+def test_the_name_of_a_start_value_that_is_taken_is_refused_unless_the_start_is_computed(write_component, model):
+    text = (
+        "from railcosim.components import Component, Memory, Parameter\n\n\n"
+        "class C(Component):\n"
+        "    m_start = Parameter('m', 2.0)\n"
+        "    m = Memory('m', output=True)\n\n"
+        "    def update(self):\n"
+        "        return {'m': self.m}\n"
+    )
+    with pytest.raises(ComponentError, match=r"C\.m_start is the name of m's start value; choose another, or let init"):
+        build(write_component(text))
+    root = model(write_component(text + "\n    def initial(self):\n        return {'m': self.m_start}\n", folder="b"))
+    assert unknowns(root, "InitialUnknowns") == {"m": {"m_start"}}
 
 
 def test_a_name_that_fmi_does_not_know_is_refused(write_component):

@@ -216,9 +216,9 @@ def packaged(reference, arguments, script, kind):
     """The same rows out of an FMU."""
     folder, description = unpacked(reference, tuple(arguments.items()), kind)
     component = resolve(reference)(**arguments)
-    slots = {}
+    slots, starts = {}, {}
     for variable in scalar_variables(component):
-        slots.setdefault(variable.slot.name, []).append(variable.reference)
+        (starts if variable.is_start else slots).setdefault(variable.slot.name, []).append(variable.reference)
     here = os.getcwd()
     fmu = FMU2Slave(
         guid=description.guid,
@@ -231,8 +231,8 @@ def packaged(reference, arguments, script, kind):
     def set_all(given):
         for name, value in given.items():
             kind = _TYPES[component.slots[name].type]
-            if slots.get(name):
-                getattr(fmu, f"set{kind}")(slots[name], np.ravel(np.asarray(value, dtype=object)).tolist())
+            if references := starts.get(name) or slots.get(name):
+                getattr(fmu, f"set{kind}")(references, np.ravel(np.asarray(value, dtype=object)).tolist())
 
     def row():
         cells = []

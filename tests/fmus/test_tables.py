@@ -42,10 +42,17 @@ def test_variables_say_type_role_start_and_bounds():
     assert rows["door"] == '{"door", TYPE_BOOLEAN, ROLE_INPUT, 0.0, -INFINITY, INFINITY, -1, -1},'
     assert rows["remark"] == '{"remark", TYPE_STRING, ROLE_INPUT, 0.0, -INFINITY, INFINITY, 2, -1},'
     assert rows["y[2]"] == '{"y[2]", TYPE_REAL, ROLE_OUTPUT, 0.0, -INFINITY, INFINITY, -1, -1},'
-    assert "ROLE_START" in rows["x[1]"]
-    assert "ROLE_COMPUTED" in rows["v"]
-    assert "ROLE_COMPUTED" in rows["m[2]"]
-    assert "ROLE_START" in rows["n"]
+    assert all("ROLE_KEPT" in rows[name] for name in ("x[1]", "v", "m[2]", "n"))
+    assert rows["x_start[2]"] == '{"x_start[2]", TYPE_REAL, ROLE_FIXED, 1.0, -INFINITY, INFINITY, -1, -1},'
+
+
+def test_what_starts_from_a_parameter_is_told_with_it():
+    text = header(resolve(MIXED)())
+    names = [re.search(r'"(.*?)"', row)[1] for row in table(text, "model_variables")]
+    started = [names[int(row.strip(" ,"))] for row in table(text, "model_started")]
+    assert started == ["x[1]", "x[2]", "n", "odd", "last_trip"]
+    first, count = constants(text)["FIRST_START"], constants(text)["N_STARTS"]
+    assert names[first : first + count] == ["x_start[1]", "x_start[2]", "n_start", "odd_start", "last_trip_start"]
 
 
 def test_real_inputs_are_numbered():
@@ -67,9 +74,9 @@ def test_outputs_with_feed_through_are_held_as_whole_arrays():
 
 
 def test_values_given_to_the_component_are_its_starts():
-    text = header(PointMassTrain(speed=0.1, limit_force=True))
-    assert '"speed", TYPE_REAL, ROLE_START, 0.1,' in text
-    assert '"limit_force", TYPE_BOOLEAN, ROLE_FIXED, 1.0,' in text
+    text = header(PointMassTrain(speed=0.1, mass=2.0))
+    assert '"speed_start", TYPE_REAL, ROLE_FIXED, 0.1,' in text
+    assert '"mass", TYPE_REAL, ROLE_FIXED, 2.0,' in text
 
 
 class Labels(Component):

@@ -88,7 +88,7 @@ def test_in_initialization_a_computed_start_moves_with_what_it_follows_from(load
     """v = u[1]^2 at the start, z = tanh(x[1] + v), der(v) = x[1] - v; afterwards v stands on its own."""
     fmu = load(MIXED).enter()
     fmu.set("u[1]", 0.5)
-    unknowns, knowns, direction = ("v", "z", "der(v)", "m[1]", "m[2]"), ("u[1]", "x[1]", "u[2]"), (2.0, 0.5, 1.0)
+    unknowns, knowns, direction = ("v", "z", "der(v)", "m[1]", "m[2]"), ("u[1]", "x_start[1]", "u[2]"), (2.0, 0.5, 1.0)
     slope = 1.0 - math.tanh(1.25) ** 2
     expected = [2.0, slope * 2.5, 0.5 - 2.0, 4.0, 2.0]
     found = fmu.directional(unknowns, knowns, direction)
@@ -105,6 +105,10 @@ def test_a_start_that_is_computed_moves_until_it_stands_on_its_own(load):
     """x = 1 / u and y = 3 x: dx = -du / u^2 in initialization mode, and 0 afterwards."""
     fmu = load(f"{Path(__file__).parent / 'samples.py'}:Begins").enter()
     assert fmu.directional(("x", "y", "der(x)"), ("u",), (2.0,)) == [-8.0, -24.0, 8.0]
+    train = load("PointMassTrain").enter()
+    assert train.directional(("speed", "der(position)"), ("speed_start",), (2.0,)) == [2.0, 2.0]
+    assert train.ExitInitializationMode() == OK
+    assert train.directional(("speed", "der(position)"), ("speed_start",), (2.0,)) == [0.0, 0.0]
     assert fmu.get("x") == 2.0, "and stays as it was computed"
     assert fmu.directional(("y",), ("x",), (1.0,)) == ERROR
     assert fmu.ExitInitializationMode() == OK

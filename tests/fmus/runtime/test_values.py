@@ -124,8 +124,14 @@ def test_computed_starts_follow_and_cannot_be_set(load):
     assert fmu.get("v") == -9.0
     assert fmu.set("v", 1.0) == ERROR
     assert "computed" in fmu.said
-    assert fmu.set("x[1]", 7.0) == OK
+    assert fmu.set("x[1]", 7.0) == ERROR
+    assert "computed" in fmu.said
+    assert fmu.set("x_start[1]", 7.0) == OK
     assert fmu.get("x[1]") == 7.0
+    assert fmu.ExitInitializationMode() == OK
+    assert fmu.set("x_start[1]", 8.0) == ERROR
+    assert "a fixed parameter; it can only be set before the run" in fmu.said
+    assert (fmu.get("x_start[1]"), fmu.get("x[1]")) == (7.0, 7.0)
 
 
 def test_outputs_are_fresh_after_a_set_and_held_over_a_step(load):
@@ -185,7 +191,7 @@ def test_empty_arrays_are_no_variables(load, write_component):
     )
     fmu = load(single).initialize()
     assert fmu.step() == OK
-    assert set(fmu.references) == {"max_step", "x[1]", "der(x[1])"}
+    assert set(fmu.references) == {"max_step", "x_start[1]", "x[1]", "der(x[1])"}
 
 
 def test_bounds_and_starts_are_those_of_the_component(load):

@@ -42,7 +42,8 @@ def started(resolve, mine):
         ({"row": np.arange(3.0)}, {"row[1]": 0.0, "row[2]": 1.0, "row[3]": 2.0}),
         ({"row[2]": 5.0}, {"row[2]": 5.0}),
         ({"one": [5.0]}, {"one[1]": 5.0}),  # an array of one is an array
-        ({"x": -3.0}, {"x": -3.0}),
+        ({"x": -3.0}, {"x_start": -3.0}),  # a state begins at a parameter, by either name
+        ({"x_start": -3.0}, {"x_start": -3.0}),
     ],
 )
 def test_start_values(started, given, expected):
@@ -74,6 +75,7 @@ def test_start_values(started, given, expected):
         ({"row": [1.0]}, "s.row: takes 3 values, 1 given"),
         ({"row": [1.0, 2.0, True]}, "s.row: takes a number, not True"),
         ({"gain": [1.0]}, "s.gain: takes a single value, not the list [1.0]"),
+        ({"x": 1.0, "x_start": 1.0}, "s.x: it is given twice, as x and as x_start"),
         ({"y": 1.0}, "s.y: it is computed (causality output) and cannot be set"),
         ({"gain": "j + 1"}, "s.gain: 'j + 1', column 1: unknown name 'j'"),
         ({"gain": "train.speed"}, "s.gain: 'train.speed': a signal such as 'train.speed' has no value before the run"),
