@@ -143,7 +143,9 @@ class Instance:
     def enter(self, **starts):
         self.call("setupExperiment")
         for name, value in starts.items():  # of a state the start value, which is a parameter
-            self.set({f"{name}_start" if f"{name}_start" in self.variables else name: value})
+            array, bracket, index = name.partition("[")
+            start = f"{array}_start{bracket}{index}"
+            self.set({start if start in self.variables else name: value})
         self.call("enterInitializationMode")
         return self
 

@@ -171,7 +171,7 @@ def test_a_sampled_block_says_its_period(sample):
     cls = resolve(sample("Counter"))
     assert "here sample_time = 0.01 s" in advice(cls(sample_time=0.01))
     assert "sample_time = 0, which samples once per communication step" in advice(cls(sample_time=0.0))
-    assert "use a fixed communication step" in advice(cls())
+    assert "it takes any communication step" in advice(cls())
 
 
 def test_what_cannot_be_traced_is_said(write_component):

@@ -89,8 +89,9 @@ def test_the_description_says_what_a_native_fmu_can(tmp_path):
 
 def test_it_runs_in_fmpy_as_in_plain_python(tmp_path):
     given = {"force": 3e5, "speed": 3.0}
+    starts = {"force": 3e5, "speed_start": 3.0}
     result = fmpy.simulate_fmu(
-        str(build("PointMassTrain", kind="native")), stop_time=10.0, output_interval=0.5, start_values=given
+        str(build("PointMassTrain", kind="native")), stop_time=10.0, output_interval=0.5, start_values=starts
     )
     expected = simulate(resolve("PointMassTrain")(**given), 10.0, 0.5)
     for name in ("position", "speed", "acceleration"):

@@ -48,7 +48,7 @@ def test_one_train_under_our_force_runs_our_trajectory(scene):
 
 def test_a_python_fmu_runs_in_fmpy_and_agrees_with_the_native_one(native):
     paths = [build("PointMassTrain", kind=kind) for kind in ("python", "native")]
-    starts = {"speed": 60.0, "position": 5.0}
+    starts = {"speed_start": 60.0, "position_start": 5.0}
     runs = [
         fmpy.simulate_fmu(str(p), stop_time=5.0, step_size=0.1, output_interval=0.1, start_values=starts) for p in paths
     ]
