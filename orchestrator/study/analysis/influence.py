@@ -48,10 +48,18 @@ class Influence:
     total: Estimate = UNKNOWN
 
     @property
+    def of_ranks(self) -> Estimate:
+        """The square of the rank correlation: the share of the ranks' variance that goes up or down with it."""
+        value, *ends = self.correlation
+        low = 0.0 if self.correlation.low < 0 < self.correlation.high else min(x * x for x in ends)
+        return Estimate(value * value, low, max(x * x for x in ends))
+
+    @property
     def strength(self) -> float:
-        """What parameters are ordered by: the best of these that is known; 0 where none is."""
-        known = (self.total.value, self.first.value, abs(self.correlation.value))
-        return next((value for value in known if not math.isnan(value)), 0.0)
+        """What parameters are ordered by: the total index, else the larger of `first` and `of_ranks`; or 0."""
+        # A single run that goes astray spoils shares of the variance, but not those of ranks.
+        known = [self.total.value] if not math.isnan(self.total.value) else [self.first.value, self.of_ranks.value]
+        return max((value for value in known if not math.isnan(value)), default=0.0)
 
 
 @dataclass(frozen=True)

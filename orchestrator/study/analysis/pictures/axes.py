@@ -20,6 +20,8 @@ PASS, FAIL, BROKEN = "#0072B2", "#D55E00", "#777777"
 """Of runs that keep a requirement, break it, or gave no verdict."""
 _MOST_TEXTS = 20
 _LETTERS = 18
+_REACH = 1.5
+"""How far a picture goes beyond what nine of ten numbers lie between, in widths of that."""
 
 
 class Axis:
@@ -104,6 +106,17 @@ def _count_by_tens(ax: Axes, side: Literal["x", "y"]) -> None:
     axis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
     axis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
     axis.set_minor_locator(NullLocator())
+
+
+def fences(values: Array) -> tuple[float, float]:
+    """Between what numbers are drawn: all of them, but for outliers far beyond where most are.
+
+    Args:
+        values: (n,), finite, at least one.
+    """
+    low, high = (float(q) for q in np.quantile(values, (0.05, 0.95)))
+    reach = _REACH * (high - low)
+    return (max(float(values.min()), low - reach), min(float(values.max()), high + reach)) if reach else (low, high)
 
 
 def folded(text: str, letters: int = _LETTERS) -> str:

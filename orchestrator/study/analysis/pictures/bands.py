@@ -63,5 +63,15 @@ def draw_bands(ax: Axes, series: pd.DataFrame, signal: str, *, label: str, worst
     if worst is not None and worst in runs:
         (own,) = values[runs == worst]
         ax.plot(times, own[seen], color=FAIL, linewidth=1.2, linestyle="--", label=f"worst run ({worst})")
+    ax.set_ylim(*_limits(table))
     name_axis(ax, "y", label, small=False)
     ax.margins(x=0)
+
+
+def _limits(table: Array) -> tuple[float, float]:
+    """Between what a signal is drawn: all of it, but for runs that leave the others far behind."""
+    below, above = np.nanquantile(table, (0.05, 0.95), axis=0)
+    low, high = float(below.min()), float(above.max())
+    low, high = max(float(np.nanmin(table)), 2 * low - high), min(float(np.nanmax(table)), 2 * high - low)
+    pad = 0.05 * (high - low) or 0.5
+    return low - pad, high + pad

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from ....figures import COLOURS
 from ..influence import Influence, Sensitivity
 from ..summary import Kept
-from .axes import FAIL, PASS, folded
+from .axes import FAIL, PASS, fences, folded
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -30,11 +30,18 @@ def draw_margins(ax: Axes, kept: Kept, margins: NDArray[np.float64], *, label: s
         label: of the margins, with their unit.
     """
     finite = margins[np.isfinite(margins)]
-    low, high = min(finite.min(), 0.0), max(finite.max(), 0.0)
+    inner = fences(finite)
+    low, high = min(inner[0], 0.0), max(inner[1], 0.0)
     width = (high - low or 1.0) / min(40, 8 + math.isqrt(len(finite)))
     edges: Any = np.arange(math.floor(low / width), math.floor(high / width) + 2) * width  # 0 is one of them
-    ax.hist(finite[finite < 0], bins=edges, color=FAIL)
-    ax.hist(finite[finite >= 0], bins=edges, color=PASS)
+    seen = np.clip(finite, edges[0], edges[-1])  # the first and the last take what lies beyond
+    ax.hist(seen[finite < 0], bins=edges, color=FAIL)
+    ax.hist(seen[finite >= 0], bins=edges, color=PASS)
+    beyond = [
+        f"{count} {side}"
+        for side, count in (("below", (finite < edges[0]).sum()), ("above", (finite > edges[-1]).sum()))
+        if count
+    ]
     ax.axvline(0.0, color="black", linewidth=0.9)
     judged = kept.passed + kept.failed
     text = f"holds in {kept.passed} of {judged} runs"
@@ -42,7 +49,7 @@ def draw_margins(ax: Axes, kept: Kept, margins: NDArray[np.float64], *, label: s
         text += f": {kept.rate.value:.1%} ({kept.rate.low:.1%} to {kept.rate.high:.1%})"
     lost = len(margins) - len(finite)
     ax.set_title(folded(kept.name, 60) + f"\n{text}" + (f"; {lost} without a margin" if lost else ""), fontsize=9)
-    ax.set_xlabel(label)
+    ax.set_xlabel(f"{label}; {' and '.join(beyond)} what is shown, in the outermost bars" if beyond else label)
     ax.set_ylabel("runs")
     ax.locator_params("y", integer=True, nbins=4)
 
@@ -58,7 +65,8 @@ def draw_influences(ax: Axes, found: Sensitivity, *, label: str) -> None:
     shown = found.influences[:MOST_PARAMETERS][::-1]
     kinds = [("total", "with others", COLOURS[4]), ("first", "alone", COLOURS[0])]
     kinds = [kind for kind in kinds if any(_is_known(one, kind[0]) for one in shown)]
-    kinds = kinds or [("correlation", "rank correlation", COLOURS[2])]
+    if len(kinds) < 2:
+        kinds.insert(0, ("of_ranks", "rank correlation²", COLOURS[2]))
     height = 0.76 / len(kinds)
     for k, (name, what, colour) in enumerate(kinds):
         places = np.arange(len(shown)) + (k - (len(kinds) - 1) / 2) * height
@@ -72,12 +80,8 @@ def draw_influences(ax: Axes, found: Sensitivity, *, label: str) -> None:
     ax.set_yticks(range(len(shown)), [folded(one.name, 34) for one in shown])
     ax.grid(False, axis="y")
     ax.axvline(0.0, color="black", linewidth=0.8)
-    ax.set_xlim(*_limits(kinds[0][0]))
+    ax.set_xlim(-0.1, 1.1)
     ax.set_title(folded(label, 70))
-
-
-def _limits(kind: str) -> tuple[float, float]:
-    return (-1.05, 1.05) if kind == "correlation" else (-0.1, 1.1)
 
 
 def _is_known(one: Influence, name: str) -> bool:

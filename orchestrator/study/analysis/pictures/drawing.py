@@ -197,7 +197,7 @@ class _Study:
         found = [one for one in made if len(one.influences) > 1 and one.influences[0].strength]
         if found:
             method = found[0].method
-            how = f"shares of the variance, by {method}" if method else "rank correlation"
+            how = f"shares of the variance, by {method}" if method else "shares of the variance of ranks"
             with self.pages(f"What matters; {how}", len(found), height_of(found)) as axes:
                 for ax, one in zip(axes, found, strict=True):
                     draw_influences(ax, one, label=self.label(one.output))

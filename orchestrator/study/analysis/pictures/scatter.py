@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any, Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from .axes import FAIL, PASS, Axis, name_axis
+from .axes import FAIL, PASS, Axis, fences, name_axis
 from .maps import draw_marks
 
 if TYPE_CHECKING:
@@ -61,7 +61,7 @@ def _draw_spread(ax: Axes, column: Column, verdicts: NDArray[Any]) -> None:
     _, values, axis = column
     there = np.isfinite(values)
     if there.any():
-        bins: Any = np.histogram_bin_edges(values[there], 20)
+        bins: Any = np.linspace(*fences(values[there]), 21) if np.ptp(values[there]) else 20
         if axis is not None and axis.dimension.values:
             bins, values = axis.edges(), axis.values
         elif axis is not None and axis.is_log:
@@ -74,10 +74,15 @@ def _draw_spread(ax: Axes, column: Column, verdicts: NDArray[Any]) -> None:
 
 
 def _put(ax: Axes, column: Column, side: Literal["x", "y"], *, is_outer: bool) -> None:
-    label, _, axis = column
+    label, values, axis = column
     if axis is not None:
         axis.put_on(ax, side, label=is_outer, small=True)
         return
     ax.locator_params(side, nbins=3)
+    finite = values[np.isfinite(values)]
+    if len(finite):
+        low, high = fences(finite)
+        pad = 0.05 * (high - low) or 0.5
+        getattr(ax, f"set_{side}lim")(low - pad, high + pad)
     if is_outer:
         name_axis(ax, side, label, small=True)

@@ -4,7 +4,7 @@ import math
 
 import numpy as np
 import pytest
-from railcosim.orchestrator.study.analysis import outputs_of, sensitivity
+from railcosim.orchestrator.study.analysis import Estimate, Influence, outputs_of, sensitivity
 
 ISHIGAMI = {f"x{k}": "uniform(-3.141592653589793, 3.141592653589793)" for k in (1, 2, 3)}
 FIRST = {"x1": 0.3139, "x2": 0.4424, "x3": 0.0}
@@ -104,6 +104,18 @@ def test_spearmans_interval_covers_as_often_as_it_says(studied):
         made = {one.name: one for one in sensitivity(frame, plan, "metric.y").influences}["a"].correlation
         covered += made.low <= known <= made.high
     assert 44 <= covered <= 50
+
+
+def test_one_run_astray_does_not_spoil_the_order(studied):
+    vary = {"idle": "0:1", "a": "0:1"}
+    frame, plan = studied(vary, {"metric.y": lambda i, a: np.where(np.arange(200) == 7, 1e9, a + 0.1 * i)}, 200)
+    assert [one.name for one in sensitivity(frame, plan, "metric.y").influences] == ["a", "idle"]
+
+
+def test_the_square_of_a_correlation_keeps_its_interval():
+    for given, squared in (((0.5, 0.25, 0.75), (0.25, 0.0625, 0.5625)), ((-0.5, -0.75, 0.25), (0.25, 0.0, 0.5625))):
+        assert Influence("a", Estimate(*given)).of_ranks == squared
+    assert math.isnan(Influence("a").of_ranks.value)
 
 
 def test_what_says_nothing_is_not_said(studied):

@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from railcosim.orchestrator.study.analysis.pictures.axes import Axis, folded
+from railcosim.orchestrator.study.analysis.pictures.axes import Axis, fences, folded
 
 
 def axis(studied, what, count=20, design="random"):
@@ -60,3 +60,9 @@ def test_many_words_are_not_all_written(studied, axes):
 )
 def test_names_are_folded_where_they_part(text, letters, lines):
     assert folded(text, letters) == lines
+
+
+def test_outliers_lie_beyond_the_fences():
+    assert fences(np.arange(101.0)) == (0, 100)
+    assert fences(np.append(np.arange(101.0), 1e9)) == pytest.approx((0, 95.95 + 1.5 * 90.9))
+    assert fences(np.array([3.0])) == (3, 3)

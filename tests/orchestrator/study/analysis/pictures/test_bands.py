@@ -45,3 +45,14 @@ def test_what_is_drawn(axes):
     ax = axes()
     draw_bands(ax, given, "v", label="v", worst=99)
     assert len(ax.lines) == 1
+    assert ax.get_ylim() == pytest.approx((-0.6, 12.6))
+
+
+def test_a_run_that_goes_astray_leaves_the_others_to_be_seen(axes):
+    time = np.arange(3.0)
+    ax = axes()
+    draw_bands(ax, series(*[(time, 1e6 * (k == 0) + k + time) for k in range(41)]), "v", label="v")
+    assert ax.get_ylim()[1] < 100
+    constant = series((time, 0 * time), (time, 0 * time))
+    draw_bands(ax, constant, "v", label="v")
+    assert ax.get_ylim() == (-0.5, 0.5)

@@ -43,6 +43,25 @@ def test_bars_are_the_indices_that_are_known(axes):
     ranked = Sensitivity("metric.y", 9, "", 0.5, tuple(Influence(f"p{k}", Estimate(-0.5)) for k in range(20)))
     ax = axes()
     draw_influences(ax, ranked, label="y")
-    assert [bar.get_width() for bar in ax.patches] == [-0.5] * 12
-    assert ax.get_xlim()[0] < -1
+    assert [bar.get_width() for bar in ax.patches] == [0.25] * 12
+    first = Influence("p", Estimate(0.5, -0.1, 0.9), first=Estimate(0.3, 0.2, 0.4))
+    ax = axes()
+    draw_influences(ax, Sensitivity("metric.y", 9, "RBD-FAST", 0.5, (first,)), label="y")
+    assert [bar.get_width() for bar in ax.patches] == [0.25, 0.3]
+
+
+def test_what_lies_far_beyond_is_in_the_outermost_bars(studied, axes):
+    frame, plan = studied({"a": "-1:1"}, {"margin.m": lambda a: np.where(np.arange(200) < 3, [-1e6], a)}, 200)
+    (kept,) = summarize(frame, plan).requirements
+    ax = axes()
+    draw_margins(ax, kept, frame["margin.m"].to_numpy(), label="margin")
+    assert sum(bar.get_height() for bar in ax.patches) == 200
+    assert ax.get_xlabel() == "margin; 3 below what is shown, in the outermost bars"
+    assert ax.get_xlim()[0] > -10
+    draw_margins(ax, kept, -frame["margin.m"].to_numpy(), label="margin")
+    assert ax.get_xlabel() == "margin; 3 above what is shown, in the outermost bars"
+
+
+def test_how_high_a_page_is():
+    ranked = Sensitivity("metric.y", 9, "", 0.5, tuple(Influence(f"p{k}") for k in range(20)))
     assert math.isclose(height_of([ranked]) - height_of([]), 0.75 + 12 * 0.33)

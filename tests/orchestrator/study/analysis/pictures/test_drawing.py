@@ -64,7 +64,7 @@ def test_of_many_parameters_the_strongest_two(drawn):
     heading, (ax,) = made["where-spacing-holds.png"]
     assert heading == "Where spacing holds; 1 other varies as well"
     assert {ax.get_xlabel(), ax.get_ylabel()} == set(PAIR)
-    assert made["what-matters.png"][0] == "What matters; rank correlation"
+    assert made["what-matters.png"][0] == "What matters; shares of the variance of ranks"
 
 
 def test_a_scatter_matrix_of_very_many_runs_shows_the_first(drawn, monkeypatch):
