@@ -27,6 +27,7 @@ from .published import (
 from .requirements import Verdict, parse_requirement
 from .signals import Part, Signals, parts_of
 from .syntax import Call, Node, Number, Operation, Reference
+from .vocabulary import Names
 
 __all__ = [
     "BAD",
@@ -43,6 +44,7 @@ __all__ = [
     "Judge",
     "Metric",
     "MetricChange",
+    "Names",
     "Node",
     "Number",
     "Operation",

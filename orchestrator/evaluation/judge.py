@@ -43,30 +43,34 @@ class Judge:
         self._requirements = {name: _read(parse_requirement, name, text) for name, text in requirements.items()}
 
     @cached_property
-    def metric_problems(self) -> list[Problem]:
-        """Every problem of the metrics that can be found before a run."""
-        return [
-            problem.at(f"metric '{name}'")
+    def metric_faults(self) -> dict[str, list[Problem]]:
+        """What can be found to be wrong with each metric before a run."""
+        return {
+            name: metric.at(f"metric '{name}'")
+            if isinstance(metric, ExpressionError)
+            else _at(f"metric '{name}'", check_metric(metric, self._names, self._steady, self._parameters))
             for name, metric in self._metrics.items()
-            for problem in (
-                metric.problems
-                if isinstance(metric, ExpressionError)
-                else check_metric(metric, self._names, self._steady, self._parameters)
-            )
-        ]
+        }
 
     @cached_property
+    def requirement_faults(self) -> dict[str, list[Problem]]:
+        """What can be found to be wrong with each requirement before a run."""
+        return {
+            name: requirement.at(f"requirement '{name}'")
+            if isinstance(requirement, ExpressionError)
+            else _at(f"requirement '{name}'", requirement.check(self._names, self._steady, self._parameters))
+            for name, requirement in self._requirements.items()
+        }
+
+    @property
+    def metric_problems(self) -> list[Problem]:
+        """Every problem of the metrics that can be found before a run."""
+        return [problem for problems in self.metric_faults.values() for problem in problems]
+
+    @property
     def requirement_problems(self) -> list[Problem]:
         """Every problem of the requirements that can be found before a run."""
-        return [
-            problem.at(f"requirement '{name}'")
-            for name, requirement in self._requirements.items()
-            for problem in (
-                requirement.problems
-                if isinstance(requirement, ExpressionError)
-                else requirement.check(self._names, self._steady, self._parameters)
-            )
-        ]
+        return [problem for problems in self.requirement_faults.values() for problem in problems]
 
     @cached_property
     def indices(self) -> dict[str, tuple[int | None, ...]]:
@@ -136,6 +140,10 @@ def _read(read: Callable[..., R], *text: Any) -> R | ExpressionError:
         return read(*text)
     except ExpressionError as error:
         return error
+
+
+def _at(place: str, problems: list[Problem]) -> list[Problem]:
+    return [problem.at(place) for problem in problems]
 
 
 def _known(read: R | ExpressionError) -> R:

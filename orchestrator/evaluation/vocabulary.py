@@ -26,6 +26,7 @@ class Names(Collection[str]):
     def __init__(self, names: Iterable[str]) -> None:
         self._names = frozenset(names)
         self._counts: dict[str, int] = {}
+        self._sorted: dict[str, dict[str, list[tuple[list[str], str]]]] = {}
         self.known: dict[Hashable, Any] = {}
         """What others found out about them."""
 
@@ -65,7 +66,7 @@ class Names(Collection[str]):
         family = _joined((name, ":" * len(indices)) for name, indices in address)
         return [
             name
-            for indices, name in self._families.get(family, ())
+            for indices, name in self._families(family.partition("[")[0]).get(family, ())
             if all(
                 want[0] <= int(index) <= want[1] if isinstance(want, tuple) else index == str(want)
                 for index, want in zip(indices, wanted, strict=True)
@@ -77,19 +78,30 @@ class Names(Collection[str]):
         """Names of elements with blanks or with several pairs of brackets, by how else they may be written."""
         return {plainly(name): name for name in self._names if "[" in name and (" " in name or "][" in name)}
 
-    @cached_property
-    def _families(self) -> dict[str, list[tuple[list[str], str]]]:
-        """Names with indices, in the order of these, by what they are without them: `train[:].force[:]`."""
+    def _families(self, array: str) -> dict[str, list[tuple[list[str], str]]]:
+        """Names that begin with an array, in the order of their indices, by what they are without these."""
+        if array in self._sorted:
+            return self._sorted[array]
         families: dict[str, list[tuple[list[str], str]]] = {}
-        for name in self._names:
-            if "[" in name:
-                groups = [re.findall(INDEX, match[0]) for match in _INDICES.finditer(name)]
-                written = iter(groups)
-                family = _INDICES.sub(lambda _, rest=written: f"[{','.join(':' * len(next(rest)))}]", name)  # type: ignore[misc]
-                families.setdefault(family, []).append(([index for group in groups for index in group], name))
+        for name in self._arrays.get(array, ()):
+            groups = [re.findall(INDEX, match[0]) for match in _INDICES.finditer(name)]
+            written = iter([f"[{','.join(':' * len(group))}]" for group in groups])
+            family = _INDICES.sub(lambda _, rest=written: next(rest), name)  # type: ignore[misc]
+            families.setdefault(family, []).append(([index for group in groups for index in group], name))
         for members in families.values():
             members.sort(key=lambda member: ([int(index) for index in member[0]], member[1]))
+        self._sorted[array] = families
         return families
+
+    @cached_property
+    def _arrays(self) -> dict[str, list[str]]:
+        """Names with indices, by what stands before the first of them."""
+        arrays: dict[str, list[str]] = {}
+        for name in self._names:
+            array, bracket, _ = name.partition("[")
+            if bracket:
+                arrays.setdefault(array, []).append(name)
+        return arrays
 
 
 def _joined(parts: Iterable[tuple[str, Sequence[str]]]) -> str:

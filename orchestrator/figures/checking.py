@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 
 from ..errors import ExpressionError
-from ..evaluation import FUNCTIONS, parse
+from ..evaluation import FUNCTIONS, Names, parse
 from ..problems import Problem, suggestion
 from .marks import mark_problems, mark_texts
 from .panels import FIGURE_KEYS, FORMATS, PANEL_KEYS, X_KEYS, bands_of, numbers_in, panels_of, texts_of
@@ -25,6 +25,7 @@ def check_figures(
 
     `names` are the signals to be recorded and the parameters; `every_step` says whether each step is recorded.
     """
+    names = Names.of(names)
     problems: list[Problem] = []
     for number, figure in enumerate(figures, 1):
         place = f"[[figures]] entry {number} ({figure.get('title', 'no title')})"

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from functools import cached_property
 
 from ..errors import ScenarioError
-from ..evaluation import Judge, check_values, split_metric
+from ..evaluation import Judge, Names, check_values, split_metric
 from ..figures import check_figures, remarked
 from ..fmi import Interface, Kind, Model, Workspace, load_models
 from ..isolation import check_isolation, check_once_per_process, isolation_notes
@@ -119,15 +119,11 @@ def _without_the_missing(
     """
     if not any(instance.swapped for instance in system.instances.values()):
         return system, []
-    requirements = {
-        k: v
-        for k, v in system.judged.requirements.items()
-        if not Judge({}, {k: v}, names, steady=steady).requirement_problems
-    }
-    metrics = {
-        k: v for k, v in system.judged.metrics.items() if not Judge({k: v}, {}, names, steady=steady).metric_problems
-    }
-    figures = [figure for figure in system.judged.figures if not check_figures([figure], names, every_step)]
+    judge = Judge(system.judged.metrics, system.judged.requirements, names, steady=steady)
+    requirements = {k: v for k, v in system.judged.requirements.items() if not judge.requirement_faults[k]}
+    metrics = {k: v for k, v in system.judged.metrics.items() if not judge.metric_faults[k]}
+    known = Names(names)
+    figures = [figure for figure in system.judged.figures if not check_figures([figure], known, every_step)]
     published, references = (
         [entry for entry in entries if split_metric(str(entry.get("metric")))[0] in metrics]
         for entries in (system.judged.published, system.judged.references)
