@@ -6,6 +6,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from . import world
+from .errors import naming
 
 if TYPE_CHECKING:
     from filelock import FileLock
@@ -20,7 +21,8 @@ _NEW = 60.0
 def own(folder: Path) -> FileLock:
     """The lock that makes this process the owner of a folder until it is released, or the process ends."""
     lock = world.lock(folder / _OWNED)
-    lock.acquire(timeout=0)
+    with naming(folder):
+        lock.acquire(timeout=0)
     return lock
 
 

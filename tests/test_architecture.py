@@ -25,9 +25,9 @@ ORDER = (
     ("figures",),
     ("evaluation",),
     ("fmi",),
-    ("system",),
+    ("leftovers", "system"),
     ("errors",),
-    ("leftovers", "markup", "problems"),
+    ("markup", "problems"),
     ("names", "times"),
     ("world",),
 )

@@ -1,9 +1,12 @@
 """Temporary folders whose owner is gone."""
 
+import errno
 import subprocess
 import sys
 from pathlib import Path
 
+import pytest
+from railcosim.orchestrator import world
 from railcosim.orchestrator.leftovers import own, remove_where_abandoned
 
 
@@ -30,3 +33,13 @@ def test_so_is_one_in_which_fmus_were_built_that_no_cache_could_keep():
         builder.communicate("\n")
     remove_where_abandoned(folder / "some.fmu")
     assert not folder.exists()
+
+
+def test_a_folder_that_cannot_be_owned_is_named(tmp_path, monkeypatch):
+    class Lock:
+        def acquire(self, timeout):
+            raise OSError(errno.EIO, "Input/output error")
+
+    monkeypatch.setattr(world, "lock", lambda _: Lock())
+    with pytest.raises(OSError, match=str(tmp_path)):
+        own(tmp_path)
