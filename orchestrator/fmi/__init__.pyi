@@ -2,6 +2,7 @@ from ...fmus.kinds import Kind
 from .archive import Workspace
 from .interface import Interface, Sort, Type, Unit, Variable
 from .models import Model, load_fmu, load_models
+from .plain import PlainSlave
 from .reading import read as read_as_written
 from .recognition import is_fmu_name
 from .slave import Channel, Slave
@@ -13,6 +14,7 @@ __all__ = [
     "Interface",
     "Kind",
     "Model",
+    "PlainSlave",
     "Slave",
     "Sort",
     "Type",

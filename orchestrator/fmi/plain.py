@@ -115,6 +115,12 @@ class PlainSlave:
         """End the run."""
         self.simulation.terminate()
 
+    @_telling
+    def reset(self) -> None:
+        """Come back to where it was when it was instantiated."""
+        self.simulation.reset()
+        self.time = 0.0
+
     def free(self) -> None:
         """Nothing to give back."""
 

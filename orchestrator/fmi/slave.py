@@ -74,5 +74,8 @@ class Slave(Protocol):
     def terminate(self) -> None:
         """End the run."""
 
+    def reset(self) -> None:
+        """Come back to where it was when it was instantiated: another run may follow."""
+
     def free(self) -> None:
         """Give everything back; nothing may follow. Never raises."""

@@ -43,7 +43,7 @@ NOTE_CALL, NOTE_MEMORY, NOTE_BASE, NOTE_LINE = range(4)
 KiB; whether it has lost its line to the master."""
 CALLS = ("", "instantiate", "setup", "enter_initialization", "exit_initialization", "set", "step", "get", "save",
          "restore", "forget", "serialize", "deserialize", "directional_derivatives", "interpolate", "terminate",
-         "roll_back", "free")  # fmt: skip
+         "roll_back", "reset", "free")  # fmt: skip
 """What an FMU is asked to do, by number in `NOTE_CALL`."""
 NUMBERS = {name: number for number, name in enumerate(CALLS)}
 _FRAMES = {*range(STEP, FORGET + 1), *range(READY, REPORT + 1)}
@@ -85,6 +85,14 @@ def _as_text(value: Any) -> Any:
 
 def _as_bytes(found: dict[str, Any]) -> Any:
     return base64.b64decode(found[_BYTES]) if found.keys() == {_BYTES} else found
+
+
+@dataclass(frozen=True, eq=False)
+class Saved:
+    """A saved state, which lives in the process: its number there, and its time in s."""
+
+    number: int
+    time: float
 
 
 @dataclass(frozen=True)

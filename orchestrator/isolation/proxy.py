@@ -11,7 +11,6 @@ import logging
 import struct
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import contextmanager
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -19,21 +18,13 @@ from ..errors import FmuError, LostError
 from ..fmi import Interface, Type
 from ..fmi.binding import call_name
 from . import messages
-from .messages import Cells, Report, frame
+from .messages import Cells, Report, Saved, frame
 from .process import HostLostError, HostProcess
 
 _SPARE_CELLS = 4096
 _CELLS_PER_VARIABLE = 4
 """Room in the shared memory; channels that find none send their values in messages."""
 _LOG = logging.getLogger(__name__)
-
-
-@dataclass(frozen=True, eq=False)
-class _Saved:
-    """A saved state, which lives in the process: its number there, and its time in s."""
-
-    number: int
-    time: float
 
 
 class IsolatedSlave:
@@ -162,13 +153,13 @@ class IsolatedSlave:
         """From now on be restored after steps that it discards."""
         self._ask("roll_back")
 
-    def save(self) -> _Saved:
+    def save(self) -> Saved:
         """The present state: a handle of the process's."""
         self._saved += 1
         self._ask("save", self._saved)
-        return _Saved(self._saved, self.time)
+        return Saved(self._saved, self.time)
 
-    def restore(self, state: _Saved) -> None:
+    def restore(self, state: Saved) -> None:
         """Come back to a saved state; it stays saved."""
         if self._dirty or self.end is not None:
             self._ask("")  # what was set before must not come after
@@ -176,19 +167,19 @@ class IsolatedSlave:
         self._queue += frame(messages.RESTORE, state.number)
         self.time = state.time
 
-    def forget(self, state: _Saved) -> None:
+    def forget(self, state: Saved) -> None:
         """Give a saved state back."""
         if self._lost is None and not self._is_gone:
             self._queue += frame(messages.FORGET, state.number)
 
-    def serialize(self, state: _Saved) -> bytes:
+    def serialize(self, state: Saved) -> bytes:
         """A saved state as bytes, as they are without isolation."""
         return bytes(self._ask("serialize", state.number))
 
-    def deserialize(self, content: bytes) -> _Saved:
+    def deserialize(self, content: bytes) -> Saved:
         """A saved state, out of its bytes."""
         self._saved += 1
-        return _Saved(self._saved, self._ask("deserialize", self._saved, content))
+        return Saved(self._saved, self._ask("deserialize", self._saved, content))
 
     def directional_derivatives(
         self, unknowns: Sequence[str], knowns: Sequence[str], seed: Sequence[float]
@@ -203,6 +194,11 @@ class IsolatedSlave:
     def terminate(self) -> None:
         """End the run."""
         self._ask("terminate")
+
+    def reset(self) -> None:
+        """Come back to where it was when it was instantiated: another run may follow."""
+        self._ask("reset")
+        self.log = []
 
     def free(self) -> None:
         """Give everything back, the process included. Never raises: what goes wrong now is no more than logged."""

@@ -1,12 +1,14 @@
 from .assembly import assembled
 from .checking import Checked, check, describe_stepping, signal_names, swaps
 from .checkpoint import CHECKPOINT_FILE, read_checkpoint
-from .ending import conclude
+from .ending import Interruption, conclude
 from .execution import at_half_the_step, execute, go_on, resume, run
 from .outcome import Run
 from .record import add_step_check, read_metrics
 from .record import read as read_record
 from .recording import CSV_FILE, ROWS_FILE, Results, Telling, recover_rows
+from .repeating import Flown, Repeater, listening
+from .revision import Revision
 from .session import Progress
 from .step_check import StepChange, StepCheck, check_step
 from .watching import Finding
@@ -17,8 +19,12 @@ __all__ = [
     "ROWS_FILE",
     "Checked",
     "Finding",
+    "Flown",
+    "Interruption",
     "Progress",
+    "Repeater",
     "Results",
+    "Revision",
     "Run",
     "StepChange",
     "StepCheck",
@@ -32,6 +38,7 @@ __all__ = [
     "describe_stepping",
     "execute",
     "go_on",
+    "listening",
     "read_checkpoint",
     "read_metrics",
     "read_record",

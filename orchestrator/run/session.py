@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterator, Mapping, Sequence
-from contextlib import AbstractContextManager, contextmanager
+from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
+from contextlib import AbstractContextManager, contextmanager, nullcontext
 from dataclasses import dataclass
 from typing import Any
 
@@ -21,6 +21,7 @@ from . import record as record_file
 from .assembly import assembled
 from .checking import Checked
 from .checkpoint import Checkpoint
+from .crew import Crew
 from .directory import RunDirectory
 from .ending import Interruption
 from .outcome import Status
@@ -61,6 +62,8 @@ class Session:
         checked: the system, found fit to run.
         job: how to run it.
         before: how many rows the run's files have, if it goes on (`rows_before`).
+        crew: instances that stay loaded from run to run: nothing is watched then, signals are heard elsewhere, and no
+            more is kept than the crew wants.
 
     Attributes:
         status: how it ended; error: why it failed or ended early.
@@ -68,7 +71,7 @@ class Session:
         coupling: how the master's iterations, step sizes, loops and events went.
     """
 
-    def __init__(self, checked: Checked, job: Job, before: Sequence[int] = (0, 0)) -> None:
+    def __init__(self, checked: Checked, job: Job, before: Sequence[int] = (0, 0), crew: Crew | None = None) -> None:
         self.checked, self.job = checked, job
         self.system = checked.system
         self.status: Status = "failed"
@@ -80,7 +83,8 @@ class Session:
         self._watching: Watching | None = None
         self._slaves: Mapping[str, Slave] = {}
         self._master: Master | None = None
-        self.interruption = Interruption(self._abandon)
+        self._crew = crew
+        self.interruption = Interruption(self._abandon) if crew is None else crew.interruption
         self._restoring: list[str] = []
         self._is_complete = False
 
@@ -95,7 +99,7 @@ class Session:
             ScenarioError: initial values do not settle.
         """
         place = None if self.job.place is None else self.job.place.path
-        with self.interruption.listening(), run_guarded(self._lose, place):
+        with self._listening(), run_guarded(self._lose, place):
             try:
                 while not self._attempt(begin, complete):
                     pass
@@ -105,6 +109,9 @@ class Session:
                 raise
         if not self._is_complete:
             complete()
+
+    def _listening(self) -> AbstractContextManager[None]:
+        return self.interruption.listening() if self._crew is None else nullcontext()
 
     def _attempt(self, begin: float, complete: Callable[[], None]) -> bool:
         """Run; False where it has to be begun anew, with an instance restored after steps that it discards."""
@@ -121,6 +128,8 @@ class Session:
         return True
 
     def _assembled(self) -> AbstractContextManager[Master]:
+        if self._crew is not None:
+            return self._crew.assembled(self.checked, self._restoring)
         return assembled(
             self.checked,
             threads=self.job.threads,
@@ -188,19 +197,28 @@ class Session:
         master.initialize(
             system.stepping.start_time, system.stepping.stop_time, may_go_on=self.job.checkpoint_every is not None
         )
-        self._watching = Watching(system, self._interfaces, self.checked.wiring, master.signals)
+        crew = self._crew
+        if crew is None:
+            self._watching = Watching(system, self._interfaces, self.checked.wiring, master.signals)
         place, begin = self.job.place, self.job.begin
         directory, identity = (None, "") if place is None else (place.path, place.identity)
-        if begin is not None:
+        if begin is not None and self._watching is not None:
             begin.restore(master)
             self._watching.restore(begin.seen)
         recording = Recording(
-            master.signals, master.kinds, self._judged, directory, identity=identity, before=self._before
+            master.signals,
+            master.kinds,
+            self._judged,
+            directory,
+            identity=identity,
+            before=self._before,
+            only=None if crew is None else crew.only,
         )
         if begin is None or directory is None:
             first = [[system.stepping.start_time, *master.values]]
             recording.see(first, first)
-            self._watching.see(first)
+            if self._watching is not None:
+                self._watching.see(first)
         else:
             recording.go_on(directory, record_file.read(directory), begin.marks)
         self._recording = recording
@@ -216,11 +234,11 @@ class Session:
         return every if varies else float(round(every))
 
     @property
-    def _judged(self) -> frozenset[str] | None:
+    def _judged(self) -> Collection[str] | None:
         """The signals that metrics and requirements look at; None where every point is a result."""
         if self._row_every == (0.0 if ALGORITHMS[self.system.stepping.algorithm].varies_step else 1.0):
             return None
-        return self.checked.judge.needed_signals
+        return self.checked.judge.needed_signals if self._crew is None else self._crew.kept
 
     def _step(self, master: Master) -> bool:
         """The communication steps, with checkpoints between them; True unless they were interrupted."""
@@ -250,7 +268,6 @@ class Session:
 
     def _observer(self, master: Master, due: Due, count: int) -> Callable[[int, Rows], bool]:
         assert self._recording is not None
-        assert self._watching is not None
         system, interruption, progress = self.system, self.interruption, self.job.progress
         recording, watching = self._recording, self._watching
         last = system.stepping.stop_time - 0.5 * system.stepping.step
@@ -265,7 +282,8 @@ class Session:
                 end[0] = time = system.stepping.stop_time
             points = rows if len(rows) else [[time, *master.values]]
             kept = due.of(steps, rows)
-            watching.see(points)
+            if watching is not None:
+                watching.see(points)
             recording.see(points, kept)
             reached = int((time - system.stepping.start_time) / percent + 1e-9)
             if progress is not None and (reached > told or world.monotonic() - shown > 0.1 or time >= last):
@@ -301,6 +319,11 @@ class Session:
     @property
     def _interfaces(self) -> dict[str, Interface]:
         return {name: model.interface for name, model in self.checked.models.items()}
+
+    @property
+    def recording(self) -> Recording | None:
+        """What was kept; None where it failed before its first point."""
+        return self._recording
 
     def findings(self, results: Results) -> list[Finding]:
         """What was found on the way, given what was recorded."""

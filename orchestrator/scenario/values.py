@@ -11,7 +11,7 @@ from typing import Any
 from ..errors import ScenarioError
 from ..names import SignalName
 from ..problems import Problem
-from ..system import Event, Instance, System
+from ..system import Event, System
 from .changes import EVENT, change
 from .events import EVENT_KEYS, expand_events, read_events
 from .groups import OPTION_KEYS, Draft, Entry, EventDraft, Group, Member, expand_group
@@ -60,7 +60,10 @@ def changed(system: System, changes: Mapping[str, Any]) -> System:
     Raises:
         ScenarioError: with every problem of the changes; some of them are of the structure, which is `load`'s.
     """
-    draft, problems = _drafted(system), list[Problem]()
+    if not changes:
+        return system
+    problems: list[Problem] = []
+    draft = _drafted(system, {key.partition(".")[0].partition("[")[0].strip() for key in changes})
     for key, value in changes.items():
         entry = Entry(_plain(value), f"--set {assignment(key, value)}")
         if is_structural(key):
@@ -73,7 +76,7 @@ def changed(system: System, changes: Mapping[str, Any]) -> System:
     made = _finished(system, draft, problems)
     if problems:
         raise ScenarioError(list(dict.fromkeys(problems)))
-    return made.changed(modified=system.provenance.modified or made != system) if changes else system
+    return made
 
 
 def _plain(value: Any) -> Any:
@@ -81,18 +84,23 @@ def _plain(value: Any) -> Any:
     return parse_value(toml_value(value))
 
 
-def _drafted(system: System) -> Draft:
-    """The system before expansion: instances that are numbered as one group."""
+def _drafted(system: System, concerned: set[str]) -> Draft:
+    """The system before expansion: instances that are numbered as one group, with what they say if it is concerned."""
     draft = Draft(events=_entries(system.events))
     for instance in system.instances.values():
         name = SignalName(instance.name)
-        start = {key: Entry(value, instance.origin) for key, value in instance.start.items()}
-        if name.number is None:
-            draft.groups[instance.name] = Group(instance.name, instance.origin, instance.model, start=start)
-            continue
-        group = draft.groups.setdefault(name.group, Group(name.group, instance.origin, instance.model, 0))
-        group.count = max(group.count or 0, name.number)
-        group.members[name.number] = Member(instance.origin, instance.model, start=start)
+        number = name.number
+        group = draft.groups.setdefault(
+            name.group, Group(name.group, instance.origin, instance.model, None if number is None else 0)
+        )
+        if number is not None:
+            group.count = max(group.count or 0, number)
+        if name.group in concerned:
+            start = {key: Entry(value, instance.origin) for key, value in instance.start.items()}
+            if number is None:
+                group.start = start
+            else:
+                group.members[number] = Member(instance.origin, instance.model, start=start)
     return draft
 
 
@@ -113,13 +121,13 @@ def _finished(system: System, draft: Draft, problems: list[Problem]) -> System:
     seed = system.seed
     if "seed" in draft.simulation:
         seed = read_seed(draft.simulation["seed"], problems)
-    instances: dict[str, Instance] = {}
-    origins = dict(system.provenance.origins)
+    instances, origins = dict(system.instances), dict(system.provenance.origins)
     for group in draft.groups.values():
-        for made, told in expand_group(group, problems):
-            if made.name in system.instances:
-                instances[made.name] = replace(system.instances[made.name], start=made.start)
+        for made, told in expand_group(group, problems) if group.start or group.members else ():
+            if made.name in instances:
+                instances[made.name] = replace(instances[made.name], start=made.start)
                 origins |= {key: where for key, where in told.items() if where.startswith("--set ")}
     events = expand_events(read_events(draft.events, problems), draft.counts, problems)
-    ordered = {name: instances.get(name, one) for name, one in system.instances.items()}
-    return system.changed(instances=ordered, events=events, seed=seed, origins=origins)
+    is_same = instances == system.instances and events == system.events and seed == system.seed
+    modified = system.provenance.modified or not is_same
+    return system.changed(instances=instances, events=events, seed=seed, origins=origins, modified=modified)

@@ -3,17 +3,18 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
+from contextlib import ExitStack
 from types import TracebackType
 from typing import Any
 
 from .. import world
 from ..errors import ScenarioError
-from ..evaluation import value_name
+from ..evaluation import Verdict
 from ..fmi import Kind, Workspace
+from ..fmi.binding import forget_paths
 from ..names import SignalName
 from ..problems import Problem, suggestion
-from ..run import Run, check, execute, signal_names
-from ..scenario import changed
+from ..run import Checked, Flown, Interruption, Repeater, Revision, listening, signal_names
 from ..system import System
 from .rows import Outcomes, Row, margins
 
@@ -32,7 +33,6 @@ class Batch:
 
     Attributes:
         metrics: the flat names of the metrics: ``"settling"``, ``"gap_min[2]"``. requirements: those of requirements.
-        notes: what a user should know of how runs are made.
 
     Raises:
         ScenarioError: the system cannot run, or a signal that is to be recorded does not exist.
@@ -41,15 +41,26 @@ class Batch:
     def __init__(
         self, system: System, *, kind: Kind = "auto", record: Sequence[str] = (), evaluate: bool = True
     ) -> None:
-        self.system, self._kind, self._evaluate = system, kind, evaluate
-        with Workspace() as workspace:
-            checked = check(system, workspace, kind)
+        self._evaluate, self._held = evaluate, ExitStack()
+        self._workspace = self._held.enter_context(Workspace())
+        try:
+            self._held.callback(forget_paths, self._workspace.folder)
+            self._revision = Revision(system, self._workspace, kind)
+            checked = self._revision.checked
             interfaces = {name: model.interface for name, model in checked.models.items()}
-            names = signal_names(interfaces, checked.wiring)
+            self._record = _recorded(record, signal_names(interfaces, checked.wiring))
+        except BaseException:
+            self._held.close()
+            raise
         self.metrics = checked.judge.value_names if evaluate else ()
         self.requirements = checked.judge.requirement_names if evaluate else ()
-        self.notes: list[str] = list(checked.notes)
-        self._record = _recorded(record, names)
+        self._repeaters: list[tuple[Checked, Repeater]] = []
+
+    @property
+    def notes(self) -> list[str]:
+        """What a user should know of the system, and of how its runs are made."""
+        crews = [repeater.crew.notes for _, repeater in self._repeaters]
+        return list(dict.fromkeys([*self._revision.checked.notes, *(note for notes in crews for note in notes)]))
 
     def __enter__(self) -> Batch:
         return self
@@ -61,6 +72,7 @@ class Batch:
 
     def close(self) -> None:
         """Give everything back; no run may follow."""
+        self._held.close()
 
     def run(self, changes: Mapping[str, Any] | None = None) -> Row:
         """One run. What fails in it is told by its status, and never raised.
@@ -71,15 +83,7 @@ class Batch:
         Raises:
             KeyboardInterrupt: the user stops it.
         """
-        begin = world.perf_counter()
-        try:
-            made = changed(self.system, changes or {})
-            outcome = execute(made, kind=self._kind)
-        except ScenarioError as error:
-            return Row("refused", str(error), seconds=world.perf_counter() - begin)
-        if outcome.status == "interrupted":
-            raise KeyboardInterrupt
-        return self._row(outcome, world.perf_counter() - begin)
+        return self.run_all([changes or {}]).rows[0]
 
     def run_all(self, runs: Iterable[Mapping[str, Any]]) -> Outcomes:
         """Many runs, one after another.
@@ -90,22 +94,50 @@ class Batch:
         Raises:
             KeyboardInterrupt: the user stops it.
         """
-        return Outcomes.of(map(self.run, runs), self.metrics, self.requirements)
+        rows = []
+        with listening() as interruption:
+            for changes in runs:
+                row = self._run(changes, interruption)
+                if row is None:
+                    break
+                rows.append(row)
+        return Outcomes.of(rows, self.metrics, self.requirements)
 
-    def _row(self, outcome: Run, seconds: float) -> Row:
-        recorded = {name: outcome[name] for name in self._record}
-        series = {"time": outcome.time, **recorded} if self._record else None
-        metrics = {value_name(one.name, k): x for one in outcome.metrics for k, x in one.values.items()}
-        verdicts = outcome.requirements if self._evaluate else []
+    def _run(self, changes: Mapping[str, Any], interruption: Interruption) -> Row | None:
+        """One run; None where it was interrupted."""
+        begin = world.perf_counter()
+        try:
+            checked = self._revision.of(changes)
+            flown = self._repeater(checked).fly(checked, interruption)
+        except ScenarioError as error:
+            return Row("refused", str(error), seconds=world.perf_counter() - begin)
+        return None if flown is None else self._row(checked, flown, begin)
+
+    def _repeater(self, checked: Checked) -> Repeater:
+        """What runs systems of this structure: nearly always that of the first run."""
+        for known, repeater in self._repeaters:
+            if known.wiring.links == checked.wiring.links and known.order == checked.order:
+                return repeater
+        made = Repeater(checked, self._record)
+        self._held.callback(made.crew.dismiss)
+        self._repeaters.append((checked, made))
+        return made
+
+    def _row(self, checked: Checked, flown: Flown, begin: float) -> Row:
+        metrics: dict[str, float] = {}
+        verdicts: list[Verdict] = []
+        if self._evaluate and flown.seen.points:
+            metrics, verdicts = checked.judge.values(flown.seen), checked.judge.verdicts(flown.seen)
+        columns = flown.recorded
         return Row(
-            outcome.status,
-            str(outcome.error or ""),
-            metrics if self._evaluate else {},
+            flown.status,
+            str(flown.error or ""),
+            metrics,
             {verdict.name: verdict.verdict for verdict in verdicts},
             margins(verdicts),
-            series=series,
-            steps=int(outcome.seconds["steps"]),
-            seconds=seconds,
+            series={name: columns[name] for name in ("time", *self._record)} if self._record else None,
+            steps=flown.steps,
+            seconds=world.perf_counter() - begin,
         )
 
 

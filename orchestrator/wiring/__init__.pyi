@@ -3,7 +3,7 @@ from .inputs import unmet_samples
 from .links import Link, Wiring, described, is_direct
 from .order import Order, derive_order
 from .resolution import wire
-from .starts import bounded
+from .starts import bounded, find_starts
 from .topology import describe_topology
 from .trains import Control, Following, Quantity, Train, find_controls, find_followings, find_trains
 
@@ -23,6 +23,7 @@ __all__ = [
     "described",
     "find_controls",
     "find_followings",
+    "find_starts",
     "find_trains",
     "generations",
     "graph_of",

@@ -6,6 +6,7 @@ import hashlib
 import itertools
 import math
 from collections.abc import Mapping
+from functools import lru_cache
 from typing import Any
 
 import numpy as np
@@ -126,10 +127,7 @@ def _typed(given: Any, variable: Variable, instance: Instance) -> Any:
     if isinstance(given, str) and given in choices:
         return choices[given]
     if isinstance(given, str):
-        constants = (
-            {"count": instance.count} if instance.index is None else {"i": instance.index, "count": instance.count}
-        )
-        given = evaluate_constant(given, **constants)
+        given = _constant(given, instance.index, instance.count)
     is_truth = isinstance(given, bool | np.bool_)
     if variable.type == "Boolean":
         if not is_truth:
@@ -138,6 +136,12 @@ def _typed(given: Any, variable: Variable, instance: Instance) -> Any:
     if is_truth or not isinstance(given, float | int | np.floating | np.integer):
         raise ScenarioError(f"takes a number, not {given!r}")
     return bounded(given, variable)
+
+
+@lru_cache(maxsize=4096)
+def _constant(text: str, index: int | None, count: int) -> Any:
+    """The value of an expression of ``i`` and ``count``: the same text stands in many instances, and in many runs."""
+    return evaluate_constant(text, count=count) if index is None else evaluate_constant(text, i=index, count=count)
 
 
 def bounded(given: Any, variable: Variable) -> float | int:

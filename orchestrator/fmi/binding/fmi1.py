@@ -29,6 +29,7 @@ _SIGNATURES: Signatures = {
     "fmiFreeSlaveInstance": (None, c_void_p),
     "fmiInitializeSlave": (c_int, c_void_p, c_double, c_bool, c_double),
     "fmiTerminateSlave": (c_int, c_void_p),
+    "fmiResetSlave": (c_int, c_void_p),
     "fmiDoStep": (c_int, c_void_p, c_double, c_double, c_bool),
     "fmiCancelStep": (c_int, c_void_p),
     **{
@@ -53,7 +54,8 @@ class Fmi1Slave(LoadedSlave):
 
     SIGNATURES, TYPES = _SIGNATURES, _TYPES
     SET, GET, DO_STEP = "fmiSet", "fmiGet", "fmiDoStep"
-    TERMINATE, FREE, CANCEL = "fmiTerminateSlave", "fmiFreeSlaveInstance", "fmiCancelStep"
+    TERMINATE, RESET, FREE = "fmiTerminateSlave", "fmiResetSlave", "fmiFreeSlaveInstance"
+    CANCEL = "fmiCancelStep"
     INTERPOLATE = "fmiSetRealInputDerivatives"
     PREFIXED = True
 

@@ -64,7 +64,7 @@ class FmuSlave(LoadedSlave):
 
     SIGNATURES, TYPES = _SIGNATURES, _TYPES
     SET, GET, DO_STEP = "fmi2Set", "fmi2Get", "fmi2DoStep"
-    TERMINATE, FREE, CANCEL = "fmi2Terminate", "fmi2FreeInstance", "fmi2CancelStep"
+    TERMINATE, RESET, FREE, CANCEL = "fmi2Terminate", "fmi2Reset", "fmi2FreeInstance", "fmi2CancelStep"
     INTERPOLATE = "fmi2SetRealInputDerivatives"
     STATE = (
         "fmi2GetFMUstate",

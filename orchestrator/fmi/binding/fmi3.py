@@ -48,6 +48,7 @@ _SIGNATURES: Signatures = {
     "fmi3EnterInitializationMode": (c_int, c_void_p, c_bool, c_double, c_double, c_bool, c_double),
     "fmi3ExitInitializationMode": (c_int, c_void_p),
     "fmi3Terminate": (c_int, c_void_p),
+    "fmi3Reset": (c_int, c_void_p),
     "fmi3EnterEventMode": (c_int, c_void_p),
     "fmi3UpdateDiscreteStates": (c_int, *[c_void_p] * 7),
     "fmi3EnterStepMode": (c_int, c_void_p),
@@ -81,7 +82,7 @@ class Fmi3Slave(LoadedSlave):
 
     SIGNATURES, TYPES = _SIGNATURES, _TYPES
     SET, GET, DO_STEP = "fmi3Set", "fmi3Get", "fmi3DoStep"
-    TERMINATE, FREE = "fmi3Terminate", "fmi3FreeInstance"
+    TERMINATE, RESET, FREE = "fmi3Terminate", "fmi3Reset", "fmi3FreeInstance"
     STATE = (
         "fmi3GetFMUState",
         "fmi3SetFMUState",
@@ -131,6 +132,12 @@ class Fmi3Slave(LoadedSlave):
         else:
             raise self.refuse(f"its discrete states do not settle in {_MOST_UPDATES} calls of fmi3UpdateDiscreteStates")
         self.call("fmi3EnterStepMode")
+
+    def reset(self) -> None:
+        """Come back to where it was when it was instantiated: another run may follow."""
+        super().reset()
+        for told in self._told:
+            told.value = 0
 
     def _announce(self) -> None:
         pass  # entering initialization mode says it all

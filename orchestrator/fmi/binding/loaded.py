@@ -55,6 +55,7 @@ class LoadedSlave(Stepping):
     GET: ClassVar[str]
     DO_STEP: ClassVar[str]
     TERMINATE: ClassVar[str]
+    RESET: ClassVar[str]
     FREE: ClassVar[str]
     CANCEL: ClassVar[str] = ""
     INTERPOLATE: ClassVar[str] = ""
@@ -77,6 +78,7 @@ class LoadedSlave(Stepping):
         self._span = (0.0, 0.0)
         self._keys: list[int | bytes] = []
         self._given: dict[str, Any] = {}
+        self._channels: dict[tuple[Type, tuple[str, ...]], Channel] = {}
         self._library = None
         self.disturbed: dict[str, None] = {}
         self.hear_as(id(self), name.encode())
@@ -139,6 +141,9 @@ class LoadedSlave(Stepping):
 
     def call_once(self, name: str, *arguments: Any) -> None:
         """Make a call of those that an instance gets once in a run: time enough to look at all that it may change."""
+        if self.interface.own_kind == "native":  # which changes nothing, and need not be looked at: see `watch`
+            self.call(name, *arguments)
+            return
         with self._carefully():
             self.call(name, *arguments)
 
@@ -197,7 +202,13 @@ class LoadedSlave(Stepping):
         return (ctypes.c_uint * len(heads))(*(v.reference for v in heads))
 
     def channel(self, kind: Type, names: Sequence[str]) -> Channel:
-        """Prepare variables of one type for being set or read together."""
+        """Prepare variables of one type for being set or read together; once for all runs."""
+        key = kind, tuple(names)
+        if key not in self._channels:
+            self._channels[key] = self._prepared(*key)
+        return self._channels[key]
+
+    def _prepared(self, kind: Type, names: Sequence[str]) -> Channel:
         parts: dict[str, list[int]] = {}
         for place, name in enumerate(names):
             parts.setdefault(self.interface.variables[name].fmi_type or kind, []).append(place)
@@ -305,6 +316,17 @@ class LoadedSlave(Stepping):
     def terminate(self) -> None:
         """End the run."""
         self.call_once(self.TERMINATE)
+
+    def reset(self) -> None:
+        """Come back to where it was when it was instantiated: another run may follow.
+
+        Raises:
+            FmuError: it cannot; nothing but `free` may follow.
+        """
+        self.time, self.rolls_back = 0.0, False
+        self.log.clear()
+        self._given.clear()
+        self.call_once(self.RESET)
 
     def free(self) -> None:
         """Give the instance and its library back; after a fatal status neither, as FMI 2.0 (2.1.3) has it.

@@ -37,7 +37,7 @@ def call_name(interface: Interface, call: str, kind: Type, names: Sequence[str])
     if call in ("set", "get"):
         own = interface.variables[names[0]].fmi_type if names else ""
         return f"{slave.SET if call == 'set' else slave.GET}{slave.TYPES[own or kind][0]}"
-    known = {"step": slave.DO_STEP, "terminate": slave.TERMINATE, "free": slave.FREE}
+    known = {"step": slave.DO_STEP, "terminate": slave.TERMINATE, "reset": slave.RESET, "free": slave.FREE}
     known |= {"interpolate": slave.INTERPOLATE} | _NAMES[interface.version]
     states = getattr(slave, "STATE", ())  # FMI 1.0 has none
     known |= dict(zip(("save", "restore", "forget", "size", "serialize", "deserialize"), states, strict=False))

@@ -28,6 +28,7 @@ class Recording:
         kinds: their FMI types.
         judged: those that metrics and requirements look at, if they see points that are no results.
         directory: where the files are; None keeps everything in memory.
+        only: signals that are kept at all; None for every one.
         identity: of the run.
         before: how many rows the run's files have, if it goes on, in the order of the files.
     """
@@ -41,24 +42,26 @@ class Recording:
         *,
         identity: str = "",
         before: Sequence[int] = (0, 0),
+        only: Collection[str] | None = None,
     ) -> None:
         paths = (None, None) if directory is None else tuple(directory / name for name in _FILES)
-        self._recorders = [Recorder(names, kinds, paths[0], there=before[0], identity=identity)]
-        self._pick: list[int] = []
-        if judged is not None:
-            self._pick = [k for k, name in enumerate(names) if name in judged]
-            chosen, of = [names[k] for k in self._pick], [kinds[k] for k in self._pick]
-            self._recorders.append(Recorder(chosen, of, paths[1], there=before[1], identity=identity))
+        self._picks: list[list[int] | None] = []
+        self._recorders: list[Recorder] = []
+        for k, chosen in enumerate((only,) if judged is None else (only, judged)):
+            picked = [n for n, name in enumerate(names) if chosen is None or name in chosen]
+            columns, of = [names[n] for n in picked], [kinds[n] for n in picked]
+            self._recorders.append(Recorder(columns, of, paths[k], there=before[k], identity=identity))
+            self._picks.append(None if chosen is None else [0, *(n + 1 for n in picked)])
 
     def see(self, points: Rows, results: Rows) -> None:
         """Take in points, and those of them that are results."""
-        self._recorders[0].extend(results)
-        if len(self._recorders) > 1:
-            places = [0, *(k + 1 for k in self._pick)]
-            if isinstance(points, np.ndarray):
-                self._recorders[1].extend(points.take(places, axis=1))
+        for recorder, places, rows in zip(self._recorders, self._picks, (results, points), strict=False):
+            if places is None:
+                recorder.extend(rows)
+            elif isinstance(rows, np.ndarray):
+                recorder.extend(rows.take(places, axis=1))
             else:
-                self._recorders[1].extend([[row[k] for k in places] for row in points])
+                recorder.extend([[row[k] for k in places] for row in rows])
 
     def go_on(self, directory: Path, record: Mapping[str, Any], marks: Sequence[Sequence[int]]) -> None:
         """Begin with the rows up to a checkpoint.
@@ -95,6 +98,10 @@ class Recording:
     def columns(self) -> Columns:
         """The results, the time among them."""
         return self._recorders[0].columns()
+
+    def every_point(self, results: Columns) -> Columns:
+        """What was kept of every point, the time among it; the results where these are all points."""
+        return results if len(self._recorders) == 1 else self._recorders[1].columns()
 
     def judged(self, results: Results) -> Signals:
         """What metrics and requirements look at: every point."""

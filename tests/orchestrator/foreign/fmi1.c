@@ -59,6 +59,21 @@ void *EXPORT(fmiInstantiateSlave)(const char *name, const char *guid, const char
     return s;
 }
 
+#ifdef RESET /* what comes of it */
+int EXPORT(fmiResetSlave)(void *c)
+{
+    First *s = c, fresh = {0};
+    memcpy(fresh.name, s->name, sizeof s->name);
+    fresh.logger = s->logger;
+    fresh.reals[1] = fresh.reals[3] = 1.0;
+    fresh.reals[4] = 2.0;
+    fresh.reals[5] = 3.0;
+    fresh.whole[2] = fresh.whole[3] = 1;
+    *s = fresh;
+    return RESET;
+}
+#endif
+
 void EXPORT(fmiFreeSlaveInstance)(void *c)
 {
     free(c);
