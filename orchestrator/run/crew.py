@@ -82,8 +82,8 @@ class Crew:
             self._given[name] |= given[name]
         for name in restoring:
             slave = self._slaves[name]
-            if isinstance(slave, LoadedSlave | IsolatedSlave):
-                slave.roll_back()
+            assert isinstance(slave, LoadedSlave | IsolatedSlave)  # no other discards a step
+            slave.roll_back()
         yield Master(
             {name: self._slaves[name] for name in checked.models},
             checked.order.sequence,

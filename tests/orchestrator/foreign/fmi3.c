@@ -78,6 +78,22 @@ void *fmi3InstantiateCoSimulation(const char *name, const char *token, const cha
     return s;
 }
 
+#ifdef RESET /* what comes of it */
+int fmi3Reset(void *c)
+{
+    Third *s = c, fresh = {{{0}}};
+    memcpy(fresh.now.text[1], s->now.text[1], sizeof s->now.text[1]);
+    fresh.logger = s->logger;
+    fresh.environment = s->environment;
+    fresh.now.f64[2] = fresh.now.f64[4] = 1.0;
+    fresh.now.i64[2] = fresh.now.i64[3] = 1;
+    fresh.now.i8[0] = -128;
+    fresh.now.u8[0] = 7;
+    *s = fresh;
+    return RESET;
+}
+#endif
+
 void fmi3FreeInstance(void *c)
 {
     free(c);

@@ -1,8 +1,10 @@
 """Runs of a batch are single runs: the same numbers, to the bit, and the same messages."""
 
+import signal
+
 import numpy as np
 import pytest
-from railcosim.orchestrator import Batch
+from railcosim.orchestrator import Batch, System
 from railcosim.orchestrator.errors import ScenarioError
 from railcosim.orchestrator.run import execute
 from railcosim.orchestrator.scenario import changed
@@ -74,3 +76,68 @@ def test_nothing_is_evaluated_or_recorded_that_is_not_asked_for(system):
 def test_a_signal_to_be_recorded_has_to_be_there(system):
     with pytest.raises(ScenarioError, match=r"^record: there is no signal 'lag\[3\].x'; did you mean"):
         Batch(system, kind="plain", record=["lag[3].x"])
+
+
+def test_an_interruption_ends_the_run_and_leaves_the_batch_as_it_was(system):
+    def runs():
+        yield {}
+        signal.raise_signal(signal.SIGINT)
+        yield {}
+        yield {}
+
+    with Batch(system, kind="plain", record=["lag.x"]) as batch:
+        before = batch.run()
+        with pytest.raises(KeyboardInterrupt):
+            batch.run_all(runs())
+        after = batch.run()
+    np.testing.assert_array_equal(before.series["lag[1].x"], after.series["lag[1].x"])
+
+
+def test_a_system_that_cannot_run_is_an_error(system):
+    system.connect("lag[1].y", "lag[2].u")
+    with pytest.raises(ScenarioError):
+        Batch(system, kind="plain")
+
+
+def test_values_that_do_not_settle_are_told(mine):
+    system = System(step=0.25, stop_time=1.0, algebraic_loops="solve")
+    for name in ("a", "b"):
+        system.add(name, mine("Affine"), gain=0.5)
+    system.connect("a.y", "b.u")
+    system.connect("b.y", "a.u")
+    with Batch(system, kind="plain", record=["a.y"]) as batch:
+        agree(batch.run(), single(system, {}, kind="plain"))
+        row = batch.run({"a.gain": 2.0, "a.w": 1.0})
+    assert (row.status, bool(row.error)) in {("refused", True), ("failed", True)}
+
+
+def test_values_that_decide_about_connections_have_instances_of_their_own(components):
+    """An input beside a connected one is connected too, unless a value holds it."""
+    body = """
+class Line(Component):
+    slope = Output("1")
+    curve = Output("1")
+
+    def outputs(self):
+        return {"slope": 1.0 + self.time, "curve": 2.0 + self.time}
+
+
+class Car(Component):
+    slope = Input("1")
+    curve = Input("1", beside=slope, optional=True)
+    x = State("1", 0.0, output=True)
+
+    def derivatives(self):
+        return {"x": self.slope + self.curve}
+"""
+    mine = components(body)
+    system = System(step=0.25, stop_time=1.0)
+    system.add("line", mine("Line"))
+    system.add("car", mine("Car"))
+    system.connect("line.slope", "car.slope")
+    runs = [{}, {"car.curve": 5.0}, {}, {"car.curve": 6.0}]
+    with Batch(system, kind="plain", record=["car.x"]) as batch:
+        rows = [batch.run(changes) for changes in runs]
+    for changes, row in zip(runs, rows, strict=True):
+        agree(row, single(system, changes, kind="plain"))
+    assert len({row.series["car.x"][-1] for row in rows}) == 3
