@@ -109,7 +109,8 @@ class Fmi3Slave(LoadedSlave):
         return found
 
     def enter_initialization(self) -> None:
-        """Enter initialization mode."""
+        """Enter initialization mode; what the last step of another run told is no more."""
+        self._waits.value = False
         self.call_once("fmi3EnterInitializationMode", False, 0.0, self._span[0], *self._end())
 
     def exit_initialization(self) -> None:
@@ -132,12 +133,6 @@ class Fmi3Slave(LoadedSlave):
         else:
             raise self.refuse(f"its discrete states do not settle in {_MOST_UPDATES} calls of fmi3UpdateDiscreteStates")
         self.call("fmi3EnterStepMode")
-
-    def reset(self) -> None:
-        """Come back to where it was when it was instantiated: another run may follow."""
-        super().reset()
-        for told in self._told:
-            told.value = 0
 
     def _announce(self) -> None:
         pass  # entering initialization mode says it all
