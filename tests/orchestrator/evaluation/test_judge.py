@@ -87,3 +87,18 @@ def test_a_metric_that_fails_late_leaves_the_others_whole():
 def test_a_number_of_points_that_is_not_that_of_the_run_is_refused():
     with pytest.raises(ExpressionError, match="its parts differ in their number of rows"):
         parse("max(d)", FUNCTIONS).evaluate(run([1.0, 2.0, 3.0]), None, d=np.ones(2))
+
+
+def test_a_run_without_a_point_has_no_values():
+    empty = Results(
+        {name: np.empty(0) for name in NAMES[:-1]},
+        np.empty(0),
+        units={},
+        parameters={"s.limit": 5.0},
+        step=0.5,
+        stop_time=1.0,
+        completed=False,
+    )
+    for metric in Judge(METRICS, {}, NAMES).metrics(empty):
+        assert "no recorded point lies in the window" in metric.problem
+        assert all(map(math.isnan, metric.values.values()))
