@@ -27,7 +27,9 @@ class Function:
 
     With a `window` it reduces the run to one number. Its first argument, which the user omits too, is then the `Span`
     that counts. It returns the rows to be looked at, shape (T,) or (n, T), and the `Fold` that looks at them. Arguments
-    annotated as `float` are one number for the whole run, the others vary over time.
+    annotated as `float` are one number for the whole run, the others vary over time. The fold may depend on the span,
+    on these numbers and on how many rows the others have, but not on their values: calls that share all that look at
+    the run together, with one fold.
     """
 
     call: Callable[..., Any]
