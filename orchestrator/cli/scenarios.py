@@ -2,7 +2,12 @@
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING
+
 from .options import Algorithm, Preset, Scenario, Set, Step, Stop, Swap, Trust, With, load_system
+
+if TYPE_CHECKING:
+    from ..system import System
 
 
 def list_all() -> None:
@@ -52,6 +57,7 @@ def check(
     from .printing import open_console, say, show_compilations, show_notes
 
     system = load_system(scenario, preset, settings, builds, swaps, stop=stop, step=step, algorithm=algorithm)
+    study = _study(system)
     out = open_console()
     with Workspace() as workspace, show_compilations(quiet=False, doing="reading what it is made of"):
         checked = check_system(system, workspace, trusted=trust)
@@ -69,5 +75,19 @@ def check(
             say(out, f"delay: {connection.target} receives {connection.source} {points} later")
     for line in describe_topology({name: model.interface for name, model in checked.models.items()}, checked.wiring):
         say(out, line)
+    for line in study:
+        say(out, line)
     show_notes(out, checked.notes)
     say(out, "no errors", "green")
+
+
+def _study(system: System) -> list[str]:
+    """What `[study]` would run, in words; nothing where there is none."""
+    if not system.study:
+        return []
+    from ..study.design import make_plan, plan_notes
+    from .lines import counted
+
+    plan = make_plan(system)
+    over = ", ".join(plan.names) or "noise alone"
+    return [f"study: {counted(plan.count, 'run')} ({plan.design}) over {over}", *plan_notes(plan)]

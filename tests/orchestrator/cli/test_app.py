@@ -411,6 +411,18 @@ def test_check_tells_of_delays_and_of_jacobi(small: Path) -> None:
     assert "jacobi steps all instances in parallel" in out
 
 
+def test_check_reads_the_study_as_well(small: Path) -> None:
+    study = '[study]\nruns = 3\ndesign = "sobol"\n[study.vary]\ntrain.mass = "normal(4e5, 2e4)"\n'
+    (small / "varied.toml").write_text(BARE + study)
+    out = orchestrate("check", "varied.toml", folder=small).stdout
+    assert "study: 3 runs (sobol) over train.mass\na Sobol sequence is balanced for" in out
+    (small / "varied.toml").write_text(BARE + study.replace("normal", "norml"))
+    said = refused("check", "varied.toml", folder=small)
+    assert "study.vary.train.mass: there is no distribution 'norml'; did you mean 'normal'?" in said
+    (small / "varied.toml").write_text(BARE + "[study]\nruns = 1\n")
+    assert "study: 1 run (random) over noise alone" in orchestrate("check", "varied.toml", folder=small).stdout
+
+
 @pytest.mark.long
 def test_build_all_builds_the_catalogue_once_each(tmp_path: Path) -> None:
     done = orchestrate("build", "--all", "Gust", "-o", "fmus", folder=tmp_path)
