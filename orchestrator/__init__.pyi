@@ -1,7 +1,7 @@
 from .errors import CouplingError, FmuError, FmuFileError, RailcosimError, RunError, ScenarioError
 from .run import Results, Run, resume, run
 from .scenario import load
-from .study import Batch
+from .study import Batch, Study
 from .system import Connection, Event, Instance, System
 
 __all__ = [
@@ -17,6 +17,7 @@ __all__ = [
     "Run",
     "RunError",
     "ScenarioError",
+    "Study",
     "System",
     "load",
     "resume",

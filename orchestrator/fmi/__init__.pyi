@@ -1,7 +1,7 @@
 from ...fmus.kinds import Kind
 from .archive import Workspace
 from .interface import Interface, Sort, Type, Unit, Variable
-from .models import Model, load_fmu, load_models
+from .models import Model, Packaged, load_fmu, load_models, packaged, provide
 from .plain import PlainSlave
 from .reading import read as read_as_written
 from .recognition import is_fmu_name
@@ -14,6 +14,7 @@ __all__ = [
     "Interface",
     "Kind",
     "Model",
+    "Packaged",
     "PlainSlave",
     "Slave",
     "Sort",
@@ -25,6 +26,8 @@ __all__ = [
     "is_pedantry",
     "load_fmu",
     "load_models",
+    "packaged",
+    "provide",
     "read_as_written",
     "state_names",
     "take_snapshot",

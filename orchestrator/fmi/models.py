@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+import json
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
+from typing import Any, NamedTuple
 
 from ...fmus.build import Plain, package, plain
-from ...fmus.kinds import Kind, ModelKind
+from ...fmus.kinds import FmuKind, Kind, ModelKind, PackagingKind
 from ..errors import FmuFileError, ScenarioError
 from ..names import SignalName
 from ..problems import Problem
@@ -19,6 +22,14 @@ from .plain import PlainSlave
 from .reader import read_interface
 from .recognition import is_fmu_name
 from .slave import Slave
+
+
+class Packaged(NamedTuple):
+    """The FMU of a component: where it is, its kind, and why it is not native if that was left open."""
+
+    path: Path
+    kind: FmuKind
+    note: str
 
 
 @dataclass(frozen=True)
@@ -100,9 +111,34 @@ def _load(instance: Instance, workspace: Workspace, kind: Kind) -> Model:
         folder = workspace.write_description(component.description)
         interface = read_interface(folder, instance.model)
         return Model(interface, kind, folder, None, component.digest, component)
-    path, made, problem = package(instance.model, instance.build, kind)
+    path, made, problem = packaged(instance.model, instance.build, kind)
     note = f"running Python FMUs, not native ones: {problem}" if problem else ""
     return replace(load_fmu(path, workspace, made), note=note)
+
+
+_PROVIDED: dict[str, Packaged] = {}
+
+
+def packaged(reference: str, arguments: Mapping[str, Any], kind: PackagingKind) -> Packaged:
+    """The FMU of a component: what was provided, or what is built here."""
+    provided = _PROVIDED.get(_asked(reference, arguments, kind))
+    return provided or Packaged(*package(reference, arguments, kind))
+
+
+def provide(reference: str, arguments: Mapping[str, Any], kind: PackagingKind, fmu: Packaged) -> None:
+    """Take from now on what another process has made, which had the compiler and the component's files.
+
+    Args:
+        reference: of the component.
+        arguments: its build arguments.
+        kind: what is asked for.
+        fmu: what is had for it.
+    """
+    _PROVIDED[_asked(reference, arguments, kind)] = fmu
+
+
+def _asked(reference: str, arguments: Mapping[str, Any], kind: PackagingKind) -> str:
+    return json.dumps([reference, dict(arguments), kind], sort_keys=True, default=str)
 
 
 def load_fmu(path: Path, workspace: Workspace, kind: ModelKind = "fmu") -> Model:

@@ -1,6 +1,7 @@
 from .assembly import assembled
 from .checking import Checked, check, describe_stepping, signal_names, swaps
 from .checkpoint import CHECKPOINT_FILE, read_checkpoint
+from .directory import RunDirectory
 from .ending import Interruption, conclude
 from .execution import at_half_the_step, execute, go_on, resume, run
 from .outcome import Run
@@ -26,6 +27,7 @@ __all__ = [
     "Results",
     "Revision",
     "Run",
+    "RunDirectory",
     "StepChange",
     "StepCheck",
     "Telling",

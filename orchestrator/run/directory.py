@@ -23,15 +23,17 @@ class RunDirectory:
     Args:
         path: of the directory; where a relative one leads is settled here, whatever an FMU does to the process.
         identity: of the run, where it is known: all its files carry it.
+        record: the file that tells which run, or study, has it.
 
     Attributes:
         given: the directory as it was named, for messages. path: where it is.
     """
 
-    def __init__(self, path: Path, identity: str = "") -> None:
+    def __init__(self, path: Path, identity: str = "", record: str = "run.json") -> None:
         self.given = path
         self.path = path.absolute()
         self.identity = identity
+        self._record = record
         self._lock = world.lock(self.path / LOCK_FILE)
 
     @property
@@ -66,7 +68,7 @@ class RunDirectory:
     def _holder(self) -> str:
         """Which run has it, as far as its record says."""
         try:
-            record = read_json(self.path / "run.json")
+            record = read_json(self.path / self._record)
             process = record["process"]
             return f" ({record['scenario'] or 'of Python'}, process {process['pid']} on {process['host']})"
         except (OSError, ValueError, LookupError, TypeError):

@@ -5,6 +5,7 @@ from .interface import show_interface
 from .outcome import show_run
 from .progress import show_cases, show_compilations, show_progress
 from .scenario import show_system
+from .study import show_runs, show_study
 from .validation import show_report
 from .verdicts import in_one_line, show_values, summary
 
@@ -22,6 +23,8 @@ __all__ = [
     "show_progress",
     "show_report",
     "show_run",
+    "show_runs",
+    "show_study",
     "show_system",
     "show_values",
     "summary",

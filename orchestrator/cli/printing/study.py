@@ -1,18 +1,28 @@
-"""A study in words: which requirements hold how often, how metrics are spread, and which parameters matter."""
+"""A study in words: how far it has got, which requirements hold how often, how metrics are spread, what matters."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Mapping, Sequence
+import sys
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass
 from itertools import islice
+from typing import TYPE_CHECKING
 
 from rich.console import Console
+from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn, TimeRemainingColumn
 from rich.table import Table
 from rich.text import Text
 
-from ...study.analysis import SHARES, Estimate, Influence, Kept, Sensitivity, Spread, Summary
-from .console import say
+from ...study.analysis import SHARES, Estimate, Influence, Kept, Sensitivity, Spread, Summary, outputs_of, sensitivity
+from ..lines import counted, tell
+from .console import open_console, say
+from .progress import show_compilations
 from .tables import SIDE_BY_SIDE, fits, table
+
+if TYPE_CHECKING:
+    from ...study.campaign import Pool, Study
 
 _MOST_OUTPUTS = 4
 _MOST_PARAMETERS = 8
@@ -138,3 +148,79 @@ def _share(estimate: Estimate) -> str:
 
 def _number(value: float) -> str:
     return "-" if math.isnan(value) else f"{value + 0.0:.4g}"  # no -0
+
+
+@dataclass
+class ShownRuns:
+    """What is told of a study while it goes on.
+
+    Attributes:
+        progress: is called with how many runs are done, of how many, and how many failed.
+        begun: is called with the workers once they are there.
+    """
+
+    progress: Callable[[int, int, int], None]
+    begun: Callable[[Pool], None]
+
+
+@contextmanager
+def show_runs(title: str, quiet: bool) -> Iterator[ShownRuns]:
+    """A progress bar with an estimate on a terminal, one line per 10 % otherwise, nothing when quiet."""
+    if quiet:
+        yield ShownRuns(lambda *_: None, lambda _: None)
+    elif sys.stderr.isatty():
+        columns = (TextColumn("{task.description}"), BarColumn(), TextColumn("{task.fields[runs]}"))
+        out = open_console(stderr=True)
+        with Progress(*columns, TimeElapsedColumn(), TimeRemainingColumn(), console=out, transient=True) as bar:
+            task = bar.add_task(title, total=None, runs="")
+
+            def show(done: int, count: int, failed: int) -> None:
+                runs = f"{done} of {counted(count, 'run')}{f', {failed} failed' if failed else ''}"
+                bar.update(task, completed=done, total=count, runs=runs)
+
+            yield ShownRuns(show, _tell_pool)
+    else:
+        with show_compilations(quiet):
+            yield ShownRuns(_lines(title), _tell_pool)
+
+
+def show_study(study: Study, quiet: bool) -> None:
+    """The end of a study, verdicts and files last; when quiet, only what went wrong, on stderr."""
+    out = open_console(stderr=quiet)
+    count, told = study.told["runs"], study.told
+    if not quiet:
+        frame = study.frame()
+        say(out, str(told["title"] or told["scenario"]), "bold")
+        show_summary(out, study.summary(), (sensitivity(frame, study.plan, name) for name in outputs_of(frame)))
+        out.print()
+    failing = [name for name, verdicts in study.verdicts.items() if verdicts["fail"]]
+    line = f"{len(study)} of {counted(count, 'run')}"
+    line += f", {study.broken} failed" if study.broken else ""
+    line += f"; not always held: {', '.join(failing)}" if failing else "; all requirements held" * bool(study.verdicts)
+    is_bad = study.failed or len(study) < count
+    if is_bad or not quiet:
+        say(out, line, "bold red" if is_bad else "green")
+    if len(study) < count:
+        say(out, f"to go on: the same command with --resume -o {study.directory}", whole=True)
+    if not quiet:
+        files = "runs.parquet, study.json" + ", series.parquet" * bool(told["how"].get("record"))
+        say(out, f"Files in {study.directory}: {files}", whole=True)
+
+
+def _tell_pool(pool: Pool) -> None:
+    if pool.dashboard:
+        tell(f"what the workers do: {pool.dashboard}")
+
+
+def _lines(title: str) -> Callable[[int, int, int], None]:
+    told: int | None = None
+
+    def show(done: int, count: int, failed: int) -> None:
+        nonlocal told
+        tenth = 10 * done // count
+        told = 10 * (done - 1) // count if told is None else told
+        if tenth > told:
+            told = tenth
+            tell(f"{title}: {10 * tenth} % of {counted(count, 'run')}{f', {failed} failed' if failed else ''}")
+
+    return show

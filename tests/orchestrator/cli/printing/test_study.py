@@ -1,10 +1,15 @@
 """A study in words, on wide and narrow terminals."""
 
 import math
+import sys
+from types import SimpleNamespace
 
 import pytest
+from railcosim.orchestrator.cli.printing import show_runs
 from railcosim.orchestrator.cli.printing.study import show_summary
 from railcosim.orchestrator.study.analysis import Estimate, Influence, Kept, Sensitivity, Spread, Summary
+
+from .test_progress import Terminal
 
 NONE = Estimate(math.nan)
 GAP = Spread("gap", 199, 1, Estimate(3, 2, 4), 0.5, (NONE, Estimate(1.5, 1, 2), NONE), -0.715, 126, 9.0, 3)
@@ -72,3 +77,30 @@ def test_many_rows_without_a_value_are_counted(shown):
     lines = rows(shown(show_summary, Summary(200, {"failed": 200}, 0.95, (), lost, (), "Note.")))
     assert "without a value: 200 runs (9 rows)" in lines
     assert rows(shown(show_summary, Summary(0, {}, 0.95, (), (), (), ""))) == ["no runs"]
+
+
+def test_on_a_terminal_there_is_a_bar(monkeypatch):
+    terminal = Terminal()
+    monkeypatch.setattr(sys, "stderr", terminal)
+    with show_runs("small", False) as shown:
+        shown.begun(SimpleNamespace(dashboard="http://here/status"))
+        shown.progress(1, 2, 0)
+        shown.progress(2, 2, 1)
+    said = terminal.getvalue()
+    assert "what the workers do: http://here/status" in said
+    assert "2 of 2 runs, 1 failed" in said
+
+
+def test_elsewhere_there_are_lines(capsys):
+    with show_runs("small", False) as shown:
+        shown.begun(SimpleNamespace(dashboard=""))
+        for done in range(1, 101):
+            shown.progress(done, 100, done // 50)
+    lines = capsys.readouterr().err.splitlines()
+    assert lines[0] == "small: 10 % of 100 runs"
+    assert lines[-1] == "small: 100 % of 100 runs, 2 failed"
+    assert len(lines) == 10
+    with show_runs("small", True) as shown:
+        shown.begun(None)
+        shown.progress(1, 1, 0)
+    assert capsys.readouterr().err == ""

@@ -1,0 +1,22 @@
+"""Many runs on many workers, and the table they leave.
+
+`running` runs a plan: `parcel` is what workers need, `pool` where they are (in this process, or on a `cluster`, where
+`flight` sends chunks of the size that `pace` finds to the `worker`s), `dataset` what is on disk, of `columns`. `study`
+reads that, and `replay` runs a row of it again.
+"""
+
+from .parcel import packed
+from .pool import Pool, pool_for
+from .replay import Replayed, replay
+from .running import run_study
+from .study import Study
+
+__all__ = [
+    "Pool",
+    "Replayed",
+    "Study",
+    "packed",
+    "pool_for",
+    "replay",
+    "run_study",
+]

@@ -1,0 +1,179 @@
+"""Runs on Dask: chunks of them go to workers in other processes, on this machine or on others."""
+
+from __future__ import annotations
+
+import importlib
+import importlib.util
+import logging
+import signal
+import threading
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import ExitStack, contextmanager, suppress
+from pathlib import Path
+from typing import Any
+
+from ... import world
+from ...errors import RailcosimError, RunError
+from ...leftovers import PREFIX, own, sweep
+from ..rows import Row
+from . import worker
+from .flight import Flight, Future, Point
+from .parcel import Parcel
+
+_PATIENCE = 30.0
+"""How long, in s, a scheduler may be away."""
+_LOOK = 1.0
+"""How often, in s, workers are counted."""
+_CONFIG = {
+    "distributed.scheduler.allowed-failures": 0,  # which run ends its worker is found by division
+    "distributed.scheduler.worker-ttl": None,  # a long step is no death; of that the connection tells
+    "distributed.admin.large-graph-warning-threshold": "1TiB",  # an FMU is as large as it is
+}
+
+
+class Cluster:
+    """Workers of Dask, while this is entered.
+
+    Args:
+        parcel: what they need.
+        scheduler: the address of one that is there; None starts one, and workers, on this machine.
+        workers: how many of them; by default as many as there are processors.
+
+    Attributes:
+        dashboard: the address at which to look at what they do; empty where there is none.
+
+    Raises:
+        RailcosimError: from `rows`, too: there is no scheduler, or a worker cannot run the study at all.
+    """
+
+    def __init__(self, parcel: Parcel, scheduler: str | None = None, workers: int | None = None) -> None:
+        self._parcel, self._scheduler, self._wanted = parcel, scheduler, workers
+        self._held = ExitStack()
+        self._files: list[Future] = []
+        self._counted, self._count = -_LOOK, 0
+        self.dashboard = ""
+
+    def __enter__(self) -> Cluster:
+        with ExitStack() as held:
+            held.enter_context(_dask().dask.config.set(_CONFIG))
+            client = self._remote() if self._scheduler else self._local(held)
+            self._client = held.enter_context(client)
+            self.dashboard = client.dashboard_link if _can_show() else ""
+            self._held = held.pop_all()
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        closing = threading.Thread(target=self._close, name="closing")
+        closing.start()
+        while closing.is_alive():
+            with suppress(KeyboardInterrupt):  # half closed, it would go on for longer at the end of the process
+                closing.join()
+
+    @property
+    def workers(self) -> int:
+        """How many there are now."""
+        if world.monotonic() - self._counted > _LOOK:
+            self._counted = world.monotonic()
+            with suppress(OSError, TimeoutError):
+                self._count = len(self._client.nthreads())
+        return self._count
+
+    def rows(
+        self, points: Iterator[Point], count: int, is_over: Callable[[], bool] = lambda: False
+    ) -> Iterator[tuple[Point, Row]]:
+        """What comes out of runs, as it comes.
+
+        Args:
+            points: number and changes of each.
+            count: how many they are.
+            is_over: whether to leave it at that; asked several times a second.
+        """
+        flight = Flight(self, points, count)
+        try:
+            yield from flight.rows(is_over)
+        finally:
+            flight.end()
+
+    def submit(self, changes: Sequence[Mapping[str, Any]]) -> Future:
+        """Send runs away."""
+        if not self._files:
+            self._files = [
+                self._client.submit(worker.blob, content, key=f"railcosim-file-{digest}")
+                for digest, content in self._parcel.contents()
+            ]
+        future: Future = self._client.submit(worker.work, self._parcel.sent(), list(changes), self._files, pure=False)
+        return future
+
+    def wait_for_scheduler(self) -> None:
+        """Wait for one that has lost everything to be there again.
+
+        Raises:
+            RunError: it is not.
+        """
+        self._files = []
+        until = world.monotonic() + _PATIENCE
+        while self._client.status != "running":
+            if self._client.status == "closed" or world.monotonic() > until:
+                where = self._scheduler or "on this machine"
+                raise RunError(f"the scheduler {where} is gone: start it and go on by --resume")
+            world.sleep(0.1)
+
+    def _close(self) -> None:
+        self._files = []
+        with self._held:
+            if self._scheduler and self._client.status == "running":  # its workers stay
+                with suppress(OSError, TimeoutError):
+                    self._client.run(worker.forget, self._parcel.digest)
+
+    def _local(self, held: ExitStack) -> Any:
+        dask = _dask()
+        folder = Path(world.mkdtemp(prefix=PREFIX))
+        held.callback(world.rmtree, folder, ignore_errors=True)
+        held.callback(own(folder).release)
+        sweep(folder)
+        held.enter_context(dask.dask.config.set({"temporary-directory": str(folder)}))
+        dask.utils.get_mp_context().Lock()  # its tracker makes the thread that starts it hear again
+        with _deaf():
+            cluster = dask.LocalCluster(
+                n_workers=self._wanted,
+                threads_per_worker=1,
+                processes=True,
+                host="127.0.0.1",
+                dashboard_address="127.0.0.1:0" if _can_show() else None,
+                local_directory=str(folder),
+                silence_logs=logging.CRITICAL,
+                env={"TMPDIR": str(folder)},
+            )
+        return dask.Client(held.enter_context(cluster), set_as_default=False, timeout=_PATIENCE)
+
+    def _remote(self) -> Any:
+        try:
+            return _dask().Client(self._scheduler, set_as_default=False, timeout=_PATIENCE)
+        except (OSError, ValueError) as error:
+            raise RailcosimError(
+                f"no scheduler answers at {self._scheduler} ({error}); start one by 'dask scheduler', and workers by "
+                f"'dask worker {self._scheduler} --nthreads 1'"
+            ) from error
+
+
+def _dask() -> Any:
+    """Dask, an extra without types."""
+    return importlib.import_module("distributed")
+
+
+@contextmanager
+def _deaf() -> Iterator[None]:
+    """Let threads and processes that are started meanwhile not hear what a terminal says: it is meant for us."""
+    if not hasattr(signal, "pthread_sigmask"):  # pragma: no cover: Windows
+        yield
+        return
+    before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT, signal.SIGHUP})
+    try:
+        yield
+    finally:
+        signal.pthread_sigmask(signal.SIG_SETMASK, before)
+
+
+def _can_show() -> bool:
+    """Whether there is what draws the dashboard, a package that Dask can do without."""
+    return importlib.util.find_spec("bokeh") is not None

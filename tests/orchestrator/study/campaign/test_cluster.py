@@ -1,0 +1,132 @@
+"""Runs on Dask: with a scheduler and a worker in this process, as on any that is there."""
+
+import logging
+import os
+import signal
+import threading
+
+import pytest
+from distributed import LocalCluster
+from railcosim.orchestrator import Study, world
+from railcosim.orchestrator.errors import RailcosimError, RunError
+from railcosim.orchestrator.study.campaign import cluster as cluster_module
+from railcosim.orchestrator.study.campaign import packed, pool_for, run_study, worker
+from railcosim.orchestrator.study.campaign.cluster import Cluster
+
+from .conftest import plan_of, same
+
+
+@pytest.fixture
+def scheduler():
+    """The address of one with a worker."""
+    how = {"n_workers": 1, "threads_per_worker": 2, "processes": False, "dashboard_address": None}
+    with LocalCluster(**how, silence_logs=logging.CRITICAL) as made:
+        yield made.scheduler_address
+
+
+def test_a_study_is_the_same_on_workers(system, how, tmp_path, scheduler, undisturbed):
+    study = run_study(plan_of(system, runs=6), how, tmp_path / "out", scheduler=scheduler)
+    assert same(study, undisturbed)
+    assert not worker._OPEN
+
+
+def test_what_a_worker_cannot_do_at_all_ends_the_study(system, how, tmp_path, scheduler, monkeypatch):
+    monkeypatch.setattr(worker, "this_version", lambda: "0.0.1")
+    with pytest.raises(RailcosimError, match=r"a worker has railcosim 0\.0\.1"):
+        run_study(plan_of(system, runs=6), how, tmp_path / "out", scheduler=scheduler)
+    assert Study.load(tmp_path / "out").told["status"] == "failed"
+
+
+def test_no_scheduler(system, how, tmp_path, monkeypatch):
+    monkeypatch.setattr(cluster_module, "_PATIENCE", 0.05)
+    for address in ("tcp://127.0.0.1:9", "nonsense://x"):
+        with pytest.raises(RailcosimError, match=f"no scheduler answers at {address} .* start one by 'dask scheduler'"):
+            run_study(plan_of(system, runs=6), how, tmp_path / "out", scheduler=address)
+
+
+@pytest.mark.parametrize(("states", "is_back"), [(["connecting", "running"], True), (["closed"], False)])
+def test_a_scheduler_that_went_is_waited_for(system, how, monkeypatch, states, is_back):
+    class Client:
+        @property
+        def status(self):
+            return states.pop(0) if len(states) > 1 else states[0]
+
+    monkeypatch.setattr(world, "sleep", lambda _: None)
+    made = Cluster(packed(how, [system], "plain"), "tcp://far:8786")
+    made._client = Client()
+    if is_back:
+        made.wait_for_scheduler()
+    else:
+        with pytest.raises(RunError, match="the scheduler tcp://far:8786 is gone: start it and go on by --resume"):
+            made.wait_for_scheduler()
+
+
+def test_a_cluster_is_closed_whole_whatever_a_user_presses(system, how, scheduler, monkeypatch):
+    made = pool_for(packed(how, [system], "plain"), scheduler)
+    close, closing = made._close, threading.Event()
+
+    def slowly():
+        closing.wait(5.0)
+        close()
+
+    def join(thread, timeout=None, join=threading.Thread.join):
+        if thread.name == "closing" and not closing.is_set():
+            closing.set()
+            raise KeyboardInterrupt
+        join(thread, timeout)
+
+    with made:
+        assert made.workers == made.workers == 1
+        monkeypatch.setattr(made, "_close", slowly)
+        with monkeypatch.context() as patch:
+            patch.setattr(threading.Thread, "join", join)
+            made.__exit__()
+    assert made._client.status == "closed"
+
+
+def test_the_dashboard_needs_a_package_that_may_be_missing(system, how, scheduler, monkeypatch):
+    monkeypatch.setattr(cluster_module, "_can_show", lambda: True)
+    with pool_for(packed(how, [system], "plain"), scheduler) as made:
+        assert made.dashboard is not None
+    monkeypatch.setattr(cluster_module, "_can_show", lambda: False)
+    with pool_for(packed(how, [system], "plain"), scheduler) as made:
+        assert made.dashboard == ""
+
+
+def test_what_is_started_does_not_hear_the_terminal():
+    with cluster_module._deaf():
+        assert signal.SIGINT in signal.pthread_sigmask(signal.SIG_BLOCK, [])
+    assert signal.SIGINT not in signal.pthread_sigmask(signal.SIG_BLOCK, [])
+    assert cluster_module._can_show() in (True, False)
+
+
+@pytest.fixture
+def started(monkeypatch):
+    """How a local cluster is started, in this process instead of others."""
+    found = {}
+
+    def start(**how):
+        found.update(how)
+        kept = {name: value for name, value in how.items() if name not in ("processes", "env", "host")}
+        return LocalCluster(**kept, processes=False)
+
+    class Dask:
+        def __getattr__(self, name):
+            return start if name == "LocalCluster" else getattr(__import__("distributed"), name)
+
+    monkeypatch.setattr(cluster_module, "_dask", Dask)
+    return found
+
+
+@pytest.mark.filterwarnings("ignore::pytest.PytestUnraisableExceptionWarning")
+def test_a_local_cluster_leaves_nothing(how, tmp_path, undisturbed, started, monkeypatch):
+    monkeypatch.setattr("tempfile.tempdir", str(tmp_path / "temporary"))
+    (tmp_path / "temporary").mkdir()
+    study = run_study(undisturbed.plan, how, tmp_path / "out", workers=2)
+    assert same(study, undisturbed)
+    assert (started["n_workers"], started["threads_per_worker"], started["host"]) == (2, 1, "127.0.0.1")
+    assert started["env"]["TMPDIR"] == started["local_directory"]
+    assert not os.path.exists(started["local_directory"])
+    for digest in list(worker._OPEN):  # those of processes of their own go with them
+        worker.forget(digest)
+    assert not list((tmp_path / "temporary").iterdir())

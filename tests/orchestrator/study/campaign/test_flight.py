@@ -1,0 +1,120 @@
+"""Chunks under way: each run comes back once, whatever becomes of its worker."""
+
+import itertools
+from concurrent.futures import CancelledError
+
+import pytest
+from distributed import KilledWorker
+from railcosim.orchestrator.study import Row
+from railcosim.orchestrator.study.campaign.flight import Flight
+
+
+class Future:
+    """What comes back at once."""
+
+    numbers = itertools.count()
+
+    def __init__(self, outcome):
+        self.key, self._outcomes, self.is_cancelled = next(self.numbers), [*outcome], False
+
+    def add_done_callback(self, call):
+        call(self)
+
+    def result(self, timeout):
+        outcome = self._outcomes.pop(0) if len(self._outcomes) > 1 else self._outcomes[0]
+        if isinstance(outcome, Exception):
+            raise outcome
+        return outcome
+
+    def cancel(self, force):
+        assert force
+        self.is_cancelled = True
+
+
+class Workers:
+    """Workers that some runs end, and that some first chunks do not come back from at once."""
+
+    def __init__(self, workers=2, *, deadly=(), first=(), allowed=0):
+        self.workers, self.deadly, self.first, self.allowed = workers, deadly, list(first), allowed
+        self.sent, self.futures, self.waits = [], [], 0
+
+    def submit(self, changes):
+        numbers = [change["n"] for change in changes]
+        self.sent.append(numbers)
+        outcome = [([Row("completed", steps=number) for number in numbers], 0.1 * len(numbers))]
+        if set(numbers) & set(self.deadly):
+            outcome = [KilledWorker("key", None, self.allowed)]
+        elif self.first:
+            outcome = [self.first.pop(0), *outcome]
+        self.futures.append(Future(outcome))
+        return self.futures[-1]
+
+    def wait_for_scheduler(self):
+        self.waits += 1
+
+
+def fly(workers, count=60, is_over=lambda: False):
+    flight = Flight(workers, ((number, {"n": number}) for number in range(count)), count)
+    found = list(flight.rows(is_over))
+    flight.end()
+    assert len({number for (number, _), _ in found}) == len(found)
+    return {number: row for (number, _), row in found}
+
+
+def test_all_come_back_in_chunks_that_grow():
+    workers = Workers()
+    rows = fly(workers)
+    assert {number: row.steps for number, row in rows.items()} == {number: number for number in range(60)}
+    assert [len(chunk) for chunk in workers.sent[:5]] == [1, 1, 1, 1, 7]
+
+
+@pytest.mark.parametrize(("allowed", "times"), [(0, 3), (3, 8)])
+def test_a_run_that_ends_its_worker_is_found_and_is_a_row(allowed, times, caplog):
+    workers = Workers(deadly=[17, 40], allowed=allowed)
+    rows = fly(workers)
+    lost = {number: row.error for number, row in rows.items() if row.status == "failed"}
+    assert sorted(lost) == [17, 40]
+    assert lost[17].startswith(f"it ended the process of its worker {times} times")
+    assert all(workers.sent.count([number]) == (3 if allowed == 0 else 2) for number in lost)
+    assert len(rows) == 60
+    assert caplog.messages == (
+        ["a worker died, and what it had is run again; an FMU that crashes is kept to its own run by --isolate"]
+    )
+
+
+def test_a_neighbour_that_was_waiting_behind_such_a_run_is_not_blamed():
+    workers = Workers(first=[KilledWorker("key", None, 3)] * 4)
+    rows = fly(workers, 4)
+    assert {row.status for row in rows.values()} == {"completed"}
+    assert len(workers.sent) == 8
+
+
+@pytest.mark.parametrize("error", [CancelledError(), OSError("the connection is closed")])
+def test_a_scheduler_that_began_anew_gets_what_it_lost(error):
+    workers = Workers(first=[error, error])
+    assert len(fly(workers)) == 60
+    assert workers.waits == 2
+
+
+def test_a_result_that_was_lost_with_its_worker_is_waited_for():
+    workers = Workers(first=[TimeoutError()])
+    assert len(fly(workers)) == 60
+    assert sum(map(len, workers.sent)) == 60
+
+
+def test_it_ends_when_it_is_told_to():
+    workers, looks = Workers(), iter([False] * 3)
+    rows = fly(workers, is_over=lambda: next(looks, True))
+    assert len(rows) == 3
+    assert sum(future.is_cancelled for future in workers.futures) >= 1
+
+
+def test_it_looks_up_while_nothing_comes(monkeypatch):
+    monkeypatch.setattr(Future, "add_done_callback", lambda self, call: None)
+    monkeypatch.setattr("railcosim.orchestrator.study.campaign.flight._TICK", 0.001)
+    looks = iter([False] * 3)
+    assert not fly(Workers(), is_over=lambda: next(looks, True))
+
+
+def test_there_may_be_no_worker_yet():
+    assert len(fly(Workers(0))) == 60
