@@ -110,7 +110,8 @@ class CompiledLoop:
         self.threads = max(1, min(coupling.settings.threads, len(self._slaves))) if is_shared else 1
         ends: list[int] = []
         for batch in algorithm.batches():
-            for share in np.array_split(list(batch.names), self.threads):
+            names = list(batch.names)
+            for share in np.array_split(names, self.threads) if self.threads > 1 else [names]:
                 self._add(list(share), batch.operations)
                 ends.append(len(self._operations))
         self._plan = (

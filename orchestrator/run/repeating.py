@@ -68,7 +68,8 @@ class Flown:
 
     Attributes:
         status, error: as `Run` has them. recorded: what is kept of the points that are results.
-        seen: the same of every communication point. steps: communication steps taken.
+        seen: the same of every communication point. steps: communication steps taken. stepping: wall time of
+            them, s.
     """
 
     status: Status
@@ -76,6 +77,7 @@ class Flown:
     recorded: Columns
     seen: Seen
     steps: int
+    stepping: float
 
 
 @contextmanager
@@ -164,7 +166,9 @@ class Repeater:
             found = explain_divergence(checked.system, self._interfaces, self._links, points, session.error)
             if found is not None:
                 session.error.explain(found.message)
-        return Flown(session.status, session.error, recorded, seen, int(session.seconds["steps"]))
+        return Flown(
+            session.status, session.error, recorded, seen, int(session.seconds["steps"]), session.seconds["stepping"]
+        )
 
 
 def _last(columns: Columns) -> Mapping[str, NDArray[Any]]:
