@@ -189,6 +189,13 @@ class Expression:
             reason = f"its parts differ in their number of rows ({error})"
             raise scope.error(Problem("", reason, "combine arrays of one size")) from None
 
+    def value(self, run: Prepared, index: int | None = None) -> Value:
+        """As `evaluate` has it, where numbers may overflow without a word."""
+        try:
+            return run.whole[self.bound(run.plan, index).term(self.tree)]
+        except (ExpressionError, ValueError):  # said by what it stands in
+            return self.apply(evaluate, run, index)
+
     def evaluate(self, signals: Signals, index: int | None = None, **constants: Any) -> float | Value:
         """The value: a number, or an array (T,), or (n, T) with one row per signal of a slice.
 

@@ -254,10 +254,10 @@ def measure(name: str, text: str, expression: Expression, run: Prepared) -> Metr
     try:
         for index in expression.instances(run.plan.names):
             values[index] = np.nan
-            value = expression.evaluate(run, index)
-            if isinstance(value, np.ndarray):
+            value = expression.value(run, index)
+            if value.ndim:
                 raise ExpressionError(_not_reduced(text))
-            values[index], truth = float(value), isinstance(value, bool)
+            values[index], truth = float(value), value.dtype == np.bool_
             known.append(index)
     except ExpressionError as error:
         problem, truth = str(error), False

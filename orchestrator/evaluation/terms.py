@@ -81,8 +81,9 @@ class Plan:
         self.names = Names.of(names)
         self.bindings: dict[Hashable, Any] = {}
         """What was made ready, by what it is."""
-        self.levels: dict[int, dict[Hashable, Reduction]] = {}
-        """All reductions by how many reducers stand inside them."""
+        self.levels: dict[int, dict[Hashable, list[Reduction]]] = {}
+        """All reductions by how many reducers stand inside them, and by what they have in common."""
+        self._reductions: dict[Hashable, Reduction] = {}
         self._terms: dict[Hashable, Term] = {}
 
     @classmethod
@@ -108,7 +109,11 @@ class Plan:
 
     def reduction(self, reduction: Reduction) -> Term:
         """What a reducer gives."""
-        reduction = self.levels.setdefault(reduction.level, {}).setdefault(reduction.key, reduction)
+        known = self._reductions.setdefault(reduction.key, reduction)
+        if known is reduction:
+            level = self.levels.setdefault(reduction.level, {})
+            level.setdefault(reduction.family, []).append(reduction)
+        reduction = known
         term = self.term(("reduction", reduction.key), lambda frame: frame.run.reduced(reduction))
         term.level = reduction.level + 1
         return term
@@ -170,7 +175,7 @@ class Prepared:
         self.plan, self.signals = plan, signals
         self.recorded = signals.names()
         self.whole = Frame(self, signals)
-        self._reduced: dict[Hashable, Value | ExpressionError | ValueError] = {}
+        self._reduced: dict[Reduction, Value | ExpressionError | ValueError] = {}
         self._spans: dict[Hashable, Span] = {}
         self._last: tuple[Part, Frame] | None = None
 
@@ -194,21 +199,18 @@ class Prepared:
         Raises:
             ExpressionError, ValueError: it gives nothing.
         """
-        if reduction.key not in self._reduced:
+        if reduction not in self._reduced:
             self._look(reduction.level)
-        value = self._reduced[reduction.key]
+        value = self._reduced[reduction]
         if isinstance(value, Exception):
             raise value
         return value
 
     def _look(self, level: int) -> None:
         """At the run, for all reducers of a level of which nothing is known yet."""
-        families: dict[Hashable, list[Reduction]] = {}
-        for key, reduction in self.plan.levels[level].items():
-            if key not in self._reduced:
-                families.setdefault(reduction.family, []).append(reduction)
-        looks = [_Look(self, family, self._reduced) for family in families.values()]
-        beyond = max((reduction.reach for family in families.values() for reduction in family), default=0)
+        pending = [[one for one in family if one not in self._reduced] for family in self.plan.levels[level].values()]
+        looks = [_Look(self, family, self._reduced) for family in pending if family]
+        beyond = max((reduction.reach for family in pending for reduction in family), default=0)
         for part in parts_of(self.signals, beyond):
             frame = self.frame(part)
             failed = [look for look in looks if not look.see(frame)]
@@ -275,7 +277,7 @@ class _Look:
     """
 
     def __init__(
-        self, run: Prepared, members: list[Reduction], found: dict[Hashable, Value | ExpressionError | ValueError]
+        self, run: Prepared, members: list[Reduction], found: dict[Reduction, Value | ExpressionError | ValueError]
     ) -> None:
         self._members, self._found = members, found
         self._folds: dict[Hashable, tuple[Fold, list[Reduction]]] = {}
@@ -290,7 +292,7 @@ class _Look:
 
     def _give_up(self, members: list[Reduction], error: ExpressionError | ValueError) -> None:
         self._members = [member for member in self._members if member not in members]
-        self._found.update((member.key, error) for member in members)
+        self._found.update((member, error) for member in members)
 
     def see(self, frame: Frame) -> bool:
         """Take in a part of the run; False if some member cannot."""
@@ -320,12 +322,12 @@ class _Look:
         for fold, members in self._folds.values():
             for place, member in enumerate(members):
                 try:
-                    self._found[member.key] = np.asarray(fold.value(place))
+                    self._found[member] = np.asarray(fold.value(place))
                 except WindowError as error:
-                    self._found[member.key] = error
+                    self._found[member] = error
         for member in self._members:
-            if member.key not in self._found:
-                self._found[member.key] = WindowError(nothing_in_window())
+            if member not in self._found:
+                self._found[member] = WindowError(nothing_in_window())
 
 
 def _flat(argument: Argument) -> list[Term]:

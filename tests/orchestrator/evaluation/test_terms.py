@@ -112,7 +112,7 @@ def test_what_is_common_is_calculated_once():
     for text in texts:
         assert isinstance(parse(text, FUNCTIONS).evaluate(prepared, 2), float)
     counts = dict.fromkeys(texts, 1)
-    looks = [reduction for level in plan.levels.values() for reduction in level.values()]
+    looks = [reduction for level in plan.levels.values() for family in level.values() for reduction in family]
     assert len(looks) == len(counts)
     assert looks[0].varying["x"] is looks[1].varying["x"]
 
