@@ -11,7 +11,7 @@ import typer
 from ...components.errors import ComponentError
 from .. import world
 from ..errors import FmuError, RailcosimError, RunError, ScenarioError
-from . import analysis, models, reports, runs, scenarios, studies
+from . import analysis, models, reports, runs, scenarios, searches, studies
 from .lines import Log, folded, tell
 from .options import FMU_FAILED, OK, WRONG_INPUT
 from .streams import flush_streams, secure_streams
@@ -95,6 +95,8 @@ for command in (
     models.new,
     analysis.compare,
     analysis.linearize,
+    searches.falsify,
+    searches.optimize,
     studies.study,
     studies.replay,
 ):

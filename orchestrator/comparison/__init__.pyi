@@ -1,3 +1,4 @@
+from .figures import draw_compared
 from .preference import read_directions
 from .reproduce import published_cases
 from .variants import Comparison, Row, compare, variants
@@ -6,6 +7,7 @@ __all__ = [
     "Comparison",
     "Row",
     "compare",
+    "draw_compared",
     "published_cases",
     "read_directions",
     "variants",

@@ -1,5 +1,5 @@
 from .changes import split_assignment
-from .loading import load
+from .loading import dump, load
 from .patterns import NAME
 from .shipped import listed, shipped
 from .toml_source import parse_value
@@ -11,6 +11,7 @@ __all__ = [
     "SEED",
     "assignment",
     "changed",
+    "dump",
     "import_notes",
     "is_structural",
     "listed",

@@ -1,13 +1,18 @@
-"""The interface of an FMU as tables."""
+"""The interface of an FMU as tables, and what was found about it."""
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Mapping, Sequence
 
 from rich.console import Console
+from rich.text import Text
 
 from ...fmi import Interface, Variable
+from ...validation import Report
+from .console import say
 from .listing import show_listing
+from .tables import table, verdict
 
 
 def show_interface(out: Console, interface: Interface) -> None:
@@ -58,3 +63,15 @@ def _start(value: object) -> str:
     if isinstance(value, bool):
         return str(value).lower()
     return f"{value:.10g}" if isinstance(value, float) else str(value)
+
+
+def show_report(out: Console, report: Report) -> None:
+    """One row a check, and the verdict in a line."""
+    made = table("", ("check", "verdict", "what was found"), fold=("what was found",))
+    for finding in report.findings:
+        made.add_row(Text(finding.check), verdict(finding.verdict), Text(finding.detail))
+    say(out, f"{report.path}: {report.interface.model}", "bold")
+    out.print(made)
+    found = Counter(finding.verdict for finding in report.findings)
+    told = ", ".join(f"{found[word]} {word}" for word in ("pass", "note", "warning", "fail", "skipped") if found[word])
+    say(out, f"{'valid' if report.passed else 'not valid'}: {told}", "green" if report.passed else "bold red")

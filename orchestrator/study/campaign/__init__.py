@@ -5,6 +5,8 @@
 reads that, and `replay` runs a row of it again.
 """
 
+from .columns import Entry
+from .dataset import Dataset, parts_of
 from .parcel import packed
 from .pool import Pool, pool_for
 from .replay import Replayed, replay
@@ -12,10 +14,13 @@ from .running import run_study
 from .study import Study
 
 __all__ = [
+    "Dataset",
+    "Entry",
     "Pool",
     "Replayed",
     "Study",
     "packed",
+    "parts_of",
     "pool_for",
     "replay",
     "run_study",

@@ -1,0 +1,108 @@
+"""What a search has found."""
+
+from __future__ import annotations
+
+import math
+import sys
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from typing import TYPE_CHECKING
+
+from rich.console import Console
+from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn, TimeRemainingColumn
+
+from ..lines import and_figures, counted, tell
+from .console import open_console, say
+from .tables import table
+
+if TYPE_CHECKING:
+    from ...study.search import Falsified, Optimized
+
+_MOST_LINES = 12
+"""So many points of a Pareto front are shown; all are files."""
+
+
+@contextmanager
+def show_search(title: str, quiet: bool) -> Iterator[Callable[[int, int, str], None]]:
+    """A bar over the runs of a search on a terminal, a line each 10 % otherwise, nothing when quiet."""
+    if quiet:
+        yield lambda *_: None
+    elif sys.stderr.isatty():
+        columns = (TextColumn("{task.description}", markup=False), BarColumn(), TextColumn("{task.fields[told]}"))
+        out = open_console(stderr=True)
+        with Progress(*columns, TimeElapsedColumn(), TimeRemainingColumn(), console=out, transient=True) as bar:
+            task = bar.add_task(title, total=None, told="")
+            yield lambda done, of, best: bar.update(
+                task, completed=done, total=of, told=", ".join(filter(None, (f"{done} of {of} runs", best)))
+            )
+    else:
+        yield _lines(title)
+
+
+def _lines(title: str) -> Callable[[int, int, str], None]:
+    told = 0
+
+    def show(done: int, of: int, best: str) -> None:
+        nonlocal told
+        if 10 * done // of > told:
+            told = 10 * done // of
+            tell(f"{title}: {done} of {of} runs" + (f", {best}" if best else ""))
+
+    return show
+
+
+def show_falsified(result: Falsified, quiet: bool) -> None:
+    """What breaks the requirement and where, or how near the search came."""
+    out, found = open_console(), result.found
+    _show_errors(out, found.failed, found.errors)
+    if result.verdict is None or result.scenario is None:
+        margin = math.nan if found.nearest is None else found.nearest.margins.get(found.requirement, math.nan)
+        nearest = (
+            ""
+            if found.nearest is None or math.isnan(margin)
+            else f"; least margin {margin:.6g}, run {found.nearest.run}"
+        )
+        say(out, f"{found.requirement} was not broken in {counted(found.runs, 'run')}{nearest}", "green")
+        _show_files(out, quiet, result, ["runs.parquet"])
+        return
+    verdict = result.verdict
+    by = "" if verdict.margin is None else f" by {abs(verdict.margin):.6g}"
+    at = "" if verdict.time is None else f" at {verdict.time:g} s"
+    at += "" if verdict.index is None else f", i = {verdict.index}"
+    say(out, f"{found.requirement} is broken{by}{at}, after {counted(found.runs, 'run')}", "bold red")
+    if not quiet:
+        say(out, f"The smallest change that still breaks it, after {counted(found.shrinking, 'more run')}:")
+        for line in result.changes:
+            say(out, f"    {line}")
+    _show_files(out, quiet, result, [result.scenario.name, "nominal.toml", "runs.parquet"])
+
+
+def show_optimized(result: Optimized, quiet: bool) -> None:
+    """The best values, or the Pareto front."""
+    out, found = open_console(), result.found
+    _show_errors(out, found.failed, found.errors)
+    names = list(found.objectives.values())
+    if not found.best:
+        say(out, f"no run of {found.runs} keeps {', '.join(found.requirements) or 'a finite value'}", "bold red")
+    elif not quiet:
+        many = len(found.best) > 1
+        title = f"{'Pareto front' if many else 'Best'} of {counted(found.runs, 'run')}"
+        made = table(title, ["scenario", *names], right=names, fold=names)
+        for best, path in list(zip(found.best, result.scenarios, strict=True))[:_MOST_LINES]:
+            made.add_row(path.name, *(f"{value:.6g}" for value in found.values(best)))
+        out.print(made)
+        if len(found.best) > _MOST_LINES:
+            say(out, f"and {len(found.best) - _MOST_LINES} more")
+        for line in result.changes[0] if not many else ():
+            say(out, f"    {line}")
+    _show_files(out, quiet, result, [*(["best.toml"] if len(names) == 1 and found.best else []), "runs.parquet"])
+
+
+def _show_errors(out: Console, failed: int, errors: tuple[str, ...]) -> None:
+    if failed:
+        say(out, f"{counted(failed, 'run')} failed: {errors[0]}", "yellow")
+
+
+def _show_files(out: Console, quiet: bool, result: Falsified | Optimized, names: list[str]) -> None:
+    if not quiet:
+        say(out, f"Files in {result.directory}: {', '.join(names)}{and_figures(len(result.figures))}", whole=True)

@@ -1,0 +1,182 @@
+"""Commands of ``orchestrate`` that search: for the run that breaks a requirement, for the best parameters."""
+
+from __future__ import annotations
+
+from enum import StrEnum
+from pathlib import Path
+from typing import Annotated, Any
+
+import typer
+
+from ..errors import ScenarioError
+from ..problems import Problem
+from ..system import System
+from .options import (
+    FAILED,
+    FMU_FAILED,
+    OK,
+    Kind,
+    KindName,
+    Preset,
+    Quiet,
+    Scenario,
+    Set,
+    Step,
+    Stop,
+    Swap,
+    With,
+    load_system,
+)
+from .printing import show_falsified, show_optimized, show_search
+
+
+class MethodName(StrEnum):
+    """`search.METHODS`, as the command line needs them."""
+
+    cma_es = "cma-es"
+    tpe = "tpe"
+    random = "random"
+
+
+Vary = Annotated[
+    list[str] | None,
+    typer.Option(
+        help="What is varied: gust.size=0:2, a distribution, a list, or a signal over time such as "
+        "target.value=signal(60, 85, 10, linear, rate=0.5); repeatable."
+    ),
+]
+Budget = Annotated[int, typer.Option(min=1, help="How many runs may be spent.")]
+Seed = Annotated[int, typer.Option(min=0, max=2**32 - 1, help="Of the search.")]
+Resume = Annotated[bool, typer.Option("--resume", help="Go on with the search in the directory: no run is run twice.")]
+NoFigures = Annotated[bool, typer.Option("--no-figures", help="Draw nothing.")]
+
+
+def falsify(
+    scenario: Scenario,
+    *,
+    vary: Vary = None,
+    requirement: Annotated[
+        str | None, typer.Option(help="The requirement to be broken; the scenario's own where it has one alone.")
+    ] = None,
+    budget: Budget = 500,
+    method: Annotated[
+        MethodName, typer.Option(help="How to search: CMA-ES, the tree-structured Parzen estimator, or at random.")
+    ] = MethodName.cma_es,
+    seed: Seed = 0,
+    resume: Resume = False,
+    preset: Preset = None,
+    settings: Set = None,
+    builds: With = None,
+    swaps: Swap = None,
+    stop: Stop = None,
+    step: Step = None,
+    kind: Kind = KindName.auto,
+    output: Annotated[
+        Path | None,
+        typer.Option("--output", "-o", help="Directory; results/falsify-<scenario>-<requirement> by default."),
+    ] = None,
+    no_figures: NoFigures = False,
+    quiet: Quiet = False,
+) -> None:
+    """Search for the run that breaks a requirement, and make what is found as small as it can be.
+
+    What is found is a scenario, counterexample.toml; as many runs as the budget may be spent on making it small.
+
+    Exit codes: 0 not broken within the budget; 1 broken; 2 the input is wrong; 3 not broken, but runs failed.
+    """
+    from ..study.search import falsify as search
+
+    system = load_system(scenario, preset, settings, builds, swaps, stop=stop, step=step)
+    name = requirement or _only_requirement(system)
+    directory = output or _directory("falsify", system, preset, name)
+    with show_search(f"{system.provenance.name}: {name}", quiet) as progress:
+        result = search(
+            system,
+            vary or (),
+            name,
+            directory,
+            budget=budget,
+            method=method.value,
+            seed=seed,
+            kind=kind.value,
+            resume=resume,
+            figures=not no_figures,
+            progress=progress,
+        )
+    show_falsified(result, quiet)
+    raise typer.Exit(FAILED if result.found.found else FMU_FAILED if result.found.failed else OK)
+
+
+def optimize(
+    scenario: Scenario,
+    *,
+    vary: Vary = None,
+    objectives: Annotated[
+        list[str] | None,
+        typer.Option(
+            "--minimize", help="What is to be least: a metric, or an expression; several give a Pareto front."
+        ),
+    ] = None,
+    requirements: Annotated[
+        list[str] | None, typer.Option("--subject-to", help="A requirement that has to hold; repeatable.")
+    ] = None,
+    budget: Budget = 500,
+    seed: Seed = 0,
+    resume: Resume = False,
+    preset: Preset = None,
+    settings: Set = None,
+    builds: With = None,
+    swaps: Swap = None,
+    stop: Stop = None,
+    step: Step = None,
+    kind: Kind = KindName.auto,
+    output: Annotated[
+        Path | None, typer.Option("--output", "-o", help="Directory; results/optimize-<scenario> by default.")
+    ] = None,
+    no_figures: NoFigures = False,
+    quiet: Quiet = False,
+) -> None:
+    """Search for the values that make metrics least while requirements hold.
+
+    One objective is searched for by the tree-structured Parzen estimator and gives best.toml, several by NSGA-II and
+    give a Pareto front of scenarios, pareto-1.toml and so on.
+
+    Exit codes: 0 found; 1 no run keeps the requirements; 2 the input is wrong; 3 none keeps them, and runs failed.
+    """
+    from ..study.search import optimize as search
+
+    if not objectives:
+        raise ScenarioError(Problem("", "nothing is to be least", "name a metric, as in --minimize settling"))
+    system = load_system(scenario, preset, settings, builds, swaps, stop=stop, step=step)
+    directory = output or _directory("optimize", system, preset)
+    how: Any = {"requirements": requirements or (), "budget": budget, "seed": seed, "kind": kind.value}
+    with show_search(system.provenance.name, quiet) as progress:
+        result = search(
+            system,
+            vary or (),
+            objectives,
+            directory,
+            **how,
+            resume=resume,
+            figures=not no_figures,
+            progress=progress,
+        )
+    show_optimized(result, quiet)
+    raise typer.Exit(OK if result.found.best else FMU_FAILED if result.found.failed else FAILED)
+
+
+def _only_requirement(system: System) -> str:
+    """The one requirement of a scenario.
+
+    Raises:
+        ScenarioError: it has none, or several.
+    """
+    names = list(system.judged.requirements)
+    if len(names) != 1:
+        remedy = f"name one by --requirement: {', '.join(names)}" if names else "write one into its [require]"
+        raise ScenarioError(Problem("", f"the scenario has {len(names) or 'no'} requirements", remedy))
+    return names[0]
+
+
+def _directory(command: str, system: System, preset: str | None, *more: str) -> Path:
+    return Path("results") / "-".join(filter(None, (command, system.provenance.name, preset, *more)))

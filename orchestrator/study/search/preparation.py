@@ -1,0 +1,156 @@
+"""What a search needs before its first run: the scenario with what is varied in place, in the search's directory."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from ... import world
+from ...errors import ScenarioError
+from ...evaluation import split_metric, value_name
+from ...fmi import Kind, Workspace
+from ...problems import Problem, suggestion
+from ...run import RunDirectory, check, execute
+from ...system import System
+from ..campaign import Dataset
+from ..rows import Row
+from ..structure import Runner
+from .counterexample import NOMINAL, changed_scenario, scenario_text
+from .evaluations import Changes, Evaluations
+from .space import Space, make_space, read_space
+
+SEARCH_FILE = "search.json"
+
+
+@dataclass(frozen=True)
+class Prepared:
+    """A search about to begin.
+
+    Attributes:
+        directory: for all that it writes. space: what is varied. evaluations: the runs.
+    """
+
+    directory: Path
+    space: Space
+    evaluations: Evaluations
+
+    @property
+    def nominal(self) -> Path:
+        """The scenario with signals in place."""
+        return self.directory / NOMINAL
+
+
+@contextmanager
+def prepared(
+    system: System,
+    vary: Sequence[str],
+    output: str | Path,
+    told: Mapping[str, Any],
+    *,
+    requirements: Sequence[str] = (),
+    metrics: Mapping[str, str] | None = None,
+    objectives: Mapping[str, str] | None = None,
+    kind: Kind = "auto",
+    resume: bool = False,
+) -> Iterator[Prepared]:
+    """Make a search ready; its runs can be asked for while this is entered.
+
+    Args:
+        system: the scenario as options change it.
+        vary: what is varied, as `--vary` takes it.
+        output: the directory.
+        told: what makes the search the one it is, so that it can be gone on with.
+        requirements: those that the search is about.
+        metrics: expressions to be evaluated beside those of the scenario.
+        objectives: metrics by flat name that the search is about, with what they are called.
+        kind: how components become models.
+        resume: whether runs that are there already count.
+
+    Raises:
+        ScenarioError: something is wrong with the scenario, a requirement or what is varied.
+        RunError: the scenario as it stands cannot be run.
+    """
+    dimensions, signals = read_space(vary)
+    _check(system, requirements, [one.name for one in dimensions])
+    system = system.changed(metrics={**system.judged.metrics, **(metrics or {})}, modified=True)
+    nominal = execute(system, kind=kind)
+    if nominal.error is not None:
+        raise nominal.error
+    _check_objectives(objectives or {}, [value_name(one.name, k) for one in nominal.metrics for k in one.values])
+    system, space = make_space(system, nominal.checked, nominal.results, dimensions, signals)
+    with RunDirectory(Path(output), record=SEARCH_FILE) as place:
+        _begin(place, system, told, resume)
+        # Keys that mean nothing, and values that nothing takes, are told here and not by every run.
+        try:
+            with Workspace() as workspace:
+                check(changed_scenario(place.path / NOMINAL, space, space.changes(space.origin())), workspace, kind)
+        except ScenarioError:  # there was no search
+            world.unlink(place.path / NOMINAL)
+            raise
+        order = [*system.judged.metrics, *system.judged.requirements]
+        dataset = Dataset(place.path, space.keys, order, system.seed)
+        with Runner(place.path / NOMINAL, kind=kind) as runner:
+            evaluations = Evaluations(lambda many: _rows(runner, many), dataset, resumed=resume)
+            try:
+                yield Prepared(place.path, space, evaluations)
+            finally:
+                dataset.flush()
+
+
+def _rows(runner: Runner, many: Sequence[Changes]) -> Iterator[Row]:
+    return (runner.run(changes) for changes in many)
+
+
+def _check(system: System, requirements: Sequence[str], names: Sequence[str]) -> None:
+    problems = []
+    known = list(system.judged.requirements)
+    for name in requirements:
+        if name not in known:
+            near = suggestion(name, known) or (f"there are {', '.join(known)}" if known else "the scenario has none")
+            problems.append(Problem("", f"there is no requirement '{name}'", near))
+    if "preset" in names:
+        remedy = "run one search for each, with --preset"
+        problems.append(Problem("--vary preset", "a preset is where a search begins", remedy))
+    if problems:
+        raise ScenarioError(problems)
+
+
+def _check_objectives(objectives: Mapping[str, str], known: Sequence[str]) -> None:
+    problems = []
+    for name, text in objectives.items():
+        if name not in known:
+            alike = [other for other in known if split_metric(other)[0] == split_metric(name)[0]]
+            remedy = f"name one of {', '.join(alike)}, or write an expression of all"
+            problems.append(Problem(f"--minimize {text}", "it is not a single number", remedy))
+    if problems:
+        raise ScenarioError(problems)
+
+
+def _begin(place: RunDirectory, system: System, told: Mapping[str, Any], resume: bool) -> None:
+    """Write down what is searched; of a search that is gone on with it must be the same."""
+    nominal, record = place.path / NOMINAL, place.path / SEARCH_FILE
+    text = scenario_text(system, ["What is searched, with what is varied as it stands."])
+    if not nominal.exists():
+        if resume:
+            raise ScenarioError(f"{place.given} holds no search to go on with; leave --resume out to begin one")
+        world.write_text(nominal, text, encoding="utf-8")
+        world.write_text(record, json.dumps(told), encoding="utf-8")
+        return
+    if not resume:
+        raise ScenarioError(
+            f"{place.given} holds a search already: go on with it by --resume, or name another directory by -o"
+        )
+    try:
+        before = json.loads(world.read_text(record, encoding="utf-8"))
+        same = all(before[key] == value for key, value in told.items())
+    except (OSError, ValueError, LookupError, TypeError):
+        same = False
+    if not same or world.read_text(nominal, encoding="utf-8") != text:
+        raise ScenarioError(
+            f"{place.given} holds another search: give the scenario and options it was begun with, or name another "
+            "directory by -o; a budget may be larger"
+        )
