@@ -74,6 +74,7 @@ def study(
     output: Annotated[
         Path | None, typer.Option("--output", "-o", help="Directory; results/<scenario>-study by default.")
     ] = None,
+    no_figures: Annotated[bool, typer.Option("--no-figures", help="Draw nothing.")] = False,
     quiet: Quiet = False,
 ) -> None:
     """Run a scenario many times, with other values each time: one table of all runs.
@@ -118,7 +119,8 @@ def study(
             progress=shown.progress,
             begun=shown.begun,
         )
-    show_study(done, quiet)
+    figures = [] if no_figures or done.signal else done.draw()
+    show_study(done, quiet, len(figures))
     if done.signal:
         raise typer.Exit(interrupted(done.signal))
     raise typer.Exit(FMU_FAILED if done.broken else FAILED if done.failed else OK)

@@ -16,7 +16,7 @@ from rich.table import Table
 from rich.text import Text
 
 from ...study.analysis import SHARES, Estimate, Influence, Kept, Sensitivity, Spread, Summary, outputs_of, sensitivity
-from ..lines import counted, tell
+from ..lines import and_figures, counted, tell
 from .console import open_console, say
 from .progress import show_compilations
 from .tables import SIDE_BY_SIDE, fits, table
@@ -184,7 +184,7 @@ def show_runs(title: str, quiet: bool) -> Iterator[ShownRuns]:
             yield ShownRuns(_lines(title), _tell_pool)
 
 
-def show_study(study: Study, quiet: bool) -> None:
+def show_study(study: Study, quiet: bool, figures: int = 0) -> None:
     """The end of a study, verdicts and files last; when quiet, only what went wrong, on stderr."""
     out = open_console(stderr=quiet)
     count, told = study.told["runs"], study.told
@@ -204,7 +204,7 @@ def show_study(study: Study, quiet: bool) -> None:
         say(out, f"to go on: the same command with --resume -o {study.directory}", whole=True)
     if not quiet:
         files = "runs.parquet, study.json" + ", series.parquet" * bool(told["how"].get("record"))
-        say(out, f"Files in {study.directory}: {files}", whole=True)
+        say(out, f"Files in {study.directory}: {files}{and_figures(figures)}", whole=True)
 
 
 def _tell_pool(pool: Pool) -> None:

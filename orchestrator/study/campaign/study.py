@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 from ... import world
 from ...errors import ScenarioError
-from ..analysis import Summary, summarize
+from ..analysis import Summary, draw_study, summarize
 from ..design import Plan
 from .columns import unified
 from .dataset import METADATA, SERIES, parts_of, sorted_tables
@@ -20,6 +20,8 @@ if TYPE_CHECKING:
     import pyarrow as pa
 
 STUDY_FILE = "study.json"
+_MOST_OVER_TIME = 1000
+"""Runs whose signals are drawn over time: of more, the memory of the client would grow with the study."""
 
 
 class Study:
@@ -81,6 +83,21 @@ class Study:
     def summary(self, *, level: float = 0.95) -> Summary:
         """How often requirements hold and how metrics are spread, with intervals of a level of confidence."""
         return summarize(self.frame(), self.plan, level=level)
+
+    def draw(self) -> list[Path]:
+        """Draw the pictures of what came out into the directory, as far as there is anything.
+
+        Returns:
+            The files.
+        """
+        import pyarrow.parquet as pq
+
+        series = None
+        if (self.directory / SERIES).is_dir():
+            few = [("run", "<", _MOST_OVER_TIME)]
+            series = pq.read_table(self.directory / SERIES, filters=few).to_pandas().sort_values("run", kind="stable")
+        title = str(self.told["title"] or self.told["scenario"])
+        return draw_study(self.frame(), self.plan, self.directory, title=title, series=series)
 
     def series(self, run: int) -> pd.DataFrame:
         """What was recorded of a run.

@@ -35,8 +35,9 @@ def scenario(tmp_path, mine, monkeypatch):
     return write
 
 
-def study(scenario, *arguments):
-    return call(["study", scenario, *arguments, "--kind", "plain", "--workers", "0"])
+def study(scenario, *arguments, figures=False):
+    quick = [] if figures else ["--no-figures"]
+    return call(["study", scenario, *arguments, *quick, "--kind", "plain", "--workers", "0"])
 
 
 def test_a_study_and_one_of_its_runs_again(scenario, capsys):
@@ -54,6 +55,13 @@ def test_a_study_and_one_of_its_runs_again(scenario, capsys):
     assert "run 2 of results/lag-study: the same to the bit" in capsys.readouterr().err
     told = json.loads(Path("results/lag-study/run-2/run.json").read_text())
     assert told["instances"]["lag"]["start"]["rate"] == 3
+
+
+def test_a_study_ends_with_its_pictures(scenario, capsys):
+    assert study(scenario(), "--vary", "lag.rate=1:3:3", "--record", "lag.x", figures=True) == 0
+    assert capsys.readouterr().out.splitlines()[-1].endswith("study.json, series.parquet, 3 figures")
+    drawn = {path.name for path in Path("results/lag-study").glob("*.png")}
+    assert drawn == {"margins-of-requirements.png", "what-came-out.png", "over-time.png"}
 
 
 def test_the_exit_code_is_1_where_a_requirement_fails(scenario, capsys):

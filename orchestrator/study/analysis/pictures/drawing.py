@@ -139,6 +139,8 @@ class _Study:
     def draw_maps(self) -> None:
         """Where each requirement holds: over the two parameters there are, else over the strongest two."""
         for kept in self.summary.requirements if len(self.axes) > 1 else ():
+            if not kept.passed + kept.failed:
+                continue
             x, y, *_ = self.strongest(f"margin.{kept.name}")
             with self.pages(f"Where {kept.name} holds{self.others(2)}", 1, 5.0) as (ax,):
                 draw_verdicts(ax, x, y, self.verdicts(kept.name))

@@ -92,6 +92,7 @@ def test_one_parameter_and_none(drawn):
 
 def test_what_failed_altogether_has_no_pictures(drawn):
     assert list(drawn({"a.x": "0:1"}, {"margin.m": lambda x: x}, 3, failed=(0, 1, 2))) == []
+    assert list(drawn({"a.x": "0:1", "a.y": "0:1"}, {"margin.m": lambda x, y: x}, 2, failed=(0, 1))) == []
 
 
 def test_bands_with_the_worst_run(drawn):
