@@ -33,7 +33,10 @@ from .variables import ScalarVariable, scalar_variables
 SOURCE = "all.c"
 """The source file of a native FMU that includes the others. Named after the model it could hide one of them."""
 _ELEMENT = {float: "Real", int: "Integer", bool: "Boolean", str: "String"}
+_POWERS = ("", "2", "3")
+"""Of seconds, in the units of states."""
 _LOG_CATEGORIES = {
+    "logAll": "all of these",
     "logStatusError": "what went wrong; always sent",
     "logStatusWarning": "what is doubtful; always sent",
     "logEvents": "what the instance does; sent while debug logging is on",
@@ -201,9 +204,9 @@ class Rate:
 
     @property
     def unit(self) -> str:
-        """The state's unit per second."""
-        unit = self.state.slot.unit
-        return f"{unit}2" if unit.endswith("/s") else f"{unit}/s"
+        """The state's unit per second: m/s, m/s2, m/s3."""
+        unit, per, power = self.state.slot.unit.rpartition("/s")
+        return f"{unit}{per}{int(power or 1) + 1}" if per and power in _POWERS else f"{self.state.slot.unit}/s"
 
 
 def _rates(variables: tuple[ScalarVariable, ...]) -> tuple[Rate, ...]:

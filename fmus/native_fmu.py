@@ -17,6 +17,15 @@ _PARTS = (
     *("advance.c", "fmi2.c", "values.c", "derivatives.c", "state.c"),
 )
 
+# From 2.29 on glibc has other versions of these functions, which differ in errno alone; older ones lack them.
+_LIBRARY = f"""#define FMI2_OVERRIDE_FUNCTION_PREFIX
+#include "{SOURCE}"
+
+#if defined(__GLIBC__) && defined(__x86_64__)
+__asm__(".symver exp,exp@GLIBC_2.2.5\\n.symver log,log@GLIBC_2.2.5\\n.symver pow,pow@GLIBC_2.2.5");
+#endif
+"""
+
 
 def sources(component: Component, guid: str) -> dict[str, str]:
     """The C files of a component's FMU by name; `SOURCE` includes the others.
@@ -41,10 +50,12 @@ def sources(component: Component, guid: str) -> dict[str, str]:
     includes = "".join(f'#include "{part}"\n' for part in ("equations.c", *_PARTS))
     files[SOURCE] = (
         f"/* {name}: one translation unit. A program that links several FMUs tells their functions apart by the\n"
-        "   prefix; a shared library has none. */\n\n"
-        f"#ifndef FMI2_OVERRIDE_FUNCTION_PREFIX\n#define FMI2_FUNCTION_PREFIX {name}_\n#endif\n"
-        '#include "instance.h"\n'
+        "   prefix, which it may choose itself; a shared library has none. */\n\n"
+        "#if defined(FMI2_FUNCTION_PREFIX)\n#define PREFIX_IS_CHOSEN\n"
+        f"#elif !defined(FMI2_OVERRIDE_FUNCTION_PREFIX)\n#define FMI2_FUNCTION_PREFIX {name}_\n#endif\n"
+        '#include "instance.h"\n\n#ifdef __cplusplus\nextern "C" {\n#endif\n'
         f"{includes}"
+        "#ifdef __cplusplus\n}\n#endif\n"
     )
     return files
 
@@ -73,7 +84,7 @@ def contents(
         for file, text in files.items():
             (Path(folder) / file).write_text(text, encoding="utf-8")
         main = Path(folder) / "library.c"
-        main.write_text(f'#define FMI2_OVERRIDE_FUNCTION_PREFIX\n#include "{SOURCE}"\n', encoding="utf-8")
+        main.write_text(_LIBRARY, encoding="utf-8")
         for platform, places in folders(platforms).items():
             target = Path(folder) / platform / f"{name}{PLATFORMS[platform].suffix}"
             compile_library(main, target, platform, only=len(platforms) == 1, cache=cache)

@@ -99,5 +99,11 @@ def _table(times: list[float], slots: list[Slot], values: Mapping[str, Any]) -> 
     columns = [np.reshape(values[slot.name], (len(times), -1)) for slot in slots]
     lines = [",".join(f'"{name}"' for name in names)]
     for time, *cells in zip(times, *columns, strict=True):
-        lines.append(",".join(repr(float(x)) for x in (time, *(x for array in cells for x in array))))
+        row = [_written(slot, x) for slot, array in zip(slots, cells, strict=True) for x in array]
+        lines.append(",".join([repr(float(time)), *row]))
     return "\n".join(lines) + "\n"
+
+
+def _written(slot: Slot, value: Any) -> str:
+    """A number; of a boolean 0 or 1, for whole numbers are read as such."""
+    return repr(float(value)) if slot.type is float else str(int(value))

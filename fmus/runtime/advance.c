@@ -1,8 +1,6 @@
 /* One communication step: a sampled block keeps its own clock, samples when a sample is due, and holds between.
    components/sampling.py says it in Python, in the same order of operations. */
 
-#include <string.h>
-
 #if IS_SAMPLED
 /* How far, of a sample or of a communication step, whichever is shorter, a communication point may miss a sample: what a
    time that was summed up gathers in roundings. */

@@ -1,8 +1,6 @@
 /* The FMI 2.0 function for directional derivatives: of real outputs and rates, and in initialization mode of what the
    initial equations compute. */
 
-#include <string.h>
-
 /* Where a real unknown stands among the results of the equations: outputs first, then rates; -1 if it is neither. */
 static int unknown_place(fmi2ValueReference reference)
 {

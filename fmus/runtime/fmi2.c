@@ -1,9 +1,5 @@
 /* The FMI 2.0 functions of the life cycle, of stepping and of the status: who may call what, and when. */
 
-#include <float.h>
-#include <stdlib.h>
-#include <string.h>
-
 enum { ANY_PHASE = PHASE_INSTANTIATED | PHASE_INITIALIZATION | PHASE_RUNNING | PHASE_TERMINATED | PHASE_ERROR };
 enum { SETTABLE = PHASE_INSTANTIATED | PHASE_INITIALIZATION | PHASE_RUNNING };
 enum { READABLE = PHASE_INITIALIZATION | PHASE_RUNNING | PHASE_TERMINATED | PHASE_ERROR };
@@ -22,7 +18,7 @@ static const char *phase_name(Phase phase)
 /* NULL unless the call is allowed now. */
 static Instance *enter(fmi2Component c, unsigned phases, const char *call)
 {
-    Instance *s = c;
+    Instance *s = (Instance *)c;
     if (s == NULL) {
         return NULL;
     }
@@ -78,7 +74,7 @@ fmi2Component fmi2Instantiate(fmi2String instanceName, fmi2Type fmuType, fmi2Str
                         MODEL_NAME ": the GUID is not " MODEL_GUID ": model description and binary differ");
         return NULL;
     }
-    Instance *s = calloc(1, sizeof *s);
+    Instance *s = (Instance *)calloc(1, sizeof *s);
     if (s == NULL) {
         refuse_instance(functions, instanceName, MODEL_NAME ": out of memory");
         return NULL;
@@ -96,7 +92,7 @@ fmi2Component fmi2Instantiate(fmi2String instanceName, fmi2Type fmuType, fmi2Str
 
 void fmi2FreeInstance(fmi2Component c)
 {
-    Instance *s = c;
+    Instance *s = (Instance *)c;
     if (s == NULL) {
         return;
     }
@@ -115,14 +111,14 @@ fmi2Status fmi2SetDebugLogging(fmi2Component c, fmi2Boolean loggingOn, size_t nC
     }
     bool events = nCategories == 0;
     for (size_t k = 0; k < nCategories; k++) {
-        bool known = false;
+        int known = -1;
         for (int n = 0; n < N_LOG_CATEGORIES && categories[k] != NULL; n++) {
-            known = known || strcmp(categories[k], log_categories[n]) == 0;
+            known = strcmp(categories[k], log_categories[n]) == 0 ? n : known;
         }
-        if (!known) {
+        if (known < 0) {
             return fail(s, "there is no log category %.100s", categories[k] == NULL ? "NULL" : categories[k]);
         }
-        events = events || strcmp(categories[k], log_categories[LOG_EVENTS]) == 0;
+        events = events || known == LOG_EVENTS || known == LOG_ALL;
     }
     s->debug = loggingOn != fmi2False && events;
     return fmi2OK;

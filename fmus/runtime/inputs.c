@@ -5,8 +5,6 @@
    with the values u0 that were set and t0 the beginning of the step. Derivatives serve one step. After it an input has
    the value that it has reached, to which the outputs belong, and is held there until it is set or given derivatives. */
 
-#include <string.h>
-
 /* Horner's rule; how far a polynomial with these derivatives goes in `elapsed` seconds. */
 static double rise(const double *derivatives, double elapsed)
 {

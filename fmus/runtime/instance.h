@@ -6,12 +6,27 @@
 #ifndef RAILCOSIM_INSTANCE_H
 #define RAILCOSIM_INSTANCE_H
 
+/* All headers of the C library are here, before anything that is declared as C in a program of C++. */
+#include <errno.h>
+#include <float.h>
 #include <math.h>
+#include <stdarg.h>
 #include <stdbool.h>
 #include <stddef.h>
 #include <stdint.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
 
 #include "fmi2Functions.h"
+
+/* FMPy's copy of the headers leaves the prefix out, because it makes shared libraries: one that is chosen is put back. */
+#if defined(PREFIX_IS_CHOSEN)
+#undef fmi2FullName
+#define JOINED(prefix, name) prefix##name
+#define PREFIXED(prefix, name) JOINED(prefix, name)
+#define fmi2FullName(name) PREFIXED(FMI2_FUNCTION_PREFIX, name)
+#endif
 
 typedef enum { TYPE_REAL, TYPE_INTEGER, TYPE_BOOLEAN, TYPE_STRING } Type;
 

@@ -1,8 +1,6 @@
 /* Integration of the states: classical Runge-Kutta in sub-steps, and onto a standstill. components/methods.py says it in
    Python, in the same order of operations. */
 
-#include <string.h>
-
 #if N_STATES > 0
 /* How finely a standstill is located, and what stands for just before it: it has a sign, and no size. */
 enum { HALVINGS = 40 };

@@ -1,11 +1,7 @@
 /* Messages to the importer. Errors and warnings are always sent; debug messages only when logging is on. */
 
-#include <stdarg.h>
-#include <stdio.h>
-#include <string.h>
-
-enum { LOG_ERROR, LOG_WARNING, LOG_EVENTS, N_LOG_CATEGORIES };
-static const char *const log_categories[N_LOG_CATEGORIES] = {"logStatusError", "logStatusWarning", "logEvents"};
+enum { LOG_ALL, LOG_ERROR, LOG_WARNING, LOG_EVENTS, N_LOG_CATEGORIES };
+static const char *const log_categories[N_LOG_CATEGORIES] = {"logAll", "logStatusError", "logStatusWarning", "logEvents"};
 
 /* The importer reads a message as a printf format, and #r12# in it as a reference to a variable: double both signs.
    There is room for twice the longest message. */

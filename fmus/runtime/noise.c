@@ -73,9 +73,9 @@ static double random_number(bool normal, uint64_t seed, uint64_t stream, uint64_
 {
     uint64_t word = random_bits(seed, stream, index);
     if (normal) {
-        return quantile(((double)(word >> 12) + 0.5) * 0x1p-52);
+        return quantile(((double)(word >> 12) + 0.5) * 2.220446049250313e-16);
     }
-    return (double)(word >> 11) * 0x1p-53;
+    return (double)(word >> 11) * 1.1102230246251565e-16;
 }
 
 /* Put the random numbers of the present time among the values. */
@@ -89,7 +89,7 @@ static fmi2Status draw(Instance *s)
         }
         /* A time that is a whole number of holds belongs to the new one whatever the rounding of k * step. */
         double interval = floor(s->time / hold + 1e-6);
-        if (!(fabs(interval) < 0x1p63)) {
+        if (!(fabs(interval) < 9223372036854775808.0)) {
             return fail(s, "%s = %g s is too short: a random number is held that long",
                         model_variables[noise->hold].name, hold);
         }

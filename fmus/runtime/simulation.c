@@ -1,9 +1,6 @@
 /* An instance in time: the initial state, integration, outputs. components/simulate.py says it in Python, and the order of
    every floating-point operation here is the order there: the two agree to the last bit. */
 
-#include <math.h>
-#include <string.h>
-
 /* What a variable of this type can hold: whole numbers of 32 bits, truth values. */
 static bool fits(Type type, double value)
 {

@@ -1,8 +1,5 @@
 /* Saved states and their FMI 2.0 functions: one flat block that can be copied, compared and moved to another process. */
 
-#include <stdlib.h>
-#include <string.h>
-
 enum { STATE_VERSION = 4 };
 
 /* What tells a block from any other; small enough to be copied to the stack and looked at. */
@@ -143,10 +140,10 @@ fmi2Status fmi2GetFMUstate(fmi2Component c, fmi2FMUstate *state)
         return fail(s, "fmi2GetFMUstate: NULL instead of a place for the state");
     }
     /* A state handed in is overwritten, and its memory reused where it fits. */
-    State *block = *state;
+    State *block = (State *)*state;
     if (block == NULL || block->head.size != state_size(s)) {
         free(block);
-        *state = block = malloc(state_size(s));
+        *state = block = (State *)malloc(state_size(s));
         if (block == NULL) {
             return fail(s, "out of memory for a saved state");
         }
@@ -161,7 +158,7 @@ fmi2Status fmi2SetFMUstate(fmi2Component c, fmi2FMUstate state)
     if (s == NULL) {
         return fmi2Error;
     }
-    return state == NULL ? fail(s, "fmi2SetFMUstate: NULL is no state") : restore_state(s, state);
+    return state == NULL ? fail(s, "fmi2SetFMUstate: NULL is no state") : restore_state(s, (const State *)state);
 }
 
 fmi2Status fmi2FreeFMUstate(fmi2Component c, fmi2FMUstate *state)
@@ -222,7 +219,7 @@ fmi2Status fmi2DeSerializeFMUstate(fmi2Component c, const fmi2Byte bytes[], size
     if (!is_ours(&head, size)) {
         return fail(s, "fmi2DeSerializeFMUstate: the bytes are no saved state of this model");
     }
-    State *block = malloc(head.size);
+    State *block = (State *)malloc(head.size);
     if (block == NULL) {
         return fail(s, "out of memory for a saved state");
     }

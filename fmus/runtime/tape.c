@@ -1,11 +1,6 @@
 /* The tape: memory along one trip that the next trip reads at the same sample. components/tape.py says it in Python;
    the file format is the same, so that a file written by either kind of FMU is read by the other. */
 
-#include <errno.h>
-#include <stdio.h>
-#include <stdlib.h>
-#include <string.h>
-
 #if N_TAPE > 0
 
 static bool waiting(const Instance *s, double trip_time)
@@ -312,7 +307,7 @@ static fmi2Status tape_allocate(Instance *s, int rows)
     if (tape->rows != rows || tape->pad != (int)pad) {
         size_t cells = (size_t)rows * N_TAPE;
         tape_free(tape);
-        tape->committed = malloc((2 * cells + (size_t)rows + 2 * (size_t)pad) * sizeof(double));
+        tape->committed = (double *)malloc((2 * cells + (size_t)rows + 2 * (size_t)pad) * sizeof(double));
         if (tape->committed == NULL) {
             return fail(s, "out of memory for a tape of %d samples", rows);
         }

@@ -1,7 +1,5 @@
 /* The FMI 2.0 functions that get and set: the way between value references and values. */
 
-#include <string.h>
-
 /* The variable behind a value reference, or NULL with a message. A rate der(x) has no entry of its own. */
 static const Variable *find(Instance *s, fmi2ValueReference reference, Type type, const char *call)
 {

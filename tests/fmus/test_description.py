@@ -14,6 +14,7 @@ from railcosim.components.component import evaluated
 from railcosim.components.declarations import Input, Memory, Output, Parameter, State, Tape
 from railcosim.components.tracing import start_name
 from railcosim.fmus.build import build
+from railcosim.fmus.description import write
 from railcosim.fmus.references import resolve
 from railcosim.fmus.units import BASE, parse
 from railcosim.fmus.variables import scalar_variables
@@ -270,6 +271,18 @@ def test_point_mass_train_by_hand(model):
     assert base["N"] == {"kg": "1", "m": "1", "s": "-2"}
     assert base["m/s2"] == base["N/kg"] == {"m": "1", "s": "-2"}
     assert base["N.s2/(m2.kg)"] == {"m": "-1"}
+
+
+def test_the_rate_of_a_state_has_the_unit_of_one_more_second(write_component):
+    body = "from railcosim.components import Component, State\n\n\nclass C(Component):\n"
+    units = {"m": "m/s", "m/s": "m/s2", "m/s2": "m/s3", "rad/s": "rad/s2", "N.s/(m.kg)": "N.s/(m.kg)/s"}
+    body += "".join(f"    x{k} = State({unit!r})\n" for k, unit in enumerate(units))
+    body += "\n    def derivatives(self):\n        return {" + ", ".join(f"'x{k}': 0.0" for k in range(5)) + "}\n"
+    root = etree.fromstring(write(resolve(write_component(body))(), "native", "0" * 64))
+    found = {v.get("name"): v.find("Real").get("unit") for v in root.iter("ScalarVariable")}
+    assert [found[f"der(x{k})"] for k in range(5)] == list(units.values())
+    exponents = {u.get("name"): dict(u.find("BaseUnit").attrib) for u in root.iterfind("UnitDefinitions/Unit")}
+    assert exponents["m/s3"] == {"m": "1", "s": "-3"}
 
 
 def test_comfort_cruise_by_hand(model):

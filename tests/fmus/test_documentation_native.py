@@ -235,7 +235,8 @@ def test_integers_trips_and_bounds(sample):
     types = reference_signals(resolve(sample("Types"))())
     header, *rows = types["Types_in.csv"].splitlines()
     assert header == '"time","teeth","doors[1]","doors[2]","offset"'
-    assert [row.split(",")[1] for row in rows] == ["0.0"] * 25 + ["1.0"] * 26
+    assert [row.split(",")[1] for row in rows] == ["0"] * 25 + ["1"] * 26
+    assert {row.split(",")[2] for row in rows} == {"0", "1"}  # as fmusim and FMUChecker read a boolean
     learner = reference_signals(resolve(sample("Learner"))(sample_time=0.1))["Learner_in.csv"].splitlines()
     names = learner[0].replace('"', "").split(",")
     rows = np.array([row.split(",") for row in learner[1:]], float)

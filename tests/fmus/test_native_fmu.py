@@ -254,11 +254,13 @@ def test_nothing_but_the_functions_of_the_standard_is_visible(tmp_path):
     (library,) = (folder / "binaries").glob("*/*.so")
     listed = subprocess.run(["nm", "-D", "--defined-only", library], capture_output=True, text=True, check=True).stdout
     assert all(line.split()[-1].startswith("fmi2") for line in listed.splitlines())
-    own = compile_program([folder / "sources" / "all.c"], tmp_path / "o", "-c", "-I", _prefixing(tmp_path))
+    own = compile_program(
+        [folder / "sources" / "all.c"], tmp_path / "o", "-c", "-I", HEADERS, "-DFMI2_FUNCTION_PREFIX=Own_"
+    )
     listed = subprocess.run(["nm", "--defined-only", "-g", own], capture_output=True, text=True, check=True).stdout
     names = [line.split()[-1] for line in listed.splitlines()]
     assert len(names) > 30
-    assert all(name.startswith("Mixed_fmi2") for name in names)
+    assert all(name.startswith("Own_fmi2") for name in names)
     called = subprocess.run(["nm", "-u", own], capture_output=True, text=True, check=True).stdout
     assert not re.search(r"\b(printf|exit|abort|setlocale)\b", called)
 
@@ -282,6 +284,42 @@ def _prefixing(folder):
             )
         )
     return place
+
+
+@pytest.mark.skipif(shutil.which("g++") is None, reason="needs g++")
+@pytest.mark.parametrize("name", [MIXED, "PidAto", "Gust"], ids=["Mixed", "PidAto", "Gust"])
+def test_the_sources_compile_as_c_plus_plus_with_the_functions_of_c(tmp_path, name):
+    (tmp_path / "sources").mkdir()
+    for file, text in native_fmu.sources(resolve(name)(), "{x}").items():
+        (tmp_path / "sources" / file).write_text(text, encoding="utf-8")
+    flags = (
+        "-x",
+        "c++",
+        "-std=c++11",
+        "-Wall",
+        "-Wextra",
+        "-Werror",
+        "-c",
+        "-I",
+        HEADERS,
+        "-DFMI2_FUNCTION_PREFIX=own_",
+    )
+    command = ["g++", *flags, tmp_path / "sources" / "all.c", "-o", tmp_path / "it.o"]
+    done = subprocess.run(command, capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stderr
+    listed = subprocess.run(["nm", "-g", tmp_path / "it.o"], capture_output=True, text=True, check=True).stdout
+    assert len(re.findall(r" T \w+_fmi2\w+$", listed, re.MULTILINE)) > 30
+
+
+@pytest.mark.skipif(shutil.which("objdump") is None or not sys.platform.startswith("linux"), reason="needs objdump")
+def test_a_library_needs_no_younger_c_library_than_2_17(tmp_path):
+    folder = unzip(build(MIXED, kind="native"), tmp_path)
+    (library,) = (folder / "binaries").glob("*/*.so")
+    listed = subprocess.run(["objdump", "-T", library], capture_output=True, text=True, check=True).stdout
+    needed = [tuple(map(int, version.split("."))) for version in re.findall(r"GLIBC_([\d.]+)", listed)]
+    assert needed
+    assert max(needed) <= (2, 17)
+    assert re.search(r"\bexp$", listed, re.MULTILINE)
 
 
 def test_two_source_fmus_run_side_by_side_in_one_program(tmp_path, sample):

@@ -30,18 +30,20 @@ def test_events_are_told_only_while_logging_is_on(load):
         (1, (b"logStatusError", b"logEvents"), True),
         (1, (b"logEvents", b"logStatusError"), True),
         (0, (b"logEvents",), False),
+        (1, (b"logAll",), True),
+        (0, (b"logAll",), False),
     ):
         assert categories(on, *names) == OK
         loud.messages.clear()
         loud.Reset()
         loud.initialize()
         assert bool(loud.messages) == told
-    assert categories(1, b"logAll") == ERROR
-    assert "logAll" in loud.said
+    assert categories(1, b"logEverything") == ERROR
+    assert "logEverything" in loud.said
     assert loud.SetDebugLogging(1, c_size_t(1), NULL) == ERROR
     assert categories(1, NULL) == ERROR
     declared = {c.get("name") for c in model_xml(loud).iter("Category")}
-    assert declared == {"logStatusError", "logStatusWarning", "logEvents"}
+    assert declared == {"logAll", "logStatusError", "logStatusWarning", "logEvents"}
 
 
 def model_xml(fmu):
