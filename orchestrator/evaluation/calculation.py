@@ -196,11 +196,6 @@ class Scope:
     frame: Frame
 
     @property
-    def text(self) -> str:
-        """The expression."""
-        return self.binding.text
-
-    @property
     def signals(self) -> Signals:
         """The run, or the part of it."""
         return self.frame.run if self.frame is self.frame.run.whole else self.frame.signals

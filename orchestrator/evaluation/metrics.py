@@ -128,15 +128,7 @@ def unit_of(expression: Expression, signals: Signals, index: int | None = None) 
 
     A signal has its own; sums and reducers keep a unit all their parts share (bare numbers go with any).
     """
-    if not isinstance(signals, Prepared):
-        return _unit_of(expression, signals, Plan(names_of(signals)), index)
-    kept, key = signals.plan.bindings, ("unit", expression.text, index)
-    if key not in kept or kept[key][0] is not signals.units:
-        kept[key] = signals.units, _unit_of(expression, signals, signals.plan, index)
-    return str(kept[key][1])
-
-
-def _unit_of(expression: Expression, signals: Signals, plan: Plan, index: int | None) -> str:
+    plan = signals.plan if isinstance(signals, Prepared) else Plan(names_of(signals))
     binding = expression.bound(plan, index)
 
     def visit(node: Node) -> str | None:  # None: a bare number
@@ -261,9 +253,17 @@ def measure(name: str, text: str, expression: Expression, run: Prepared) -> Metr
             known.append(index)
     except ExpressionError as error:
         problem, truth = str(error), False
-    unit = unit_of(expression, run, known[-1]) if known else ""
+    unit = _unit(expression, run, known[-1]) if known else ""
     comfort = isinstance(expression.tree, Call) and expression.tree.name == "comfort"
     return Metric(name, text, values or {None: np.nan}, unit, comfort, problem, truth)
+
+
+def _unit(expression: Expression, run: Prepared, index: int | None) -> str:
+    """As `unit_of` has it, found once for runs with the same units."""
+    kept, key = run.plan.bindings, ("unit", expression.text, index)
+    if key not in kept or kept[key][0] is not run.units:
+        kept[key] = run.units, unit_of(expression, run, index)
+    return str(kept[key][1])
 
 
 def compare_metrics(metrics: Sequence[Metric], others: Sequence[Metric]) -> list[MetricChange]:

@@ -5,7 +5,8 @@ import math
 import numpy as np
 import pytest
 from railcosim.orchestrator.errors import ExpressionError
-from railcosim.orchestrator.evaluation import FUNCTIONS, Judge, parse
+from railcosim.orchestrator.evaluation import FUNCTIONS, Expression, Judge, parse, unit_of
+from railcosim.orchestrator.evaluation.terms import Plan, Prepared
 from railcosim.orchestrator.run.recording import Results
 
 pytestmark = pytest.mark.usefixtures("parts")
@@ -102,3 +103,14 @@ def test_a_run_without_a_point_has_no_values():
     for metric in Judge(METRICS, {}, NAMES).metrics(empty):
         assert "no recorded point lies in the window" in metric.problem
         assert all(map(math.isnan, metric.values.values()))
+
+
+def test_units_are_those_of_the_run_and_of_the_expression_itself():
+    judge = Judge({"top": "max(s.x)"}, {}, NAMES)
+    first, second = run([1.0, 2.0]), run([1.0, 2.0])
+    second.units = {"s.x": "km"}
+    assert [judge.metrics(signals)[0].unit for signals in (first, second, first)] == ["m", "km", "m"]
+    prepared = Prepared(Plan(NAMES), second)
+    whole = parse("s.x - s.limit")
+    assert unit_of(Expression(whole.text, whole.references[0]), prepared) == "km"
+    assert unit_of(Expression(whole.text, whole.references[1]), prepared) == ""  # of another part of the same text
