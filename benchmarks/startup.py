@@ -30,10 +30,16 @@ COMMANDS = {
 """Bound, as a multiple of importing NumPy, and arguments."""
 
 
+ENVIRONMENT = {name: value for name, value in os.environ.items() if name != "PYTHONDONTWRITEBYTECODE"}
+"""With modules compiled, as those of an installed package are."""
+
+
 def cost(arguments: tuple[str, ...], folder: str) -> tuple[float, float]:
     """CPU and wall time in s of one process of Python and all that it waits for."""
     begin = time.perf_counter()
-    process = subprocess.Popen((sys.executable, *arguments), cwd=folder, env=os.environ, stdout=subprocess.DEVNULL)
+    process = subprocess.Popen(
+        (sys.executable, *arguments), cwd=folder, env=ENVIRONMENT, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL
+    )
     _, status, usage = os.wait4(process.pid, 0)
     wall = time.perf_counter() - begin
     process.returncode = os.waitstatus_to_exitcode(status)

@@ -71,10 +71,11 @@ def compare(
     """
     from ..comparison import compare as compare_systems
     from ..comparison import read_directions, variants
-    from ..report import REPORT_FILE, check_drawable, write_report
     from .printing import show_comparison, show_page, show_progress
 
     if report:
+        from ..report import check_drawable
+
         check_drawable()
     systems = variants(
         scenarios,
@@ -101,6 +102,8 @@ def compare(
     show_comparison(comparison, quiet)
     ran = [variant.run.directory for variant in comparison.variants if variant.run and variant.run.directory]
     if report and ran:
+        from ..report import REPORT_FILE, write_report
+
         page = write_report(ran, directory / REPORT_FILE, comparison.names if len(ran) == len(comparison.names) else ())
         show_page(page, quiet)
     if comparison.interrupted:

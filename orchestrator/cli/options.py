@@ -52,10 +52,8 @@ Swap = Annotated[
 ]
 Stop = Annotated[float | None, typer.Option(help="Stop time in s.")]
 Step = Annotated[float | None, typer.Option(help="Communication step in s; sample times equal to it follow.")]
-ALGORITHM_NAMES = ("adaptive", "gauss-seidel", "iterative", "jacobi")
-"""Those of `master.ALGORITHMS`, as the command line needs them."""
 Algorithm = Annotated[
-    str | None, typer.Option(metavar=f"<{'|'.join(ALGORITHM_NAMES)}>", help="How the instances exchange values.")
+    str | None, typer.Option(metavar="NAME", help="How the instances exchange values (see 'orchestrate list').")
 ]
 Kind = Annotated[
     KindName,

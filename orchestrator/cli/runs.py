@@ -97,12 +97,13 @@ def run(
     once, also where an FMU does not return.
     """
     from ..isolation import isolate
-    from ..report import check_drawable, write_report
     from ..run import add_step_check, check_step, execute, go_on, read_checkpoint
     from ..scenario import load
     from .printing import show_page, show_progress, show_run
 
     if report:
+        from ..report import check_drawable
+
         check_drawable()
     how: Any = {"figures": not no_figures, "threads": threads, "checkpoint_every": checkpoint_every}
     if resume_from is not None:
@@ -139,6 +140,8 @@ def run(
             add_step_check(outcome.directory, verdict)
     show_run(outcome, second, verdict, quiet)
     if report and outcome.directory is not None:
+        from ..report import write_report
+
         show_page(write_report([outcome.directory]), quiet)
     for ended in (outcome, second):
         if ended is not None and ended.status == "failed" and ended.error is not None:

@@ -10,6 +10,8 @@ _VALUE = 8
 """Bytes of a number in ``results.bin``, or in memory where no directory is given."""
 _TEXT = 14
 """Bytes of a number in ``results.csv``, as the shipped scenarios have them on average."""
+_SMALL = 1e7
+"""Bytes of results that are worth no word on any machine, nor the question how much memory it has."""
 _LARGE = 1e9
 """Bytes of results that are worth a word on any machine."""
 _SHARE = 0.25
@@ -49,9 +51,12 @@ def size_of(system: System, signals: int) -> Size:
 
 def tell_size(system: System, signals: int) -> str:
     """One sentence where results will be large for any machine, or for this one; nothing otherwise."""
+    size = size_of(system, signals)
+    if size.memory <= _SMALL:
+        return ""
     import psutil
 
-    size, free = size_of(system, signals), float(psutil.virtual_memory().available)
+    free = float(psutil.virtual_memory().available)
     if size.memory <= min(_LARGE, _SHARE * free):
         return ""
     stepping = system.stepping

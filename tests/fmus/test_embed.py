@@ -1,13 +1,17 @@
 """The copy of the equations inside an FMU: what it holds, whom it imports, and that copies never meet."""
 
+import ast
 import sys
+from pathlib import Path
 
 import pytest
 from railcosim.components import ComfortCruise, Component, ComponentError, Output
+from railcosim.fmus import embed
 from railcosim.fmus.build import build
 from railcosim.fmus.embed import embedded_files
 from railcosim.fmus.references import resolve
 
+COMPONENTS = Path(__file__).parents[2] / "components"
 HEAD = "from railcosim.components import Component, Output\n"
 GIVES = "\n\nclass C(Component):\n    y = Output('1')\n\n    def outputs(self):\n        return {{'y': {}}}\n"
 
@@ -238,3 +242,16 @@ def test_a_class_typed_at_a_prompt_is_refused():
     exec(HEAD + GIVES.format("1.0"), space)
     with pytest.raises(ComponentError, match="C must stand at the top level of a file, so that its FMU can carry"):
         embedded_files(space["C"])
+
+
+def test_files_of_the_project_are_found_as_python_finds_them():
+    """What is read by a pattern, beside the parsed statements."""
+    for path in sorted(COMPONENTS.rglob("*.py")):
+        name = f"components/{path.relative_to(COMPONENTS).as_posix()}"
+        nodes = [n for n in ast.walk(ast.parse(path.read_text())) if isinstance(n, ast.ImportFrom) and n.level]
+        wanted = set()
+        for node in nodes:
+            base = Path(name).parents[node.level - 1]
+            names = [node.module] if node.module else [alias.name for alias in node.names]
+            wanted |= {f"{(base / each.replace('.', '/')).as_posix()}.py" for each in names}
+        assert set(embed._own_file(name)[1]) == wanted, name

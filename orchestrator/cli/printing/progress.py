@@ -8,8 +8,6 @@ import threading
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 
-from rich.progress import BarColumn, Progress, SpinnerColumn, TextColumn, TimeElapsedColumn, TimeRemainingColumn
-
 from ....fmus import toolchain
 from ...run import CSV_FILE, Telling
 from ...run import Progress as OnProgress
@@ -51,6 +49,8 @@ def show_progress(title: str, quiet: bool, start: float = 0.0, reached: float | 
     if quiet:
         yield None
     elif sys.stderr.isatty():
+        from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn, TimeRemainingColumn
+
         columns = (TextColumn("{task.description}"), BarColumn(), TextColumn("{task.fields[reached]}"))
         out = open_console(stderr=True)
         with Progress(*columns, TimeElapsedColumn(), TimeRemainingColumn(), console=out, transient=True) as bar:
@@ -81,6 +81,8 @@ def show_compilations(quiet: bool, *, doing: str = "") -> Iterator[None]:
     if quiet:
         yield
     elif sys.stderr.isatty():
+        from rich.progress import Progress, SpinnerColumn, TextColumn, TimeElapsedColumn
+
         columns = (SpinnerColumn(), TextColumn("{task.description}", markup=False), TimeElapsedColumn())
         with Progress(*columns, console=open_console(stderr=True), transient=True) as bar:
             task = bar.add_task("", start=False, visible=False)
@@ -133,6 +135,8 @@ def show_cases(count: int, quiet: bool) -> Iterator[Callable[[str], None]]:
     if quiet:
         yield lambda _: None
     elif sys.stderr.isatty():
+        from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
+
         columns = (BarColumn(), TextColumn("{task.completed} of {task.total}"), TextColumn("{task.description}"))
         with Progress(*columns, TimeElapsedColumn(), console=open_console(stderr=True), transient=True) as bar:
             task = bar.add_task("", total=count, completed=-1)

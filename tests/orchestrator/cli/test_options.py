@@ -4,9 +4,8 @@ import json
 
 import pytest
 from railcosim.orchestrator.cli.app import call
-from railcosim.orchestrator.cli.options import ALGORITHM_NAMES, PROBE_SECONDS, FormatName
+from railcosim.orchestrator.cli.options import PROBE_SECONDS, FormatName
 from railcosim.orchestrator.figures import FORMATS
-from railcosim.orchestrator.master import ALGORITHMS
 from railcosim.orchestrator.validation import TIMEOUT
 
 SCENARIO = """
@@ -37,7 +36,6 @@ def test_the_formats_of_the_command_line_are_those_of_the_figures():
 
 
 def test_what_the_command_line_says_without_loading_it_is_what_there_is():
-    assert sorted(ALGORITHM_NAMES) == sorted(ALGORITHMS)
     assert PROBE_SECONDS == TIMEOUT
 
 

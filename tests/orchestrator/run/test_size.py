@@ -3,6 +3,7 @@
 import logging
 from types import SimpleNamespace
 
+import psutil
 import pytest
 from railcosim.orchestrator import System, run
 from railcosim.orchestrator.cli.app import app
@@ -22,7 +23,7 @@ def free(monkeypatch):
     """Set how much memory is free, in bytes."""
 
     def say(count):
-        monkeypatch.setattr(module.psutil, "virtual_memory", lambda: SimpleNamespace(available=count))
+        monkeypatch.setattr(psutil, "virtual_memory", lambda: SimpleNamespace(available=count))
 
     say(1e12)
     return say
@@ -54,8 +55,9 @@ def test_what_is_large_here(free):
     assert "160 MB in results.bin, or in memory without -o (600 MB are free)" in tell_size(made, 1)
 
 
-def test_it_is_told_before_the_run(free, tmp_path, caplog):
+def test_it_is_told_before_the_run(free, tmp_path, caplog, monkeypatch):
     free(100.0)
+    monkeypatch.setattr(module, "_SMALL", 0.0)
     made = system(stop_time=1.0)
     with caplog.at_level(logging.WARNING):
         outcome = run(made, kind="plain", output=tmp_path)
