@@ -25,7 +25,7 @@ from .events import draft_events, expand_events, read_events
 from .groups import Draft, Entry, expand_group
 from .patterns import connect
 from .reader import Reader
-from .shipped import MODELS, shipped, title_of
+from .shipped import is_shipped, shipped, shipped_file
 from .simulation import TOLERANCES, read_simulation, spread_tolerances
 from .toml_source import Source, parse_value
 from .varied import read_study
@@ -41,8 +41,9 @@ def find(name_or_path: str | os.PathLike[str]) -> Path:
         ScenarioError: there is none; the message suggests the nearest name.
     """
     text = os.fspath(name_or_path)
-    if os.path.basename(text) == text and title_of(MODELS / f"{text}.toml") is not None:
-        return MODELS / f"{text}.toml"
+    ours = shipped_file(text) if os.path.basename(text) == text else None
+    if ours is not None:
+        return ours
     if os.path.isfile(text) and text.endswith(".toml"):
         return Path(text)
     if is_fmu_name(text):
@@ -101,7 +102,7 @@ def load(
         ScenarioError: with every problem of the file and of the changes, each with its place.
     """
     path = find(scenario)
-    source = Source.read(path, path.name if path.parent == MODELS else str(path))
+    source = Source.read(path, path.name if is_shipped(path) else str(path))
     return _system(source, path, _Changes(preset, settings, builds, swaps, stop_time, step, algorithm))
 
 

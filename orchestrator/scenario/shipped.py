@@ -28,7 +28,8 @@ class Listed:
 def listed() -> list[Listed]:
     """Every scenario that comes with the package, by name."""
     read = {path.stem: _read(path) for path in sorted(world.glob(MODELS, "*.toml"))}
-    return [Listed(name, _title(data), _presets(data)) for name, data in read.items() if data is not None]
+    found = [(name, data) for name, data in read.items() if data is not None]
+    return [Listed(name, str(data.get("title", "")), _presets(data)) for name, data in found]
 
 
 def shipped() -> list[tuple[str, str]]:
@@ -36,10 +37,15 @@ def shipped() -> list[tuple[str, str]]:
     return [(each.name, each.title) for each in listed()]
 
 
-def title_of(path: Path) -> str | None:
-    """Title of the scenario in a file; None for what is no scenario, and for what cannot be read."""
-    data = _read(path)
-    return None if data is None else _title(data)
+def shipped_file(name: str) -> Path | None:
+    """The file of a shipped scenario; None where there is no such scenario."""
+    path = MODELS / f"{name}.toml"
+    return None if _read(path) is None else path
+
+
+def is_shipped(path: Path) -> bool:
+    """Whether a file is one of those."""
+    return path.parent == MODELS
 
 
 def _read(path: Path) -> dict[str, Any] | None:
@@ -48,10 +54,6 @@ def _read(path: Path) -> dict[str, Any] | None:
     except (OSError, ValueError):  # listing the others is more useful than failing on one
         return None
     return data if "instances" in data else None
-
-
-def _title(data: dict[str, Any]) -> str:
-    return str(data.get("title", ""))
 
 
 def _presets(data: dict[str, Any]) -> dict[str, str]:

@@ -3,13 +3,13 @@
 import re
 import shlex
 from collections.abc import Iterator
+from importlib import import_module
 from pathlib import Path
 
 import pytest
 from railcosim.orchestrator import ScenarioError, load
 from railcosim.orchestrator.cli.app import call
 from railcosim.orchestrator.comparison.reproduce import published_cases
-from railcosim.orchestrator.scenario import loading as scenario
 
 SCENARIO = """
 title = "A train on its own"
@@ -57,7 +57,7 @@ def a_pipe_of_the_usual_width() -> Iterator[None]:
 @pytest.fixture
 def shelf(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     """A folder in the place of the shipped scenarios, with one that reproduces."""
-    monkeypatch.setattr(scenario, "MODELS", tmp_path)
+    monkeypatch.setattr(import_module("railcosim.orchestrator.scenario.shipped"), "MODELS", tmp_path)
     (tmp_path / "one.toml").write_text(SCENARIO.format(fast=20.0, own=10.0))
     return tmp_path
 
