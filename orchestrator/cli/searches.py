@@ -27,7 +27,6 @@ from .options import (
     With,
     load_system,
 )
-from .printing import show_falsified, show_optimized, show_search
 
 
 class MethodName(StrEnum):
@@ -85,6 +84,7 @@ def falsify(
     Exit codes: 0 not broken within the budget; 1 broken; 2 the input is wrong; 3 not broken, but runs failed.
     """
     from ..study.search import falsify as search
+    from .printing import show_falsified, show_search
 
     system = load_system(scenario, preset, settings, builds, swaps, stop=stop, step=step)
     name = requirement or _only_requirement(system)
@@ -144,6 +144,7 @@ def optimize(
     Exit codes: 0 found; 1 no run keeps the requirements; 2 the input is wrong; 3 none keeps them, and runs failed.
     """
     from ..study.search import optimize as search
+    from .printing import show_optimized, show_search
 
     if not objectives:
         raise ScenarioError(Problem("", "nothing is to be least", "name a metric, as in --minimize settling"))
