@@ -14,7 +14,7 @@ from ..errors import ExpressionError
 from ..problems import Problem, suggestion
 from .functions import ARITHMETIC, LOGIC, WINDOWS, Function, Value, call_problem, logical, where
 from .signals import Part, Signals
-from .syntax import Call, Group, Name, Node, Number, Operation, Reference, Span, walk
+from .syntax import Call, Group, Name, Node, Number, Operation, Reference, Span, Temporal, walk
 from .terms import Argument, Frame, Plan, Prepared, Reduction, Term
 from .vocabulary import Names, unknown_signal
 
@@ -97,6 +97,10 @@ class Binding:
                 )
             case Operation(operator=operator, operands=operands):
                 return _operation(self.plan, operator, [self.term(operand) for operand in operands])
+            case Temporal(word=word):
+                message = f"'{word}' stands where a number is wanted"
+                remedy = "it makes conditions of requirements, joined by and, or, not and implies"
+                raise self.error(Problem("", message, remedy))
         raise self.error("a list is only understood as an argument")
 
     def _fixed(self, value: Any) -> Term:

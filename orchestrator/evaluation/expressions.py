@@ -14,9 +14,10 @@ from ..errors import ExpressionError, WindowError
 from ..names import SignalName
 from ..problems import Problem, suggestion
 from .calculation import Binding, Scope, evaluate, names_of, reach
+from .formulas import read
 from .functions import CONSTANTS, ELEMENTWISE, Function, Value, call_problem
 from .signals import Rehearsal, Signals
-from .syntax import Call, Group, Name, Node, Number, Operation, Reference, read, walk
+from .syntax import Call, Name, Node, Reference, walk
 from .terms import Plan, Prepared
 from .vocabulary import Names, numbers_of, unknown_signal
 
@@ -112,10 +113,16 @@ class Expression:
         binding = self.bound(Plan.of(names), index)
         return [binding.found(reference) for reference in self.references]
 
-    def check(self, names: Collection[str], constants: Collection[str] = ()) -> list[Problem]:
+    def check(
+        self,
+        names: Collection[str],
+        constants: Collection[str] = (),
+        rule: Callable[[Node, Scope], Any] = evaluate,
+    ) -> list[Problem]:
         """Every problem that can be found before a run, each with the column and the nearest valid name.
 
-        `constants` are further bare names the expression may use, such as the variable of a function plot.
+        `constants` are further bare names the expression may use, such as the variable of a function plot; `rule` is
+        how it will be evaluated.
         """
         names = Names.of(names)
         known = {*CONSTANTS, *constants, "time", "count", *(["i"] if self.references else [])}
@@ -123,7 +130,7 @@ class Expression:
             problems = [
                 problem.at(f"'{self.text}', column {node.column}")
                 for node in walk(self.tree)
-                if not isinstance(node, Number | Group | Operation) and (problem := self._problem(node, names, known))
+                if isinstance(node, Name | Reference | Call) and (problem := self._problem(node, names, known))
             ]
         except ExpressionError as error:  # an index beyond all numbers
             return error.problems
@@ -133,7 +140,7 @@ class Expression:
         if not instances:
             return [Problem(f"'{self.text}'", "there is no i for which all of its signals exist", "mend the indices")]
         try:
-            self.evaluate(Plan.of(names).rehearsal, instances[0], **dict.fromkeys(constants, 1.0))
+            self.apply(rule, Plan.of(names).rehearsal, instances[0], **dict.fromkeys(constants, 1.0))
         except WindowError:
             pass  # the rehearsal is shorter than the run
         except ExpressionError as error:

@@ -1,18 +1,17 @@
 """Requirements: `always|eventually|finally CONDITION [from T] [until T] [outside [a, b]]...`, judged after a run.
 
-A verdict is pass, fail or inconclusive, with a signed margin: the smallest slack over time and index, negative where
-the condition is violated. Only recorded points are seen. What NaN touches fails, and an unfinished run never passes.
+The condition may be a formula of signal temporal logic, and a formula may stand alone. A verdict is pass, fail or
+inconclusive, with a signed margin: the smallest slack over time and index, negative where the condition is violated,
+and what decided it. Only the points that are seen count. What NaN touches fails, and an unfinished run never passes.
 Numbers that differ by rounding are equal: their margin is 0. The grammar and its meaning stand in `docs/metrics.md`.
 """
 
 import re
-from collections.abc import Callable, Collection, Iterator
+from collections.abc import Collection, Iterator, Mapping
 from dataclasses import dataclass
-from functools import partial
 from typing import Literal, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ..errors import ExpressionError, WindowError
 from ..names import SignalName
@@ -20,14 +19,26 @@ from ..problems import Problem, suggestion
 from ..times import digits, slack
 from .calculation import Scope, names_of, reach
 from .expressions import Expression, evaluate_constant, parse
+from .formulas import says_when, tokens_of
 from .functions import CONSTANTS
 from .metrics import EVERY_STEP, FUNCTIONS
-from .reducers import Span, ends_of, scalar, window_of
-from .signals import Rehearsal, Signals, parts_of
-from .slack import COMPARISONS, slack_of
-from .syntax import Call, Name, Node, Number, Operation, Reference, walk
+from .reducers import Span, ends_of, scalar
+from .signals import Rehearsal, Signals
+from .slack import COMPARISONS
+from .syntax import Call, Name, Node, Number, Operation, Reference, Temporal, walk
+from .temporal import (
+    Culprit,
+    Decision,
+    Formula,
+    Points,
+    Rehearsed,
+    Word,
+    decoded,
+    horizon,
+    scales_of,
+)
 
-QUANTIFIERS = ("always", "eventually", "finally")
+QUANTIFIERS: tuple[Word, ...] = ("always", "eventually", "finally")
 CLAUSES = ("from", "until", "outside")
 _MISSING = "write always, eventually or finally, then a condition: always abs(train[i].acceleration) <= 1.0"
 
@@ -38,7 +49,9 @@ class Verdict:
 
     `margin` is the worst slack, in the unit of the compared quantities; None when there is none (nothing was judged,
     or a boolean decided). `time` [s] and `index` are where the worst was seen, `points` how many recorded points were
-    judged, `reason` why it is inconclusive or what was NaN.
+    judged, `reason` why it is inconclusive or what was NaN. `robustness` is the margin where every comparison is
+    divided by a size that counts in its unit, so that those of unlike signals compare; `blame` has the signals of the
+    comparison that decided.
     """
 
     name: str
@@ -49,16 +62,8 @@ class Verdict:
     index: int | None = None
     points: int = 0
     reason: str = ""
-
-
-@dataclass(frozen=True)
-class _Worst:
-    """The deciding point for one index."""
-
-    holds: bool
-    slack: float
-    time: float
-    index: int | None
+    robustness: float | None = None
+    blame: tuple[str, ...] = ()
 
 
 class _Times(NamedTuple):
@@ -75,7 +80,7 @@ class Requirement:
 
     name: str
     text: str
-    quantifier: str
+    quantifier: Word
     condition: Expression
     start: Expression | None = None
     end: Expression | None = None
@@ -120,7 +125,8 @@ class Requirement:
         return problems
 
     def _problems(self, names: Collection[str], parameters: Collection[str] | None) -> list[Problem]:
-        problems = self.condition.check(names)
+        problems = self.condition.check(names, rule=_rehearse)
+        problems += self._bound_problems(names, parameters)
         for moment in self.moments:
             found = moment.check(names)
             if moment.uses_index:
@@ -148,34 +154,62 @@ class Requirement:
             times = self.times(signals)
         except ExpressionError as error:
             return Verdict(self.name, self.text, "inconclusive", reason=str(error))
-        first, last = ends_of(signals)
-        span = Span(times.start, times.end, times.outside, forgiven=slack(signals.step, first, last))
         indices = self.condition.instances(names_of(signals))
         if not indices:
             return Verdict(self.name, self.text, "inconclusive", reason="no signal has such an index")
         try:
-            seen = [self.condition.apply(partial(self._look, span, index), signals, index) for index in indices]
+            seen = [(index, self._decision(signals, times, index)) for index in indices]
+            if not seen[0][1].points:
+                return Verdict(self.name, self.text, "inconclusive", reason="no recorded point lies in its window")
+            index, worst = min(seen, key=lambda found: found[1].badness)
+            verdict, reason = self._verdict(worst, signals, times.end)
+            robustness = self._scaled(signals, times, dict(seen))
         except WindowError as error:
             return Verdict(self.name, self.text, "inconclusive", reason=str(error))
-        judged = seen[0].points
-        if not judged:
-            return Verdict(self.name, self.text, "inconclusive", reason="no recorded point lies in its window")
-        worst = min((look.decisive() for look in seen), key=_badness)
-        verdict, reason = self._verdict(worst, signals, times.end, last)
-        margin = None if np.isinf(worst.slack) else worst.slack
-        judged = 1 if self.quantifier == "finally" else judged
-        return Verdict(self.name, self.text, verdict, margin, worst.time, worst.index, judged, reason)
+        extreme, culprit = worst.decisive, worst.culprit()
+        names, row = self._blamed(culprit, worst.formula.scope, index)
+        if index is None:
+            index = self._row_number(worst.formula.scope, extreme.row, extreme.rows) or row
+        time = worst.formula.points.time(culprit.place)
+        return Verdict(
+            self.name, self.text, verdict, _finite(extreme.value), time, index, worst.points, reason, robustness, names
+        )
+
+    def _decision(self, signals: Signals, times: _Times, index: int | None, *, scaled: bool = False) -> Decision:
+        """What decides for one index; with `scaled`, every comparison is divided by the size of its unit."""
+
+        def decide(node: Node, scope: Scope) -> Decision:
+            points = Points(signals, reach(node))
+            span = Span(times.start, times.end, times.outside, forgiven=points.forgiven)
+            formula = Formula(scope, points, scales_of(self.condition, scope, index) if scaled else None)
+            return Decision(formula, node, self.quantifier, span)
+
+        return self.condition.apply(decide, signals, index)
+
+    def _scaled(self, signals: Signals, times: _Times, seen: Mapping[int | None, Decision]) -> float | None:
+        """The worst value where every comparison is divided by the size of its unit."""
+        found = []
+        for index, decision in seen.items():
+            scales = scales_of(self.condition, decision.formula.scope, index)
+            value = decision.decisive.value
+            if len(set(scales.values())) > 1:
+                value = self._decision(signals, times, index, scaled=True).decisive.value
+            else:
+                value = value / next(iter(scales.values()), 1.0)
+            found.append((not decision.is_missing, value))
+        return _finite(min(found, key=lambda pair: (pair[0], 0.0 if not pair[0] else pair[1]))[1])
 
     def _verdict(
-        self, worst: _Worst, signals: Signals, end: float | None, last: float
+        self, worst: Decision, signals: Signals, end: float | None
     ) -> tuple[Literal["pass", "fail", "inconclusive"], str]:
-        """The verdict of a run that ends at the time `last`, and the reason for it, where it needs one."""
+        """The verdict, and the reason for it, where it needs one."""
+        first, last = ends_of(signals)
         reached = signals.completed if end is None else end <= last + slack(signals.step, last)
         # A number over the whole run (final, settling_time, ...) is not final before the run is.
         reducers = (isinstance(x, Call) and self.condition.functions[x.name].reduces for x in walk(self.condition.tree))
         provisional = not signals.completed and any(reducers)
-        if not worst.holds and not provisional and (reached or self.quantifier == "always"):
-            return "fail", "a value is not a number (NaN)" if np.isnan(worst.slack) else ""
+        if worst.fails and not provisional and (reached or self.quantifier in ("always", "")):
+            return "fail", "a value is not a number (NaN)" if worst.is_missing else ""
         if not signals.completed:
             return (
                 "inconclusive",
@@ -183,17 +217,34 @@ class Requirement:
             )
         if end is not None and not reached:
             return "inconclusive", f"its window lasts until {digits(end)} s, the run only until {digits(last)} s"
+        if not worst.holds:
+            return "inconclusive", self._unknown(worst.formula, first, last)
         return "pass", ""
 
-    def _look(self, span: Span, index: int | None, node: Node, scope: Scope) -> "_Look":
-        """At the condition for one index over the whole run, part by part."""
-        look = _Look(
-            self.quantifier, lambda row, rows: index if index is not None else self._row_number(scope, row, rows)
-        )
-        for part in parts_of(scope.signals, reach(node)):
-            met, slack = (window_of(part, x, span) for x in np.broadcast_arrays(*slack_of(node, scope.of(part))))
-            look.see(slack.times, met.kept != 0.0, slack.kept)
-        return look
+    def _unknown(self, formula: Formula, first: float, last: float) -> str:
+        """Why a completed run does not tell."""
+        if formula.gaps:
+            words = " and ".join(sorted(formula.gaps))
+            return f"no point lies in some window of {words}; widen it, or take shorter steps"
+        ahead = horizon(self.condition.tree, formula.interval)
+        told = f"it looks {digits(ahead)} s ahead, and the run ends at {digits(last)} s"
+        if self.quantifier == "" or last - ahead < first:
+            return f"{told}; let the run last until {digits(first + ahead)} s"
+        return f"{told}; write until {digits(last - ahead, last)} behind it, or let the run go on"
+
+    def _blamed(self, culprit: Culprit, scope: Scope, index: int | None) -> tuple[tuple[str, ...], int | None]:
+        """The signals of the comparison that decides, or its parameters if it has none; and the index of its row."""
+        names: list[str] = []
+        row: int | None = None
+        for reference in (part for part in walk(culprit.node) if isinstance(part, Reference)) if culprit.node else ():
+            (resolved,) = Expression(reference.text, reference).resolve(scope.names, index)
+            if reference.stacked and culprit.row < len(resolved) and culprit.rows == len(resolved):
+                resolved = [resolved[culprit.row]]
+                row = next(iter(SignalName.parse(resolved[0]).indices), None) if row is None else row
+            names += resolved
+        recorded = scope.signals.names()
+        signals = [name for name in names if name in recorded]
+        return tuple(dict.fromkeys(signals or names)), row
 
     def _row_number(self, scope: Scope, row: int, rows: int) -> int | None:
         """The index a row of a slice stands for: 3 for the second row of `train[2:].speed`."""
@@ -203,54 +254,27 @@ class Requirement:
                 return next(iter(SignalName.parse(names[row]).indices), None)
         return None
 
-
-class _Look:
-    """What decides a requirement, of what was seen so far.
-
-    Args:
-        quantifier: of the requirement. number: the index that a row stands for, of so many rows.
-    """
-
-    def __init__(self, quantifier: str, number: Callable[[int, int], int | None]) -> None:
-        self._quantifier, self._number = quantifier, number
-        self._worst: tuple[tuple[bool, bool, float, int], _Worst] | None = None
-        self._best: tuple[tuple[bool, float], _Worst] | None = None
-        self.points = 0
-
-    def see(self, time: NDArray[np.float64], holds: NDArray[np.bool_], slack: NDArray[np.float64]) -> None:
-        """Take in points that count: their times (T,), and the condition and its slack there (n, T)."""
-        self.points += len(time)
-        if not len(time):
-            return
-        if self._quantifier == "finally":
-            self._worst, time, holds, slack = None, time[-1:], holds[:, -1:], slack[:, -1:]
-        # The worst point: NaN before a violation before the smallest slack, before a row further ahead.
-        known = ~np.isnan(slack)
-        order = np.lexsort((slack.ravel(), holds.ravel(), known.ravel()))
-        row, column = (int(k) for k in np.unravel_index(int(order[0]), slack.shape))
-        key = (bool(known[row, column]), bool(holds[row, column]), float(slack[row, column]), row)
-        if self._worst is None or key < self._worst[0]:
-            self._worst = key, self._at(time, slack, bool(holds[row, column]), row, column)
-        if self._quantifier == "eventually":
-            every = np.asarray(holds.all(axis=0))  # the rows of a slice count together, at the best moment
-            column = int(np.lexsort((-slack.min(axis=0), ~every))[0])
-            best = (not every[column], -float(slack[:, column].min()))
-            if self._best is None or best < self._best[0]:
-                row = int(np.argmin(slack[:, column]))
-                self._best = best, self._at(time, slack, bool(every[column]), row, column)
-
-    def _at(self, time: NDArray[np.float64], slack: NDArray[np.float64], holds: bool, row: int, column: int) -> _Worst:
-        return _Worst(holds, float(slack[row, column]), float(time[column]), self._number(row, len(slack)))
-
-    def decisive(self) -> _Worst:
-        """The point that decides."""
-        assert self._worst is not None
-        worst = self._worst[1]
-        return worst if self._best is None or np.isnan(worst.slack) else self._best[1]
+    def _bound_problems(self, names: Collection[str], parameters: Collection[str] | None) -> Iterator[Problem]:
+        """What is wrong with the bounds of intervals: they are numbers or parameters, with `i` or without."""
+        for node in walk(self.condition.tree):
+            if isinstance(node, Temporal) and node.interval is not None and parameters is not None:
+                for reference in (x for bound in node.interval for x in walk(bound) if isinstance(x, Reference)):
+                    alone = Expression(reference.text, reference)
+                    every = {name for k in alone.instances(names) for name in alone.resolve(names, k)[0]}
+                    if every and not every <= set(parameters):
+                        message = "a bound of an interval is a number or a parameter, not a signal"
+                        yield Problem(f"'{self.condition.text}', column {reference.column}", message)
 
 
-def _badness(worst: _Worst) -> tuple[bool, bool, float]:
-    return not np.isnan(worst.slack), worst.holds, worst.slack
+def _finite(value: float) -> float | None:
+    """A value as it is told; None where it is no measure."""
+    return None if np.isinf(value) else float(decoded(np.asarray(value)))
+
+
+def _rehearse(node: Node, scope: Scope) -> None:
+    """Calculate a condition in a rehearsal."""
+    signals = scope.signals
+    Rehearsed(scope, Points(signals, reach(node))).values(node, 0, signals.points)
 
 
 def _conditions(node: Node) -> Iterator[Node]:
@@ -260,6 +284,9 @@ def _conditions(node: Node) -> Iterator[Node]:
             Operation(operator="and" | "or" | "not", operands=operands)
             | Operation(operator="if", operands=(_, *operands))
         ):
+            for operand in operands:
+                yield from _conditions(operand)
+        case Temporal(operands=operands):
             for operand in operands:
                 yield from _conditions(operand)
         case _:
@@ -282,17 +309,15 @@ def _can_be_true(node: Node) -> bool:
 def _clauses(text: str) -> list[tuple[str, str]]:
     """Split at from, until, outside where not in brackets or quotes: [("", condition), (word, argument), ...]."""
     parts = [("", "")]
-    depth, quote, start = 0, "", 0
-    for match in re.finditer(r"[\w.]+|\S", text):
-        token = match[0]
-        if quote or token in "\"'":
-            quote = "" if token == quote else quote or token
-        elif token in CLAUSES and depth == 0:
-            parts[-1] = (parts[-1][0], text[start : match.start()].strip())
-            parts.append((token, ""))
-            start = match.end()
+    depth, start, tokens = 0, 0, tokens_of(text)
+    for k, token in enumerate(tokens):
+        interval = token.text == "until" and k + 1 < len(tokens) and tokens[k + 1].text == "["
+        if token.text in CLAUSES and depth == 0 and not interval:
+            parts[-1] = (parts[-1][0], text[start : token.start].strip())
+            parts.append((token.text, ""))
+            start = token.end
         else:
-            depth += (token in "([{") - (token in ")]}")
+            depth += (token.text in "([{") - (token.text in ")]}")
     parts[-1] = (parts[-1][0], text[start:].strip())
     return parts
 
@@ -321,6 +346,23 @@ def _window(text: str) -> tuple[Expression, Expression]:
     return _time("outside", match[1].strip()), _time("outside", match[2].strip())
 
 
+def _quantifier(text: str) -> tuple[Word, str]:
+    """The word in front, and what follows it; no word where a formula stands alone.
+
+    Raises:
+        ExpressionError: nothing says when.
+    """
+    word = re.split(r"\W", text, maxsplit=1)[0]
+    for quantifier in QUANTIFIERS:
+        if word == quantifier and not text[len(word) :].lstrip().startswith((".", "[", "=")):
+            return quantifier, text[len(word) :].strip()
+    if not says_when(text):
+        first = text.split(" ", maxsplit=1)[0]
+        nearest = suggestion(first, QUANTIFIERS) or _MISSING
+        raise ExpressionError(Problem("", f"'{text}' does not say when", nearest))
+    return "", text
+
+
 def parse_requirement(name: str, text: str) -> Requirement:
     """Read a requirement such as `always abs(train[i].acceleration) <= 1.0 outside [210, 240]`.
 
@@ -328,10 +370,7 @@ def parse_requirement(name: str, text: str) -> Requirement:
         ExpressionError: with every problem of the text, which does not say the name.
     """
     text = re.sub(r"\s+", " ", text).strip()
-    quantifier, _, rest = text.partition(" ")
-    if quantifier not in QUANTIFIERS:
-        nearest = suggestion(quantifier, QUANTIFIERS) or _MISSING
-        raise ExpressionError(Problem("", f"'{text}' does not say when", nearest))
+    quantifier, rest = _quantifier(text)
     (_, condition), *clauses = _clauses(rest)
     times: dict[str, Expression] = {}
     outside: list[tuple[Expression, Expression]] = []
@@ -350,6 +389,9 @@ def parse_requirement(name: str, text: str) -> Requirement:
         expression = parse(condition, FUNCTIONS)
     except ExpressionError as error:
         problems += error.problems
+    if not quantifier and clauses:
+        remedy = f"write always ({condition}) {clauses[0][0]} ..., or keep to its intervals"
+        problems.append(Problem("", f"'{clauses[0][0]}' stands behind a formula that says itself when", remedy))
     if problems:
         raise ExpressionError(problems)
     made = Requirement(name, text, quantifier, expression, times.get("from"), times.get("until"), tuple(outside))

@@ -3,6 +3,7 @@
 Numbers that differ by rounding are equal: their slack is 0.
 """
 
+from collections.abc import Mapping
 from functools import reduce
 from typing import Any, NamedTuple
 
@@ -24,17 +25,22 @@ class Slack(NamedTuple):
     slack: NDArray[np.float64]
 
 
-def slack_of(node: Node, scope: Scope) -> Slack:
+def slack_of(node: Node, scope: Scope, scales: Mapping[int, float] | None = None) -> Slack:
     """The slack of a condition: b - a for a < b, the least for `and`, the most for `or`, negated for `not`.
 
     A bare signal is a boolean: it holds where it is not zero and has no measure. NaN never holds.
+
+    Args:
+        node: the condition.
+        scope: what its names stand for.
+        scales: what the slack of a comparison is divided by, by the identity of its node.
     """
     match node:
         case Operation(operator="not", operands=(operand,)):
-            holds, slack = slack_of(operand, scope)
+            holds, slack = slack_of(operand, scope, scales)
             return Slack(~holds & ~np.isnan(slack), -slack)
         case Operation(operator="and" | "or" as operator, operands=operands):
-            parts = [slack_of(operand, scope) for operand in operands]
+            parts = [slack_of(operand, scope, scales) for operand in operands]
             smaller = operator == "and"
             slack = (np.minimum if smaller else np.maximum).reduce(np.broadcast_arrays(*(part.slack for part in parts)))
             every = np.broadcast_arrays(*(part.holds for part in parts))
@@ -42,12 +48,13 @@ def slack_of(node: Node, scope: Scope) -> Slack:
             return Slack(np.asarray(holds & ~np.isnan(slack)), np.asarray(slack))
         case Operation(operator="if", operands=(condition, then, otherwise)):
             choice = np.asarray(evaluate(condition, scope), dtype=np.float64)
-            yes, no = slack_of(then, scope), slack_of(otherwise, scope)
+            yes, no = slack_of(then, scope, scales), slack_of(otherwise, scope, scales)
             slack = np.where(np.isnan(choice), np.nan, np.where(choice, yes.slack, no.slack))
             return Slack(np.where(choice, yes.holds, no.holds) & ~np.isnan(slack), slack)
         case Operation(operator=operator, operands=(left, right)) if operator in COMPARISONS:
             rounding = ROUNDING * np.maximum(_size(left, scope), _size(right, scope))
-            return _compare(operator, evaluate(left, scope), evaluate(right, scope), rounding)
+            holds, slack = _compare(operator, evaluate(left, scope), evaluate(right, scope), rounding)
+            return Slack(holds, slack if scales is None else slack / scales[id(node)])
     value = np.asarray(evaluate(node, scope), dtype=np.float64)
     slack = np.where(np.isnan(value), np.nan, np.where(value, np.inf, -np.inf))
     return Slack(slack > 0, slack)

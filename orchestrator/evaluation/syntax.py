@@ -5,9 +5,8 @@ nodes mean stands in `expressions`.
 """
 
 import ast
-import re
 import warnings
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from functools import cached_property
 from typing import TypeAlias
@@ -115,7 +114,20 @@ class Call:
     column: int
 
 
-Node: TypeAlias = Number | Name | Reference | Group | Operation | Call
+@dataclass(frozen=True)
+class Temporal:
+    """A word of temporal logic with its operands, such as `eventually[0, 30] (gap >= 15)`.
+
+    `interval` has the first and the last time that it looks at, counted from now in s; None is all the time there is.
+    """
+
+    word: str
+    operands: tuple["Node", ...]
+    interval: tuple["Node", "Node"] | None
+    column: int
+
+
+Node: TypeAlias = Number | Name | Reference | Group | Operation | Call | Temporal
 
 
 def walk(node: Node) -> Iterator[Node]:
@@ -124,6 +136,9 @@ def walk(node: Node) -> Iterator[Node]:
     match node:
         case Group(items=children) | Operation(operands=children) | Call(arguments=children):
             for child in children:
+                yield from walk(child)
+        case Temporal(operands=operands, interval=interval):
+            for child in (*(interval or ()), *operands):
                 yield from walk(child)
 
 
@@ -138,25 +153,55 @@ _REMEDIES: dict[type[ast.AST], str] = {
 }  # fmt: skip
 
 
-class _Reader:
-    """Rebuilds Python's syntax tree of one text as ours, refusing everything that is not on the list."""
+HOLE = "_"
+"""What stands in a text in place of a formula that was read before."""
+CHANGES = ("rise", "fall")
 
-    def __init__(self, text: str) -> None:
-        self.text = text
+
+class Reader:
+    """Rebuilds Python's syntax tree of one text as ours, refusing everything that is not on the list.
+
+    Args:
+        text: what is shown where something is wrong.
+        source: what is read of it, which begins at the character `start`.
+        holes: the formulas of which only a `HOLE` is left, by their columns in the text.
+    """
+
+    def __init__(self, text: str, source: str, start: int = 0, holes: Mapping[int, Node] | None = None) -> None:
+        self.text, self.source, self.start, self.holes = text, source, start, holes or {}
+
+    def tree(self) -> ast.expr:
+        """Python's.
+
+        Raises:
+            ExpressionError: it is none, with the column and the remedy.
+        """
+        try:
+            with warnings.catch_warnings():
+                warnings.simplefilter("ignore")
+                return ast.parse(self.source, mode="eval").body
+        except SyntaxError as error:
+            remedy = 'a name with other characters or a reserved word goes into signal("...")'
+            place = f"'{self.text}', column {(error.offset or 1) + self.start}"
+            raise ExpressionError(Problem(place, error.msg, remedy)) from None
 
     def column(self, node: ast.expr) -> int:
-        return len(self.text.encode()[: node.col_offset].decode(errors="replace")) + 1
+        """Where a node stands in the text, from 1 on."""
+        return len(self.source.encode()[: node.col_offset].decode(errors="replace")) + 1 + self.start
 
     def error(self, node: ast.expr, message: str, remedy: str = "") -> ExpressionError:
+        """An error that quotes the text."""
         return ExpressionError(Problem(f"'{self.text}', column {self.column(node)}", message, remedy))
 
     def operator(self, node: ast.expr, kind: ast.AST) -> str:
+        """How an operator is written."""
         if type(kind) not in _OPERATORS:
             remedy = _REMEDIES.get(type(kind), "there are + - * / ** < <= > >= == != and or not")
             raise self.error(node, "this operator is not understood", remedy)
         return _OPERATORS[type(kind)]
 
     def read(self, node: ast.expr, depth: int = 0) -> Node:  # noqa: PLR0911 (one a kind of node)
+        """A node and all below it."""
         if depth > MAX_DEPTH:
             raise self.error(node, f"nested more than {MAX_DEPTH} levels deep", "split the expression")
         deeper = depth + 1
@@ -164,7 +209,7 @@ class _Reader:
             case ast.Constant(value=bool() | int() | float() as value):
                 return Number(value if isinstance(value, bool) else float(value))
             case ast.Name(id=name):
-                return Name(name, self.column(node))
+                return self.holes.get(self.column(node)) or Name(name, self.column(node))
             case ast.Attribute() | ast.Subscript():
                 return self.reference(node, deeper)
             case ast.UnaryOp(op=kind, operand=operand):
@@ -196,6 +241,7 @@ class _Reader:
         return links[0] if len(links) == 1 else Operation("and", tuple(links))
 
     def call(self, node: ast.Call, depth: int) -> Node:
+        """A call, a signal by its full name, or a change."""
         if not isinstance(node.func, ast.Name):
             raise self.error(node, "a function is called by its plain name, as in max(train[1].speed)")
         if node.func.id == "signal":
@@ -203,6 +249,10 @@ class _Reader:
                 case [ast.Constant(value=str(name))] if not node.keywords:
                     return Reference(name, self.column(node), ((name, ()),))
             raise self.error(node, 'signal takes one name in quotes, exactly as recorded: signal("plant.der(x)")')
+        if node.func.id in CHANGES:
+            if len(node.args) != 1 or node.keywords:
+                raise self.error(node, f"{node.func.id} takes one condition", "as in rise(train[1].speed > 20)")
+            return Temporal(node.func.id, (self.read(node.args[0], depth),), None, self.column(node))
         keywords = tuple(keyword.arg for keyword in node.keywords if keyword.arg is not None)
         if len(keywords) < len(node.keywords) or any(isinstance(argument, ast.Starred) for argument in node.args):
             raise self.error(node, "* and ** arguments are not understood", "write the arguments out")
@@ -212,11 +262,13 @@ class _Reader:
         return Call(node.func.id, tuple(self.argument(x, depth) for x in arguments), keywords, self.column(node))
 
     def argument(self, node: ast.expr, depth: int) -> Node:
+        """An argument of a call, which may be a list."""
         if isinstance(node, ast.List | ast.Tuple) and depth <= MAX_DEPTH:
             return Group(tuple(self.argument(item, depth + 1) for item in node.elts))
         return self.read(node, depth)
 
     def reference(self, node: ast.expr, depth: int) -> Reference:
+        """A signal, or a family of signals."""
         parts: list[tuple[str, tuple[Node | Span, ...]]] = []
         text, indices, inner = "", tuple[Node | Span, ...](), node
         while True:  # from the last name to the first
@@ -235,16 +287,19 @@ class _Reader:
                     raise self.error(node, "a signal is written like train[i].speed or consist[1].force[2]")
 
     def indices(self, node: ast.expr, depth: int) -> tuple[Node | Span, ...]:
+        """What stands in one pair of brackets."""
         items = node.elts if isinstance(node, ast.Tuple) and node.elts else [node]
         return tuple(self.span(x, depth) if isinstance(x, ast.Slice) else self.index(x, depth) for x in items)
 
     def span(self, node: ast.Slice, depth: int) -> Span:
+        """A slice."""
         if node.step is not None:
             raise self.error(node.step, "a slice has no step", "write train[2:] or train[1:3], both ends included")
         first, last = (self.index(end, depth) if end else None for end in (node.lower, node.upper))
         return Span(first, last)
 
     def index(self, node: ast.expr, depth: int) -> Node:
+        """An index."""
         index = self.read(node, depth)
         for part in walk(index):
             match part:
@@ -254,32 +309,3 @@ class _Reader:
                     continue
             raise self.error(node, "an index is a whole number, i, count or a sum of these, as in train[i-1].speed")
         return index
-
-
-def read(text: str) -> tuple[str, Node]:
-    """The text as it will be shown, and its tree.
-
-    Raises:
-        ExpressionError: for anything that is not an expression of this language, with the column and the remedy.
-    """
-    text = re.sub(r"\s", " ", text).strip()
-    if not text:
-        remedy = "write a signal or a formula, such as train[1].speed"
-        raise ExpressionError(Problem("", "an expression is empty", remedy))
-    if len(text) > MAX_LENGTH:
-        message = f"longer than {MAX_LENGTH} characters"
-        raise ExpressionError(Problem(f"'{text[:40]}...'", message, "split the expression"))
-    try:
-        with warnings.catch_warnings():
-            warnings.simplefilter("ignore")
-            tree = ast.parse(text, mode="eval")
-        return text, _Reader(text).read(tree.body)
-    except ExpressionError:
-        raise
-    except SyntaxError as error:
-        remedy = 'a name with other characters or a reserved word goes into signal("...")'
-        raise ExpressionError(Problem(f"'{text}', column {error.offset or 1}", error.msg, remedy)) from None
-    except (RecursionError, MemoryError):
-        raise ExpressionError(Problem(f"'{text}'", "nested too deeply", "split the expression")) from None
-    except (ValueError, OverflowError) as error:
-        raise ExpressionError(Problem(f"'{text}'", str(error), "write plain names and numbers")) from None
