@@ -1,4 +1,5 @@
 from .errors import CouplingError, FmuError, FmuFileError, RailcosimError, RunError, ScenarioError
+from .evaluation import robustness
 from .run import Results, Run, resume, run
 from .scenario import load
 from .study import Batch, Study
@@ -21,5 +22,6 @@ __all__ = [
     "System",
     "load",
     "resume",
+    "robustness",
     "run",
 ]

@@ -25,6 +25,7 @@ from .published import (
     split_metric,
 )
 from .requirements import Verdict, parse_requirement
+from .robustness import robustness
 from .signals import Part, Signals, parts_of
 from .syntax import Call, Node, Number, Operation, Reference
 from .vocabulary import Names
@@ -64,6 +65,7 @@ __all__ = [
     "parse",
     "parse_requirement",
     "parts_of",
+    "robustness",
     "split_metric",
     "unit_of",
     "value_name",

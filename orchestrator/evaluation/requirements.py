@@ -31,10 +31,10 @@ from .temporal import (
     Decision,
     Formula,
     Points,
-    Rehearsed,
     Word,
     decoded,
     horizon,
+    rehearsed_interval,
     scales_of,
 )
 
@@ -274,7 +274,8 @@ def _finite(value: float) -> float | None:
 def _rehearse(node: Node, scope: Scope) -> None:
     """Calculate a condition in a rehearsal."""
     signals = scope.signals
-    Rehearsed(scope, Points(signals, reach(node))).values(node, 0, signals.points)
+    points = Points(signals, reach(node))
+    Formula(scope, points, interval=rehearsed_interval).values(node, 0, signals.points)
 
 
 def _conditions(node: Node) -> Iterator[Node]:

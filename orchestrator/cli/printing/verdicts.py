@@ -19,14 +19,15 @@ _SMALLEST_CLAIM = 16
 
 
 def show_requirements(out: Console, verdicts: Sequence[Verdict]) -> None:
-    """One row a requirement: verdict, signed margin, worst time."""
-    columns = ("requirement", "verdict", "margin", "worst at", "text")
-    made = table("Requirements", columns, right=("margin", "worst at"), fold=("requirement", "text"))
+    """One row a requirement: verdict, signed margin, worst time, and the signals that decided."""
+    columns = ("requirement", "verdict", "margin", "worst at", "decided by", "text")
+    made = table("Requirements", columns, right=("margin", "worst at"), fold=("requirement", "decided by", "text"))
     for v in verdicts:
         place = "" if v.time is None else f"{digits(v.time)} s"
         place += "" if v.index is None else f", i = {v.index}"
         margin = "" if v.margin is None else f"{v.margin:.4g}"
-        made.add_row(Text(v.name), verdict(v.verdict), margin, place, Text(" ".join(v.text.split())))
+        blame = Text(", ".join(v.blame))
+        made.add_row(Text(v.name), verdict(v.verdict), margin, place, blame, Text(" ".join(v.text.split())))
     out.print(made)
     show_reasons(out, "because", ((v.name, v.reason) for v in verdicts if v.reason))
     say(out, "Requirements are judged at the recorded points.", "dim")

@@ -2,18 +2,17 @@ from .blame import Culprit
 from .judging import Decision, Word
 from .points import Points
 from .scales import scales_of
-from .values import Formula, Rehearsed, Scales, decoded, horizon, is_temporal
+from .values import Formula, Scales, decoded, horizon, rehearsed_interval
 
 __all__ = [
     "Culprit",
     "Decision",
     "Formula",
     "Points",
-    "Rehearsed",
     "Scales",
     "Word",
     "decoded",
     "horizon",
-    "is_temporal",
+    "rehearsed_interval",
     "scales_of",
 ]

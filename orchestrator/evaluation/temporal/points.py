@@ -50,7 +50,7 @@ class Points:
         found = self._parts.get((first, last))
         if found is None:
             end = min(last + self._ahead, self.count)
-            found = Part(self.signals, self.signals.part(first, end), 0, end - last)
+            found = Part(self.signals, self.signals.part(first, end), first, beyond=end - last)
             if len(self._parts) == _KEPT:
                 del self._parts[next(iter(self._parts))]
             self._parts[first, last] = found

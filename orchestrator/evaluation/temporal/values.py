@@ -10,6 +10,8 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from ...errors import ExpressionError, WindowError
+from ...problems import Problem
 from ...times import digits
 from .. import signals as runs
 from ..calculation import Scope, evaluate
@@ -80,24 +82,62 @@ def is_past(node: Temporal) -> bool:
 
 
 def horizon(node: Node, interval: Callable[[Temporal], tuple[float, float]]) -> float:
-    """How far ahead a formula looks in s; infinite where one of its words has no end."""
+    """How far ahead a formula looks in s, beyond words without end, which look at what there is."""
     if isinstance(node, Temporal):
-        own = 0.0 if is_past(node) or node.word in CHANGES else interval(node)[1]
-        return own + max(horizon(operand, interval) for operand in node.operands)
+        bounds = (0.0, 0.0) if is_past(node) or node.word in CHANGES else interval(node)
+        return bounds[int(np.isfinite(bounds[1]))] + max(horizon(operand, interval) for operand in node.operands)
     if isinstance(node, Operation):
         return max(horizon(operand, interval) for operand in node.operands)
     return 0.0
+
+
+def interval_of(node: Temporal, scope: Scope) -> tuple[float, float]:
+    """The interval of a word in s.
+
+    Raises:
+        WindowError: a bound varies, is negative, or the interval ends before it begins.
+    """
+    if node.interval is None:
+        return 0.0, np.inf
+    try:
+        low, high = (scalar(evaluate(bound, scope), f"a bound of {node.word}") for bound in node.interval)
+    except ExpressionError as error:
+        raise WindowError(error.problems) from None
+    if not 0.0 <= low <= high or low == np.inf:
+        written = f"{node.word}[{digits(low)}, {digits(high)}]"
+        remedy = "its first time is 0 or later, and its last one no earlier than that"
+        raise WindowError(Problem("", f"'{written}' is no interval", remedy))
+    return low, high
+
+
+def rehearsed_interval(node: Temporal, scope: Scope) -> tuple[float, float]:
+    """The same in a rehearsal, in which parameters have no values yet: any that is one."""
+    bounds = node.interval or ()
+    if not any(isinstance(part, Reference) for bound in bounds for part in walk(bound)):
+        try:
+            return interval_of(node, scope)
+        except WindowError as error:  # which no run will change
+            raise ExpressionError(error.problems) from None
+    for bound in bounds:
+        scalar(evaluate(bound, scope), f"a bound of {node.word}")
+    return 0.0, np.inf
 
 
 class Formula:
     """The values of a formula and its parts in a run, for one value of its index.
 
     Args:
-        scope: what its names stand for. points: of the run. scales: of its comparisons, or 1.
+        scope: what its names stand for. points: of the run. scales: of its comparisons, or 1. interval: of a word.
     """
 
-    def __init__(self, scope: Scope, points: Points, scales: Scales | None = None) -> None:
-        self.scope, self.points, self._scales = scope, points, scales
+    def __init__(
+        self,
+        scope: Scope,
+        points: Points,
+        scales: Scales | None = None,
+        interval: Callable[[Temporal, Scope], tuple[float, float]] = interval_of,
+    ) -> None:
+        self.scope, self.points, self._scales, self._interval_of = scope, points, scales, interval
         self.gaps: set[str] = set()
         self._last: dict[int, tuple[int, int, Bounds]] = {}
         self._ends: dict[int, dict[int, Bounds]] = {}
@@ -150,21 +190,9 @@ class Formula:
         return Bounds.exact(_own(values, part))
 
     def interval(self, node: Temporal) -> tuple[float, float]:
-        """The interval of a word in s.
-
-        Raises:
-            ExpressionError: a bound varies, is negative, or the interval ends before it begins.
-        """
+        """The interval of a word in s."""
         if id(node) not in self._intervals:
-            low, high = (0.0, np.inf)
-            if node.interval is not None:
-                low, high = (scalar(evaluate(bound, self.scope), f"a bound of {node.word}") for bound in node.interval)
-            if not 0.0 <= low <= high or low == np.inf:
-                written = f"{node.word}[{low:g}, {high:g}]"
-                raise self.scope.error(
-                    f"'{written}' is no interval: its bounds are at least 0, and the second is at least the first"
-                )
-            self._intervals[id(node)] = low, high
+            self._intervals[id(node)] = self._interval_of(node, self.scope)
         return self._intervals[id(node)]
 
     def windows(self, node: Temporal, first: int, last: int) -> Windows:
@@ -284,19 +312,6 @@ class Formula:
         if all(x.high is x.low for x in (p, q, rest)):
             return Bounds.exact(low)
         return Bounds(low, clamped(q.high[order], p.high[order], float(rest.high[0]))[-1:])
-
-
-class Rehearsed(Formula):
-    """A formula in a rehearsal, in which parameters have no values yet."""
-
-    def interval(self, node: Temporal) -> tuple[float, float]:
-        """As it will be where it is of numbers alone; else anything."""
-        bounds = node.interval or ()
-        if not any(isinstance(part, Reference) for bound in bounds for part in walk(bound)):
-            return super().interval(node)
-        for bound in bounds:
-            scalar(evaluate(bound, self.scope), f"a bound of {node.word}")
-        return 0.0, np.inf
 
 
 class Look(NamedTuple):
