@@ -20,12 +20,11 @@ from ..times import digits, slack
 from .calculation import Scope, names_of, reach
 from .expressions import Expression, evaluate_constant, parse
 from .formulas import says_when, tokens_of
-from .functions import CONSTANTS
 from .metrics import EVERY_STEP, FUNCTIONS
 from .reducers import Span, ends_of, scalar
 from .signals import Rehearsal, Signals
-from .slack import COMPARISONS
-from .syntax import Call, Name, Node, Number, Operation, Reference, Temporal, walk
+from .slack import can_be_true, conditions
+from .syntax import Call, Node, Reference, Temporal, walk
 from .temporal import (
     Culprit,
     Decision,
@@ -138,7 +137,7 @@ class Requirement:
             elif not found and parameters is not None and not _is_constant(moment, names, parameters):
                 found = [Problem(f"'{moment.text}'", "a time is a number or a parameter, not a signal")]
             problems += found
-        shapeless = [node for node in _conditions(self.condition.tree) if not _can_be_true(node)]
+        shapeless = [node for node in conditions(self.condition.tree) if not can_be_true(node)]
         if shapeless and not problems:
             number = f"'{self.condition.text}' is a number, not a condition"
             return [Problem("", number, "compare it, as in abs(x) <= 1")]
@@ -276,35 +275,6 @@ def _rehearse(node: Node, scope: Scope) -> None:
     signals = scope.signals
     points = Points(signals, reach(node))
     Formula(scope, points, interval=rehearsed_interval).values(node, 0, signals.points)
-
-
-def _conditions(node: Node) -> Iterator[Node]:
-    """The parts that have to be true or false: below and, or, not, and both branches of if."""
-    match node:
-        case (
-            Operation(operator="and" | "or" | "not", operands=operands)
-            | Operation(operator="if", operands=(_, *operands))
-        ):
-            for operand in operands:
-                yield from _conditions(operand)
-        case Temporal(operands=operands):
-            for operand in operands:
-                yield from _conditions(operand)
-        case _:
-            yield node
-
-
-def _can_be_true(node: Node) -> bool:
-    match node:
-        case Operation(operator=operator):
-            return operator in COMPARISONS
-        case Call(name=name):
-            return name in {"where", "at_sample"}
-        case Number(value=value):
-            return isinstance(value, bool)
-        case Name(name=name):
-            return isinstance(CONSTANTS.get(name), bool)
-    return isinstance(node, Reference)
 
 
 def _clauses(text: str) -> list[tuple[str, str]]:

@@ -3,7 +3,7 @@
 Numbers that differ by rounding are equal: their slack is 0.
 """
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from functools import reduce
 from typing import Any, NamedTuple
 
@@ -11,7 +11,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .calculation import Scope, evaluate
-from .syntax import Call, Node, Operation
+from .functions import CONSTANTS
+from .syntax import Call, Name, Node, Number, Operation, Reference, Temporal
 
 COMPARISONS = ("<", "<=", ">", ">=", "==", "!=")
 ROUNDING = 4 * float(np.finfo(np.float64).eps)
@@ -82,3 +83,33 @@ def _compare(operator: str, left: NDArray[Any], right: NDArray[Any], rounding: N
         return Slack(equal, -size) if operator == "==" else Slack(~equal & ~np.isnan(size), size)
     slack = difference if operator in ("<", "<=") else -difference
     return Slack(slack > 0.0 if operator in ("<", ">") else slack >= 0.0, slack)
+
+
+def conditions(node: Node) -> Iterator[Node]:
+    """The parts that have to be true or false: below and, or, not, and both branches of if."""
+    match node:
+        case (
+            Operation(operator="and" | "or" | "not", operands=operands)
+            | Operation(operator="if", operands=(_, *operands))
+        ):
+            for operand in operands:
+                yield from conditions(operand)
+        case Temporal(operands=operands):
+            for operand in operands:
+                yield from conditions(operand)
+        case _:
+            yield node
+
+
+def can_be_true(node: Node) -> bool:
+    """Whether a part is more than a number."""
+    match node:
+        case Operation(operator=operator):
+            return operator in COMPARISONS
+        case Call(name=name):
+            return name in {"where", "at_sample"}
+        case Number(value=value):
+            return isinstance(value, bool)
+        case Name(name=name):
+            return isinstance(CONSTANTS.get(name), bool)
+    return isinstance(node, Reference)

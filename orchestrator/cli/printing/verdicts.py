@@ -19,17 +19,18 @@ _SMALLEST_CLAIM = 16
 
 
 def show_requirements(out: Console, verdicts: Sequence[Verdict]) -> None:
-    """One row a requirement: verdict, signed margin, worst time, and the signals that decided."""
-    columns = ("requirement", "verdict", "margin", "worst at", "decided by", "text")
-    made = table("Requirements", columns, right=("margin", "worst at"), fold=("requirement", "decided by", "text"))
+    """One row a requirement: verdict, signed margin, worst time; below, the signals that decided of those not kept."""
+    columns = ("requirement", "verdict", "margin", "worst at", "text")
+    made = table("Requirements", columns, right=("margin", "worst at"), fold=("requirement", "text"))
     for v in verdicts:
         place = "" if v.time is None else f"{digits(v.time)} s"
         place += "" if v.index is None else f", i = {v.index}"
         margin = "" if v.margin is None else f"{v.margin:.4g}"
-        blame = Text(", ".join(v.blame))
-        made.add_row(Text(v.name), verdict(v.verdict), margin, place, blame, Text(" ".join(v.text.split())))
+        made.add_row(Text(v.name), verdict(v.verdict), margin, place, Text(" ".join(v.text.split())))
     out.print(made)
     show_reasons(out, "because", ((v.name, v.reason) for v in verdicts if v.reason))
+    blamed = ((v.name, " and ".join(v.blame)) for v in verdicts if v.verdict == "fail" and v.blame)
+    show_reasons(out, "decided by", blamed)
     say(out, "Requirements are judged at the recorded points.", "dim")
 
 
