@@ -25,7 +25,11 @@ def scales_of(condition: Expression, scope: Scope, index: int | None) -> Scales:
     """What the slack of each comparison of a condition is divided by, for one value of its index."""
     units, kept, key = scope.signals.units, scope.binding.plan.bindings, ("scales", id(condition.tree), index)
     if key not in kept or kept[key][0] is not units:
-        kept[key] = units, _scales_of(condition, scope, index), condition.tree  # which stays, so that no other tree has its identity
+        kept[key] = (
+            units,
+            _scales_of(condition, scope, index),
+            condition.tree,
+        )  # which stays, so that no other tree has its identity
     scales: Scales = kept[key][1]
     return scales
 
