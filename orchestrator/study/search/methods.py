@@ -21,6 +21,8 @@ Array = NDArray[np.float64]
 
 _WIDTH = 0.3
 """Of CMA-ES's first steps, as a part of the cube."""
+_NEAR = 0.01
+"""Steps so small, as a part of the cube, count as stuck: digits of a margin that holds break nothing."""
 _MOST = 64
 """The largest population of CMA-ES: on a plateau it is stuck each time at once."""
 _GROUP = 4
@@ -72,6 +74,7 @@ class CmaEs(Method):
 
         options = {
             "bounds": [0.0, 1.0],
+            "tolx": _NEAR,
             "popsize": self._population,
             "randn": lambda *shape: self._luck.standard_normal(shape),
             "seed": math.nan,  # its luck is ours, not NumPy's for all
