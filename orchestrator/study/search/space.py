@@ -147,7 +147,7 @@ def make_space(
     placed_system, placed = place_signals(system, checked, results, signals)
     nominal: dict[str, float] = {}
     for one in dimensions:
-        value = _nominal(one.name, system, results)
+        value = _nominal(one.name, system, checked, results)
         if value is not None and (one.law is not None or one.is_numeric):
             nominal[one.name] = value
     for signal in placed:
@@ -155,8 +155,8 @@ def make_space(
     return placed_system, Space(tuple(dimensions), tuple(placed), nominal)
 
 
-def _nominal(key: str, system: System, results: Results) -> float | None:
-    """What the scenario has of a key: one number, or None."""
+def _nominal(key: str, system: System, checked: Checked, results: Results) -> float | None:
+    """What the scenario has of a key: one number, or None. A start value may stand in a parameter of its own."""
     instance, _, word = key.partition(".")
     if instance == "simulation":
         found = [getattr(system, word, None) if word == "seed" else getattr(system.stepping, word, None)]
@@ -164,7 +164,9 @@ def _nominal(key: str, system: System, results: Results) -> float | None:
         number = SignalName(instance).number or 0
         found = [getattr(event, word, None) for event in system.events[number - 1 : number]]
     else:
-        wanted = SignalName(instance, word)
-        found = [value for name, value in results.parameters.items() if wanted.covers(SignalName.parse(name))]
+        words = {word, *(model.interface.start_name(word) for model in checked.models.values())}
+        wanted = [SignalName(instance, each) for each in words]
+        parameters = ((SignalName.parse(name), value) for name, value in results.parameters.items())
+        found = [value for name, value in parameters if any(each.covers(name) for each in wanted)]
     plain = [value for value in found if isinstance(value, int | float) and not isinstance(value, bool)]
     return float(plain[0]) if len(set(plain)) == 1 and len(plain) == len(found) else None

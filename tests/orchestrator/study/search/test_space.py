@@ -50,6 +50,15 @@ def test_nominal_is_what_all_have_in_common(mine):
     assert nominal == {"lag[2].rate": 3.0, "lag.gain": 1.5, "events[1].at": 0.5, "simulation.step": 0.5}
 
 
+def test_a_start_value_is_nominal_too(mine):
+    system = System(stop_time=1.0, step=0.5)
+    system.add("train", "PointMassTrain", force=0.0, position=7.0)
+    assert space_of(system, "train.position=0:10", "train.position_start=0:10").nominal == {
+        "train.position": 7.0,
+        "train.position_start": 7.0,
+    }
+
+
 def test_a_rate_limit_holds_for_values_left_as_they_were(lagging):
     space = space_of(lagging(), "target.value=signal(0, 4, 2, rate=1)")
     assert space.allows({"target.values[2]": 2.0})
