@@ -50,6 +50,7 @@ class Cluster:
         self._parcel, self._scheduler, self._wanted = parcel, scheduler, workers
         self._held = ExitStack()
         self._files: list[Future] = []
+        self._times_lost = 0
         self._counted, self._count = -_LOOK, 0
         self.dashboard = ""
 
@@ -98,11 +99,16 @@ class Cluster:
         """Send runs away."""
         if not self._files:
             self._files = [
-                self._client.submit(worker.blob, content, key=f"railcosim-file-{digest}")
+                self._client.submit(worker.blob, content, key=f"railcosim-file-{digest}{'-again' * self._times_lost}")
                 for digest, content in self._parcel.contents()
             ]
         future: Future = self._client.submit(worker.work, self._parcel.sent(), list(changes), self._files, pure=False)
         return future
+
+    def send_files_again(self) -> None:
+        """Do not wait for files that were lost with a worker: Dask has given them up."""
+        self._files = []
+        self._times_lost += 1
 
     def wait_for_scheduler(self) -> None:
         """Wait for one that has lost everything to be there again.

@@ -38,6 +38,9 @@ class Sender(Protocol):
     def submit(self, changes: Sequence[Mapping[str, Any]]) -> Future:
         """Send runs away."""
 
+    def send_files_again(self) -> None:
+        """Do not wait for files that were lost with a worker."""
+
     def wait_for_scheduler(self) -> None:
         """Wait for one that has lost everything to be there again."""
 
@@ -118,7 +121,11 @@ class Flight:
             self._flying[future.key] = future, chunk
             self._landed.put(future)
         except KilledWorker as error:
-            yield from self._died(chunk, error.allowed_failures + 1)
+            if error.task == future.key:
+                yield from self._died(chunk, error.allowed_failures + 1)
+            else:  # it was about to give a file to another, and nobody had begun with this chunk
+                self._again.append(chunk)
+                self._sender.send_files_again()
         except (CancelledError, OSError):  # what goes wrong on a worker is no OSError
             self._again.append(chunk)
             self._sender.wait_for_scheduler()

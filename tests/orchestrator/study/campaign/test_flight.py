@@ -16,6 +16,9 @@ class Future:
 
     def __init__(self, outcome):
         self.key, self._outcomes, self.is_cancelled = next(self.numbers), [*outcome], False
+        for one in self._outcomes:
+            if isinstance(one, KilledWorker) and one.task == "own":
+                one.args = (self.key, *one.args[1:])
 
     def add_done_callback(self, call):
         call(self)
@@ -36,18 +39,21 @@ class Workers:
 
     def __init__(self, workers=2, *, deadly=(), first=(), allowed=0):
         self.workers, self.deadly, self.first, self.allowed = workers, deadly, list(first), allowed
-        self.sent, self.futures, self.waits = [], [], 0
+        self.sent, self.futures, self.waits, self.lost_files = [], [], 0, 0
 
     def submit(self, changes):
         numbers = [change["n"] for change in changes]
         self.sent.append(numbers)
         outcome = [([Row("completed", steps=number) for number in numbers], 0.1 * len(numbers))]
         if set(numbers) & set(self.deadly):
-            outcome = [KilledWorker("key", None, self.allowed)]
+            outcome = [KilledWorker("own", None, self.allowed)]
         elif self.first:
             outcome = [self.first.pop(0), *outcome]
         self.futures.append(Future(outcome))
         return self.futures[-1]
+
+    def send_files_again(self):
+        self.lost_files += 1
 
     def wait_for_scheduler(self):
         self.waits += 1
@@ -83,10 +89,18 @@ def test_a_run_that_ends_its_worker_is_found_and_is_a_row(allowed, times, caplog
 
 
 def test_a_neighbour_that_was_waiting_behind_such_a_run_is_not_blamed():
-    workers = Workers(first=[KilledWorker("key", None, 3)] * 4)
+    workers = Workers(first=[KilledWorker("own", None, 3) for _ in range(4)])
     rows = fly(workers, 4)
     assert {row.status for row in rows.values()} == {"completed"}
     assert len(workers.sent) == 8
+
+
+def test_a_file_that_was_lost_is_nobodys_fault():
+    workers = Workers(first=[KilledWorker("a file", None, 0)] * 3)
+    rows = fly(workers, 2)
+    assert {row.status for row in rows.values()} == {"completed"}
+    assert workers.lost_files == 3
+    assert workers.sent == [[0], [1], [0], [1], [0]]
 
 
 @pytest.mark.parametrize("error", [CancelledError(), OSError("the connection is closed")])

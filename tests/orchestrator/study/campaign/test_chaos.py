@@ -1,0 +1,141 @@
+"""Studies that are disturbed: workers and schedulers are killed, FMUs crash, and every run is there exactly once."""
+
+import contextlib
+import os
+import random
+import signal
+import subprocess
+import sys
+import time
+
+import psutil
+import pytest
+from railcosim.orchestrator import Study, load
+from railcosim.orchestrator.errors import RunError
+from railcosim.orchestrator.study.campaign import run_study
+
+from .conftest import plan_of, same
+
+pytestmark = pytest.mark.long
+RUNS = 300
+
+
+def workers_of(process):
+    """The worker processes that a process has started."""
+    found = []
+    for one in process.children(recursive=True):
+        with contextlib.suppress(psutil.NoSuchProcess):
+            found += [one] if "spawn_main" in " ".join(one.cmdline()) else []
+    return found
+
+
+@pytest.fixture
+def native(how, system, tmp_path):
+    """How native runs are made, and what they are when nothing disturbs them."""
+    how["kind"] = "native"
+    return how, run_study(plan_of(system, runs=RUNS), how, tmp_path / "undisturbed", workers=0)
+
+
+@pytest.mark.parametrize("seed", [1, 2])
+def test_workers_are_killed_at_random(native, system, tmp_path, seed):
+    how, undisturbed = native
+    draw, me = random.Random(seed), psutil.Process()
+    moments = set(draw.sample(range(RUNS // 2), 4))
+
+    def kill(done, count, failed):
+        if done in moments and (found := workers_of(me)):
+            draw.choice(found).kill()
+
+    study = run_study(plan_of(system, runs=RUNS), how, tmp_path / "out", workers=2, progress=kill)
+    assert same(study, undisturbed)
+    assert not workers_of(me)
+
+
+def test_a_killed_study_goes_on_as_often_as_it_is_killed(native, system, scenario, tmp_path):
+    _, undisturbed = native
+    command = [sys.executable, "-m", "railcosim.orchestrator.cli", "study", str(scenario), "--vary"]
+    command += ["lag.rate=uniform(0.1, 3)", "--runs", str(RUNS), "--seed", "3", "--kind", "native", "--workers", "2"]
+    command += ["-o", str(tmp_path / "out"), "--quiet"]
+    for after in (7.0, 8.0):
+        study = subprocess.Popen([*command, "--resume"] if (tmp_path / "out/study.json").exists() else command)
+        time.sleep(after)
+        for one in psutil.Process(study.pid).children():
+            one.kill()
+        study.kill()
+        study.wait()
+    assert subprocess.run([*command, "--resume"], check=False, timeout=300).returncode in (0, 1)
+    assert same(Study.load(tmp_path / "out"), undisturbed)
+
+
+def test_runs_that_end_their_worker_are_rows(hostile, tmp_path):
+    fmu = hostile()
+    scenario = tmp_path / "hostile.toml"
+    scenario.write_text(
+        '[simulation]\nstop_time = 1.0\nstep = 0.1\n[instances.bad]\nfmu = "' + str(fmu) + '"\n'
+        '[metrics]\nend = "final(bad.x)"'
+    )
+    how = {"scenario": str(scenario), "kind": "native"}
+    deeds = ["", "step abort 0.5", "step kill 0.3", "step exit 0.2"]
+    plan = plan_of(load(scenario), "bad.u=1:10:10", "bad.deed=" + ",".join(f'"{deed}"' for deed in deeds))
+    study = run_study(plan, how, tmp_path / "out", workers=2)
+    frame = study.frame()
+    assert frame["run"].tolist() == list(range(40))
+    lost = frame["status"] == "failed"
+    assert (lost == (frame["bad.deed"] != "")).all()
+    assert frame["error"][lost].str.contains("it ended the process of its worker 3 times|exit").all()
+
+
+@pytest.fixture
+def by_hand(tmp_path):
+    """A scheduler and workers, each a process in a folder of its own, without the files of the scenario."""
+    started = []
+
+    def start(*arguments):
+        folder = tmp_path / f"hand{len(started)}"
+        folder.mkdir()
+        environment = os.environ | {"TMPDIR": str(folder)}
+        command = [sys.executable, "-m", "dask", *arguments]
+        log = open(folder / "log", "w")  # noqa: SIM115 (the process has it)
+        started.append(subprocess.Popen(command, cwd=folder, env=environment, stdout=log, stderr=log))
+        log.close()
+        return started[-1]
+
+    yield start
+    for one in started:
+        one.terminate()
+    for one in started:
+        one.wait(30)
+
+
+def test_a_scheduler_by_hand_is_restarted(native, system, tmp_path, by_hand):
+    how, undisturbed = native
+    address, port = "tcp://127.0.0.1:18786", "18786"
+
+    def up():
+        found = [by_hand("scheduler", "--host", "127.0.0.1", "--port", port, "--no-dashboard")]
+        return found + [by_hand("worker", address, "--nthreads", "1", "--no-dashboard") for _ in range(2)]
+
+    running, restarts = up(), iter([100])
+    due = next(restarts)
+
+    def restart(done, count, failed):
+        nonlocal due, running
+        if done == due:
+            due = -1
+            for one in running:
+                one.send_signal(signal.SIGKILL)
+                one.wait()
+            running = up()
+
+    study = run_study(plan_of(system, runs=RUNS), how, tmp_path / "out", scheduler=address, progress=restart)
+    assert same(study, undisturbed)
+
+    def stop(done, count, failed):
+        if done == 50:
+            for one in running:
+                one.kill()
+
+    with pytest.raises(RunError, match=f"the scheduler {address} is gone: start it and go on by --resume"):
+        run_study(plan_of(system, runs=RUNS), how, tmp_path / "gone", scheduler=address, progress=stop)
+    again = run_study(plan_of(system, runs=RUNS), how, tmp_path / "gone", workers=2, resume=True)
+    assert same(again, undisturbed)
