@@ -49,14 +49,13 @@ class Cluster:
     def __init__(self, parcel: Parcel, scheduler: str | None = None, workers: int | None = None) -> None:
         self._parcel, self._scheduler, self._wanted = parcel, scheduler, workers
         self._held = ExitStack()
-        self._files: list[Future] = []
-        self._times_lost = 0
         self._counted, self._count = -_LOOK, 0
         self.dashboard = ""
 
     def __enter__(self) -> Cluster:
         with ExitStack() as held:
             held.enter_context(_dask().dask.config.set(_CONFIG))
+            self._contents = [content for _, content in self._parcel.contents()]  # as they are now, for all workers
             client = self._remote() if self._scheduler else self._local(held)
             self._client = held.enter_context(client)
             self.dashboard = client.dashboard_link if _can_show() else ""
@@ -95,20 +94,11 @@ class Cluster:
         finally:
             flight.end()
 
-    def submit(self, changes: Sequence[Mapping[str, Any]]) -> Future:
-        """Send runs away."""
-        if not self._files:
-            self._files = [
-                self._client.submit(worker.blob, content, key=f"railcosim-file-{digest}{'-again' * self._times_lost}")
-                for digest, content in self._parcel.contents()
-            ]
-        future: Future = self._client.submit(worker.work, self._parcel.sent(), list(changes), self._files, pure=False)
+    def submit(self, changes: Sequence[Mapping[str, Any]], *, with_files: bool) -> Future:
+        """Send runs away, with all files for a worker that has not had them yet."""
+        contents = self._contents if with_files else None
+        future: Future = self._client.submit(worker.work, self._parcel.sent(), list(changes), contents, pure=False)
         return future
-
-    def send_files_again(self) -> None:
-        """Do not wait for files that were lost with a worker: Dask has given them up."""
-        self._files = []
-        self._times_lost += 1
 
     def wait_for_scheduler(self) -> None:
         """Wait for one that has lost everything to be there again.
@@ -116,7 +106,6 @@ class Cluster:
         Raises:
             RunError: it is not.
         """
-        self._files = []
         until = world.monotonic() + _PATIENCE
         while self._client.status != "running":
             if self._client.status == "closed" or world.monotonic() > until:
@@ -125,7 +114,6 @@ class Cluster:
             world.sleep(0.1)
 
     def _close(self) -> None:
-        self._files = []
         with self._held:
             if self._scheduler and self._client.status == "running":  # its workers stay
                 with suppress(OSError, TimeoutError):

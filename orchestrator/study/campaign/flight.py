@@ -35,11 +35,8 @@ class Sender(Protocol):
     def workers(self) -> int:
         """How many there are now."""
 
-    def submit(self, changes: Sequence[Mapping[str, Any]]) -> Future:
-        """Send runs away."""
-
-    def send_files_again(self) -> None:
-        """Do not wait for files that were lost with a worker."""
+    def submit(self, changes: Sequence[Mapping[str, Any]], *, with_files: bool) -> Future:
+        """Send runs away, with all files for a worker that has not had them yet."""
 
     def wait_for_scheduler(self) -> None:
         """Wait for one that has lost everything to be there again."""
@@ -106,8 +103,8 @@ class Flight:
         self._left -= len(points)
         return _Chunk(points) if points else None
 
-    def _submit(self, chunk: _Chunk) -> None:
-        future = self._sender.submit([changes for _, changes in chunk.points])
+    def _submit(self, chunk: _Chunk, *, with_files: bool = False) -> None:
+        future = self._sender.submit([changes for _, changes in chunk.points], with_files=with_files)
         self._flying[future.key] = future, chunk
         future.add_done_callback(self._landed.put)
 
@@ -116,20 +113,20 @@ class Flight:
 
         _, chunk = self._flying.pop(future.key)
         try:
-            rows, seconds = future.result(timeout=_TICK)
+            answer = future.result(timeout=_TICK)
         except TimeoutError:  # its worker died before the result was fetched: it is had again
             self._flying[future.key] = future, chunk
             self._landed.put(future)
         except KilledWorker as error:
-            if error.task == future.key:
-                yield from self._died(chunk, error.allowed_failures + 1)
-            else:  # it was about to give a file to another, and nobody had begun with this chunk
-                self._again.append(chunk)
-                self._sender.send_files_again()
+            yield from self._died(chunk, error.allowed_failures + 1)
         except (CancelledError, OSError):  # what goes wrong on a worker is no OSError
             self._again.append(chunk)
             self._sender.wait_for_scheduler()
         else:
+            if answer is None:  # a worker that has not had the files yet
+                self._submit(chunk, with_files=True)
+                return
+            rows, seconds = answer
             self._pace.took(len(rows), seconds)
             yield from zip(chunk.points, rows, strict=True)
 

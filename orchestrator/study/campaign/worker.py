@@ -25,24 +25,25 @@ _OPEN: dict[str, Unpacked] = {}
 """Studies by the digest of their parcel."""
 
 
-def blob(content: bytes) -> bytes:
-    """What a file holds, as something that workers pass on to each other."""
-    return content
-
-
-def work(parcel: Parcel, points: Sequence[Mapping[str, Any]], contents: Sequence[bytes]) -> tuple[list[Row], float]:
+def work(
+    parcel: Parcel, points: Sequence[Mapping[str, Any]], contents: Sequence[bytes] | None
+) -> tuple[list[Row], float] | None:
     """What comes out of runs, and how long they took in s, without what was to be made ready for them.
+
+    None where this worker has not had the files yet: it is asked again with them, and then has them for all others.
 
     Args:
         parcel: what the study needs.
         points: the changes of each run.
-        contents: of all files.
+        contents: of all files; None does not send them.
 
     Raises:
         RailcosimError: this worker cannot run the study at all.
     """
     with _LOCK:
         if parcel.digest not in _OPEN:
+            if contents is None:
+                return None
             try:
                 _OPEN[parcel.digest] = Unpacked(parcel, contents)
             except OSError as error:

@@ -30,15 +30,6 @@ def test_a_study_is_the_same_on_workers(system, how, tmp_path, scheduler, undist
     assert not worker._OPEN
 
 
-def test_files_that_were_lost_are_sent_again(how, system, scheduler):
-    with pool_for(packed(how, [system], "plain"), scheduler) as made:
-        assert made.submit([{}]).result()[0][0].status == "completed"
-        before = {file.key for file in made._files}
-        made.send_files_again()
-        assert made.submit([{}]).result()[0][0].status == "completed"
-        assert {file.key for file in made._files} == {f"{key}-again" for key in before}
-
-
 def test_what_a_worker_cannot_do_at_all_ends_the_study(system, how, tmp_path, scheduler, monkeypatch):
     monkeypatch.setattr(worker, "this_version", lambda: "0.0.1")
     with pytest.raises(RailcosimError, match=r"a worker has railcosim 0\.0\.1"):

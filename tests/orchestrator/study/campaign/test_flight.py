@@ -39,9 +39,10 @@ class Workers:
 
     def __init__(self, workers=2, *, deadly=(), first=(), allowed=0):
         self.workers, self.deadly, self.first, self.allowed = workers, deadly, list(first), allowed
-        self.sent, self.futures, self.waits, self.lost_files = [], [], 0, 0
+        self.sent, self.futures, self.waits, self.with_files = [], [], 0, []
 
-    def submit(self, changes):
+    def submit(self, changes, *, with_files):
+        self.with_files.append(with_files)
         numbers = [change["n"] for change in changes]
         self.sent.append(numbers)
         outcome = [([Row("completed", steps=number) for number in numbers], 0.1 * len(numbers))]
@@ -51,9 +52,6 @@ class Workers:
             outcome = [self.first.pop(0), *outcome]
         self.futures.append(Future(outcome))
         return self.futures[-1]
-
-    def send_files_again(self):
-        self.lost_files += 1
 
     def wait_for_scheduler(self):
         self.waits += 1
@@ -95,12 +93,12 @@ def test_a_neighbour_that_was_waiting_behind_such_a_run_is_not_blamed():
     assert len(workers.sent) == 8
 
 
-def test_a_file_that_was_lost_is_nobodys_fault():
-    workers = Workers(first=[KilledWorker("a file", None, 0)] * 3)
-    rows = fly(workers, 2)
+def test_files_go_to_who_has_not_had_them():
+    workers = Workers(first=[None, None])
+    rows = fly(workers, 3)
     assert {row.status for row in rows.values()} == {"completed"}
-    assert workers.lost_files == 3
-    assert workers.sent == [[0], [1], [0], [1], [0]]
+    assert workers.sent == [[0], [1], [2], [0], [1]]
+    assert workers.with_files == [False, False, False, True, True]
 
 
 @pytest.mark.parametrize("error", [CancelledError(), OSError("the connection is closed")])

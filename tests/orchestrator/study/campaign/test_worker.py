@@ -41,7 +41,7 @@ end = "final(mine.x) + 10 * final(far.x)"
 
 
 def unpack_all(parcel):
-    return [worker.blob(content) for _, content in parcel.contents()]
+    return [content for _, content in parcel.contents()]
 
 
 @pytest.fixture
@@ -76,7 +76,9 @@ def test_it_runs_where_none_of_the_files_are(study, tmp_path, kind, monkeypatch)
     if kind == "native":  # nor a compiler
         monkeypatch.setattr(models, "package", None)
     assert {path.rpartition("/")[2] for path in parcel.files} == {"study.toml", "mine.py", "gains.py", "slope.json"}
-    rows, seconds = worker.work(parcel.sent(), [{}, {"mine.x": 3.0}], contents)
+    assert worker.work(parcel.sent(), [{}], None) is None
+    worker.work(parcel.sent(), [], contents)
+    rows, seconds = worker.work(parcel.sent(), [{}, {"mine.x": 3.0}], None)
     assert rows[0].error == ""
     assert rows[0].metrics == here.metrics
     assert rows[1].metrics["end"] == pytest.approx(here.metrics["end"] + 2.0)
