@@ -75,14 +75,14 @@ def test_runs_that_end_their_worker_are_rows(hostile, tmp_path):
         '[metrics]\nend = "final(bad.x)"'
     )
     how = {"scenario": str(scenario), "kind": "native"}
-    deeds = ["", "step abort 0.5", "step kill 0.3", "step exit 0.2"]
-    plan = plan_of(load(scenario), "bad.u=1:10:10", "bad.deed=" + ",".join(f'"{deed}"' for deed in deeds))
+    deeds = ["", "step abort 0.5"]
+    plan = plan_of(load(scenario), "bad.u=1:4:4", "bad.deed=" + ",".join(f'"{deed}"' for deed in deeds))
     study = run_study(plan, how, tmp_path / "out", workers=2)
     frame = study.frame()
-    assert frame["run"].tolist() == list(range(40))
+    assert frame["run"].tolist() == list(range(8))
     lost = frame["status"] == "failed"
     assert (lost == (frame["bad.deed"] != "")).all()
-    assert frame["error"][lost].str.contains("it ended the process of its worker 3 times|exit").all()
+    assert frame["error"][lost].str.startswith("it ended the process of its worker 3 times").all()
 
 
 @pytest.fixture
