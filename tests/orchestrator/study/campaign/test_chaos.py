@@ -75,7 +75,7 @@ def test_runs_that_end_their_worker_are_rows(hostile, tmp_path):
         '[metrics]\nend = "final(bad.x)"'
     )
     how = {"scenario": str(scenario), "kind": "native"}
-    deeds = ["", "step abort 0.5"]
+    deeds = ["", "step kill 0.3"]
     plan = plan_of(load(scenario), "bad.u=1:4:4", "bad.deed=" + ",".join(f'"{deed}"' for deed in deeds))
     study = run_study(plan, how, tmp_path / "out", workers=2)
     frame = study.frame()
