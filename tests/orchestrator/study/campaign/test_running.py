@@ -156,6 +156,8 @@ def test_another_scenario_is_another_study(undisturbed, system, how, scenario):
 def test_what_cannot_run_at_all_is_refused_and_leaves_nothing(system, how, tmp_path):
     with pytest.raises(ScenarioError, match="gane"):
         run_study(plan_of(system, "lag.gane=1,2,3"), how, tmp_path / "none", workers=0)
+    with pytest.raises(ScenarioError, match=r"0\.05 s is not a whole number of steps"):
+        run_study(plan_of(system, "simulation.stop_time=0.05,0.07"), how, tmp_path / "none", workers=0)
     assert not (tmp_path / "none").exists()
 
 
