@@ -16,7 +16,7 @@ from ..names import SignalName
 from ..problems import Problem, suggestion
 from ..run import Checked, Flown, Interruption, Repeater, Revision, listening, signal_names
 from ..system import System
-from .rows import Outcomes, Row, margins
+from .rows import Outcomes, Row, margins, scaled
 
 
 class Batch:
@@ -135,6 +135,7 @@ class Batch:
             metrics,
             {verdict.name: verdict.verdict for verdict in verdicts},
             margins(verdicts),
+            scaled(verdicts),
             series={name: columns[name] for name in ("time", *self._record)} if self._record else None,
             steps=flown.steps,
             seconds=world.perf_counter() - begin,

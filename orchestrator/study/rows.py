@@ -23,7 +23,7 @@ class Row:
         metrics: by flat name (``"settling"``, ``"gap_min[2]"``); NaN where one has no value.
         verdicts: ``"pass"``, ``"fail"`` or ``"inconclusive"`` by requirement.
         margins: the worst slack by requirement, in the unit of what is compared; NaN where there is none.
-        scaled: margins that compare across requirements, where they are known.
+        scaled: margins in sizes of what is compared, which compare across requirements; NaN where there is none.
         series: ``"time"`` in s and the signals that were asked for, shape (points,); None where none were.
         steps: communication steps taken. seconds: wall time.
     """
@@ -82,3 +82,8 @@ class Outcomes:
 def margins(verdicts: Iterable[Verdict]) -> dict[str, float]:
     """Margins by requirement; NaN where there is none."""
     return {verdict.name: np.nan if verdict.margin is None else verdict.margin for verdict in verdicts}
+
+
+def scaled(verdicts: Iterable[Verdict]) -> dict[str, float]:
+    """Margins in sizes of what is compared, by requirement; NaN where there is none."""
+    return {verdict.name: np.nan if verdict.robustness is None else verdict.robustness for verdict in verdicts}

@@ -13,7 +13,7 @@ from .shrinking import shrink
 from .space import Space
 
 Told = Callable[[int, int, float], None]
-"""Told of each run: how many there were, of how many, and the least margin so far."""
+"""Told of each run: how many there were, of how many, and the least margin so far, in the unit of what is compared."""
 
 
 @dataclass(frozen=True)
@@ -76,7 +76,7 @@ def search(
         if evaluation.breaks(requirement) or score < least:
             nearest, least = evaluation, score
         if told is not None:
-            told(count, budget, least)
+            told(count, budget, math.nan if nearest is None else nearest.margins.get(requirement, math.nan))
         return score
 
     def is_broken() -> bool:

@@ -34,6 +34,8 @@ def agree(row, run):
     assert row.verdicts == {one.name: one.verdict for one in run.requirements}
     margins = [np.nan if one.margin is None else one.margin for one in run.requirements]
     np.testing.assert_array_equal(list(row.margins.values()), margins)
+    scaled = [np.nan if one.robustness is None else one.robustness for one in run.requirements]
+    np.testing.assert_array_equal(list(row.scaled.values()), scaled)
     assert row.steps == run.seconds["steps"]
     for name, values in (row.series or {}).items():
         np.testing.assert_array_equal(values, run.time if name == "time" else run[name])
