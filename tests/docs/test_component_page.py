@@ -34,7 +34,7 @@ def test_a_page_tells_all_that_is_declared(without_figure, name):
 def test_a_row_of_each_table_by_hand(without_figure):
     page = without_figure.page(ComfortCruise)
     assert "| `ahead_speed` | m/s | 0 | yes | speed of the train ahead |" in page
-    assert "| `beta` | 1/s | 0.0342857 | ≥ 0 | gain on speed differences to the neighbours |" in page
+    assert "| `beta` | 1/s | 0.0342857 | ≥ 0 | yes | gain on speed differences to the neighbours |" in page
     degraded = "`has_ahead`, `has_behind`, `has_leader`, `ahead_age`, `behind_age`, `leader_age`"
     assert f"| `degraded` | boolean | {degraded} | whether a neighbour's data is too old to be extrapolated |" in page
 

@@ -50,7 +50,7 @@ def test_the_record_identifies_models_data_and_program(files):
     _, record, _, _ = files
     train = record["instances"]["train"]
     assert train["digest"] == hashlib.sha256(build("PointMassTrain", kind="python").read_bytes()).hexdigest()
-    assert (train["model"], train["kind"], train["start"]) == ("PointMassTrain", "python", {"speed": 20.0})
+    assert (train["model"], train["kind"], train["start"]) == ("PointMassTrain", "python", {"speed_start": 20.0})
     assert record["instances"]["timetable"]["build"] == {"points": 2}
     assert record["versions"].keys() >= {"railcosim", "fmpy", "pythonfmu", "numpy"}
     assert record["scenario_text"] == "title = 'T'"

@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 from railcosim.orchestrator import load, world
 from railcosim.orchestrator.cli import app as cli
-from railcosim.orchestrator.cli import runs
+from railcosim.orchestrator.cli import printing
 from railcosim.orchestrator.cli.printing.progress import Shown
 from railcosim.orchestrator.errors import FmuError
 from railcosim.orchestrator.run import checkpoint, session
@@ -291,7 +291,7 @@ def test_an_interrupted_run_says_how_to_go_on(orchestrate, scenario, tmp_path, m
 
     out = tmp_path / "out"
     with monkeypatch.context() as patch:
-        patch.setattr(runs, "show_progress", pressing)
+        patch.setattr(printing, "show_progress", pressing)
         code, said, _ = orchestrate("run", scenario, "--kind", "plain", "--checkpoint-every", 1, "-o", out)
     assert code == 130
     assert "interrupted at t = 2.6 s of 4 s\n" in said

@@ -64,7 +64,7 @@ def test_only_what_may_differ_is_checked_again(system, checks, one, other, count
         {"a.rate": [1.0, 2.0]},
         {"a.rate": float("inf")},
         {"events[1].value": "on"},
-        {"c.sample_time": 0.2},
+        {"c.sample_time": 1e-12},
     ],
 )
 def test_what_is_wrong_is_told_as_of_a_single_run(system, wrong):
