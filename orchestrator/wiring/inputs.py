@@ -129,11 +129,13 @@ def unmet_samples(
         if not interface.annotation or not sample or not isinstance(sample, int | float):
             continue
         step = system.instances[name].step or system.stepping.step
-        if not _is_multiple(step, sample):
-            what = f"step {digits(step)} s is not a whole multiple of its sample_time {digits(sample)} s"
+        countable = step / sample < _COUNTABLE
+        if not countable or not _is_multiple(step, sample):
+            not_met = "not a whole multiple" if countable else "too great a multiple"
+            what = f"step {digits(step)} s is {not_met} of its sample_time {digits(sample)} s"
             remedy = f"set step or {name}.sample_time"
             problem = Problem(name, f"the communication {what}", remedy, (SignalName(name),))
-            yield problem.at(system.instances[name].origin), step / sample < _COUNTABLE
+            yield problem.at(system.instances[name].origin), countable
 
 
 def check_sampling(system: System, interfaces: Mapping[str, Interface], wiring: Wiring) -> None:

@@ -133,7 +133,7 @@ def test_a_sample_time_that_was_set_counts(resolve, mine):
 def test_a_sample_time_that_divides_nothing(resolve, mine):
     system = System(step=0.3)
     system.add("it", mine("Needy"), needed=0.0, needed_row=0.0, sample_time=1e-320)
-    assert "is not a whole multiple of its sample_time 1e-320 s; set step" in str(resolve(system).problems[0])
+    assert "is too great a multiple of its sample_time 1e-320 s; set step" in str(resolve(system).problems[0])
 
 
 @pytest.mark.parametrize("own", ["", "String"])
