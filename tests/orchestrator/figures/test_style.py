@@ -6,7 +6,7 @@ import sys
 from pathlib import Path
 
 import pytest
-from railcosim.orchestrator.figures.style import _folded, wrapped
+from railcosim.orchestrator.figures.style import _folded, page, wrapped
 
 
 def test_many_curves_are_coloured_by_order(drawn):
@@ -70,3 +70,10 @@ def test_a_title_is_no_wider_than_its_panel():
     text = "a title of a panel " * 12
     assert max(map(len, wrapped(text, 7.8).splitlines())) <= 94
     assert wrapped(text + "$x = 1$", 7.8) == text + "$x = 1$"
+
+
+@pytest.mark.parametrize("ending", ["png", "svg"])
+def test_panels_beside_one_another_leave_no_empty_one(tmp_path, ending):
+    with page("Three", 3, tmp_path / f"three.{ending}", size=(6.0, 4.0), columns=2) as axes:
+        assert len(axes) == len(axes[0].figure.axes) == 3
+    assert (tmp_path / f"three.{ending}").stat().st_size > 1000

@@ -20,6 +20,12 @@ def test_a_study_is_what_it_was(undisturbed):
     assert study.table(["seed"]).column_names == ["run", "seed"]
 
 
+def test_pictures_of_a_study_that_recorded_nothing(undisturbed):
+    drawn = undisturbed.draw()
+    assert drawn
+    assert all(path.parent == undisturbed.directory and path.is_file() for path in drawn)
+
+
 def test_what_is_not_there_is_said(undisturbed, tmp_path):
     with pytest.raises(ScenarioError, match="run 6 is none of its 6, 0 to 5"):
         undisturbed.row(6)
