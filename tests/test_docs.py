@@ -26,7 +26,7 @@ PAGES = [
 MADE = ("components/", "reference/command_line.md")
 """Pages of the site that docs/generate.py makes; tests/docs has them."""
 BLOCK = re.compile(r"^```(console|python|toml|diff)\n(.*?)^```$", re.MULTILINE | re.DOTALL)
-FILE = re.compile(r"# ([\w/-]+\.(?:py|toml))\n")
+FILE = re.compile(r"# ([\w/-]+\.(?:pyi?|toml))\n")
 CHECKOUT = "<!-- in a checkout -->"
 PACKAGES = ("components", "fmus", "models", "orchestrator")
 FLAGS = doctest.ELLIPSIS | doctest.NORMALIZE_WHITESPACE
