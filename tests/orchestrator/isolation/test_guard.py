@@ -97,6 +97,8 @@ def test_the_last_of_what_it_printed_is_told_however_much_that_was(apart, log):
 # -------------------------------------------------------------------- what it may not
 
 
+OUTLIVED = r"did not return from fmi2DoStep within 1 s; its process was ended"
+"""What is told where a thread of a library (NumPy has one) outlives the thread that the FMU has ended."""
 NO_LINE = "its process lost its line to the master in fmi2DoStep or before: the FMU closes descriptors that are not its"
 
 
@@ -118,7 +120,7 @@ NO_LINE = "its process lost its line to the master in fmi2DoStep or before: the 
                 "send_frame": r"did not return from what it was asked for within 1 s; its process was ended",
                 "_exit0": r"its process ended in fmi2DoStep \(exit code 0\)",
                 "thread_exit": r"its process ended in fmi2DoStep \(exit code 7\)",
-                "end_thread": r"its process ended in fmi2DoStep \(exit code 0\)",
+                "end_thread": rf"(its process ended in fmi2DoStep \(exit code 0\)|{OUTLIVED})",
                 "daemon": r"its process ended in fmi2DoStep \(exit code 0\)",
                 "divide": r"its process crashed in fmi2DoStep \(SIGFPE\)",
                 "trap": r"its process crashed in fmi2DoStep \(SIGILL\)",
@@ -127,14 +129,15 @@ NO_LINE = "its process lost its line to the master in fmi2DoStep or before: the 
                 "raise_1": r"its process was ended in fmi2DoStep by a signal \(SIGHUP\)",
                 "raise_19": r"did not return from fmi2DoStep within 1 s; its process was ended",
                 "kill_group": r"its process was killed in fmi2DoStep \(SIGKILL\), most likely by the system",
-                "seccomp": r"its process was killed in fmi2DoStep \(SIGKILL\), most likely by the system",
+                "seccomp": rf"(its process was killed in fmi2DoStep \(SIGKILL\), most likely by the system|{OUTLIVED})",
                 "exec": r"its process left in fmi2DoStep and was ended",
             }.items()
         ),
     ],
 )
 def test_what_ends_it_is_told_and_its_own_log_is_not_written_into(apart, log, deed, told):
-    error = live(apart(begun=True, step_timeout=60.0 if deed == "exec" else 1.0), deed)
+    hangs = "did not return" in told  # the others end by themselves, later on a busy machine
+    error = live(apart(begun=True, step_timeout=1.0 if hangs else 60.0), deed)
     assert re.match(rf"it, t = 0(\.5)? s: {told}", str(error))
     assert not log.exists() or log.read_text() == "mine\n"
     assert not left(log)

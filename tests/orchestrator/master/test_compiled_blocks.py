@@ -42,7 +42,7 @@ def test_blocks_are_short_in_time(workspace, odd, ring, instantiated):
 
 ENDLESS = """
 import sys
-from railcosim.orchestrator.system import Event, System
+from railcosim.orchestrator import System, run
 system = System(stop_time=1e9, step=0.25, record=25.0)
 system.add("a", sys.argv[1], u=1.5)
 system.add("b", sys.argv[1], v=0.5)
