@@ -17,6 +17,7 @@ from collections.abc import Callable, Iterable, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+import numpy  # noqa: F401 (before the guard forks: its threads stay there, and an FMU that ends its thread ends the process)
 import psutil
 
 from .. import world
