@@ -47,8 +47,8 @@ class Verdict:
     """How one requirement came out.
 
     `margin` is the worst slack, in the unit of the compared quantities; None when there is none (nothing was judged,
-    or a boolean decided). `time` [s] and `index` are where the worst was seen, `points` how many recorded points were
-    judged, `reason` why it is inconclusive or what was NaN. `robustness` is the margin where every comparison is
+    or a boolean decided). `time` [s] and `index` are where the worst was seen, `points` how many points were judged,
+    `reason` why it is inconclusive or what was NaN. `robustness` is the margin where every comparison is
     divided by a size that counts in its unit, so that those of unlike signals compare; `blame` has the signals of the
     comparison that decided.
     """

@@ -31,7 +31,7 @@ def show_requirements(out: Console, verdicts: Sequence[Verdict]) -> None:
     show_reasons(out, "because", ((v.name, v.reason) for v in verdicts if v.reason))
     blamed = ((v.name, " and ".join(v.blame)) for v in verdicts if v.verdict == "fail" and v.blame)
     show_reasons(out, "decided by", blamed)
-    say(out, "Requirements are judged at the recorded points.", "dim")
+    say(out, "Requirements are judged at every communication point.", "dim")
 
 
 def show_values(out: Console, title: str, groups: Mapping[str, Sequence[ComparedValue]]) -> None:

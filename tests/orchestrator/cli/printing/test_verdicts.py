@@ -25,7 +25,7 @@ def test_a_requirement_shows_verdict_margin_and_the_worst_place(shown):
     lines = shown(show_requirements, verdicts)
     assert any(re.fullmatch(r"spacing +fail +-759 +140\.2 s, i = 4 +always a < b", line) for line in lines)
     assert "because: the window is not covered (later)" in lines
-    assert "Requirements are judged at the recorded points." in lines
+    assert "Requirements are judged at every communication point." in lines
 
 
 @pytest.mark.parametrize("width", [160, 80, 70])
