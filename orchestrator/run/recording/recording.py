@@ -7,7 +7,6 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ...errors import ScenarioError
 from ...evaluation import Signals
@@ -15,6 +14,7 @@ from ...master import Rows
 from .columns import Columns
 from .recorder import ROWS_FILE, SEEN_FILE, Recorder, checksum_of
 from .results import Results
+from .seen import Seen
 from .stored import open_stored
 
 _FILES = (ROWS_FILE, SEEN_FILE)
@@ -105,33 +105,10 @@ class Recording:
 
     def judged(self, results: Results) -> Signals:
         """What metrics and requirements look at: every point."""
-        return results if len(self._recorders) == 1 else _Judged(results, self._recorders[1].columns())
-
-
-class _Judged:
-    """Signals at every point, although fewer are results."""
-
-    def __init__(self, results: Results, columns: Columns) -> None:
-        self._results, self._columns = results, columns
-        self.step, self.completed, self.stop_time = results.step, results.completed, results.stop_time
-        self.units, self.parameters = results.units, results.parameters
-
-    @property
-    def time(self) -> NDArray[np.float64]:
-        return self._columns["time"]
-
-    @property
-    def points(self) -> int:
-        return self._columns.points
-
-    def part(self, first: int, last: int) -> Mapping[str, NDArray[Any]]:
-        return self._columns.part(first, last)
-
-    def names(self) -> Collection[str]:
-        return self._results.names()
-
-    def __getitem__(self, name: str) -> NDArray[Any]:
-        return self._columns[name]
+        if len(self._recorders) == 1:
+            return results
+        told = (results.step, results.completed, results.stop_time, results.units, results.parameters)
+        return Seen(self._recorders[1].columns(), results.names(), *told)
 
 
 def check_stored(directory: Path, record: Mapping[str, Any], marks: Sequence[Sequence[int]]) -> list[int]:
