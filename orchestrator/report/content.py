@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+import hashlib
+from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -12,7 +13,7 @@ from numpy.typing import NDArray
 
 from ..errors import RailcosimError
 from ..evaluation import Judge
-from ..figures import Curve, bracketed, curves_of, filled_title, panels_of
+from ..figures import bracketed, curves_of, filled_title, panels_of
 from ..run import Results, read_metrics, read_record
 from .payload import Packed, is_even, pack
 from .trains import gradients_of, trains_of
@@ -29,16 +30,23 @@ class Columns:
 
     packed: list[Packed] = field(default_factory=list)
     told: list[dict[str, Any]] = field(default_factory=list)
+    _known: dict[bytes, int] = field(default_factory=dict)
 
     def add(self, values: NDArray[Any]) -> int:
-        """Pack a column; its number."""
+        """Pack a column, if it is not there yet; its number."""
         words: dict[str, int] = {}
         if values.dtype.kind not in "fiub":  # texts: numbered in the order in which they come
             values = np.array([words.setdefault(str(word), len(words)) for word in values], dtype=np.float64)
-        column = pack(values)
+        numbers = np.ascontiguousarray(values, dtype=np.float64)
+        digest = hashlib.sha256(numbers.data.cast("B") if len(numbers) else b"")
+        digest.update("\0".join(words).encode(errors="surrogatepass"))
+        known = self._known.setdefault(digest.digest(), len(self.packed))
+        if known < len(self.packed):
+            return known
+        column = pack(numbers)
         self.packed.append(column)
         self.told.append({"points": len(values), "offset": column.offset} | ({"words": list(words)} if words else {}))
-        return len(self.packed) - 1
+        return known
 
     @property
     def loss(self) -> float:
@@ -48,13 +56,19 @@ class Columns:
 
 @dataclass(frozen=True)
 class Content:
-    """One run: its directory, run.json, metrics.json, signals, and the place of each in the page's columns."""
+    """One run.
+
+    Attributes:
+        directory: of the run. record, metrics: run.json and metrics.json. results: its signals.
+        places: the number of each among the page's columns. steps: those that are no Reals, which change in steps.
+    """
 
     directory: Path
     record: Mapping[str, Any]
     metrics: Mapping[str, Any]
     results: Results
     places: Mapping[str, int]
+    steps: Collection[str]
 
     @property
     def title(self) -> str:
@@ -69,9 +83,13 @@ def read_content(directory: Path, columns: Columns) -> Content:
         ScenarioError: there is no run that can be read.
     """
     record, results = read_record(directory), Results.load(directory)
-    return Content(
-        directory, record, read_metrics(directory), results, {name: columns.add(results[name]) for name in results}
-    )
+    places, steps = {}, set()
+    for name in results:  # each is read once: large ones stand in a file
+        values = results[name]
+        places[name] = columns.add(values)
+        if values.dtype.kind != "f":
+            steps.add(name)
+    return Content(directory, record, read_metrics(directory), results, places, steps)
 
 
 def shown(contents: Sequence[Content], names: Sequence[str], columns: Columns) -> dict[str, Any]:
@@ -114,7 +132,7 @@ def _signals(contents: Sequence[Content]) -> list[dict[str, Any]]:
             "unit": own.results.units.get(name, ""),
             "columns": [content.places.get(name) for content in contents],
         }
-        found.append(told | ({} if own.results[name].dtype.kind == "f" else {"steps": True}))
+        found.append(told | ({"steps": True} if name in own.steps else {}))
     return found
 
 
@@ -160,21 +178,9 @@ def _lines(
             "look": [run, k] if prefix else [k, 0],
             "unit": curve.unit if scale == 1.0 else "",
             "curve_unit": curve.unit if scale == 1.0 else "",
-            **_columns_of(curve, scale, content, columns),
+            "column": columns.add(curve.y * scale),
+            **({} if len(curve.y) == content.results.points else {"x": columns.add(curve.x)}),
         }
-
-
-def _columns_of(curve: Curve, scale: float, content: Content, columns: Columns) -> dict[str, int]:
-    """Where the numbers of a curve are: those of a signal as it is stand in the page already."""
-    results = content.results
-    if scale == 1.0 and len(curve.y):
-        for name, place in content.places.items():
-            own = results[name]
-            alike = own.dtype.kind == "f" and len(own) == len(curve.y) and own[-1] == curve.y[-1]
-            if alike and np.array_equal(own, curve.y, equal_nan=True):
-                return {"column": place}
-    column = columns.add(curve.y * scale)
-    return {"column": column} if len(curve.y) == results.points else {"column": column, "x": columns.add(curve.x)}
 
 
 def _bands(record: Mapping[str, Any]) -> Iterator[dict[str, Any]]:

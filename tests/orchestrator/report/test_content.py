@@ -106,6 +106,13 @@ def test_texts_are_numbered(tmp_path):
     assert columns.told[place]["words"] == ["go", "stop"]
 
 
+def test_equal_columns_are_packed_once():
+    columns = Columns()
+    numbers, words = np.array([0.0, 1.0, 0.0]), np.array(["go", "stop", "go"], dtype=object)
+    assert [columns.add(x) for x in (numbers, numbers.astype(bool), words, numbers + 1.0, words)] == [0, 0, 1, 2, 1]
+    assert len(columns.packed) == len(columns.told) == 3
+
+
 def test_a_run_that_failed(wavy, mine, tmp_path):
     system = wavy()
     system.add("fails", mine("Fails"), until=5.0)
