@@ -21,9 +21,9 @@ ALL = [signal.SIGINT, signal.SIGTERM, signal.SIGHUP]
 
 @pytest.fixture
 def quick(monkeypatch):
-    """Less patience."""
+    """Signals that come quickly are two; and there is time to answer them, or the tests themselves would end."""
     monkeypatch.setattr(interruption, "_TOGETHER", 0.02)
-    monkeypatch.setattr(interruption, "_PATIENCE", 0.05)
+    monkeypatch.setattr(interruption, "_PATIENCE", 60.0)
 
 
 def send(*times, number=signal.SIGINT):
@@ -122,6 +122,7 @@ def test_a_second_one_is_an_exception(quick):
 def test_one_that_finds_no_way_back_to_python_ends_the_process(quick, monkeypatch, caplog):
     """Here the process goes on after its end, so that the test can see it."""
     ends, saved = [], []
+    monkeypatch.setattr(interruption, "_PATIENCE", 0.05)
     monkeypatch.setattr(world, "exit_at_once", ends.append)
     it = Interruption(lambda why: saved.append(why) or 1 / 0)
     with pytest.raises(KeyboardInterrupt):
