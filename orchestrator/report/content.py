@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Collection, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -60,7 +60,7 @@ class Content:
 
     Attributes:
         directory: of the run. record, metrics: run.json and metrics.json. results: its signals.
-        places: the number of each among the page's columns. steps: those that are no Reals, which change in steps.
+        places: the number of each among the page's columns.
     """
 
     directory: Path
@@ -68,7 +68,6 @@ class Content:
     metrics: Mapping[str, Any]
     results: Results
     places: Mapping[str, int]
-    steps: Collection[str]
 
     @property
     def title(self) -> str:
@@ -83,13 +82,8 @@ def read_content(directory: Path, columns: Columns) -> Content:
         ScenarioError: there is no run that can be read.
     """
     record, results = read_record(directory), Results.load(directory)
-    places, steps = {}, set()
-    for name in results:  # each is read once: large ones stand in a file
-        values = results[name]
-        places[name] = columns.add(values)
-        if values.dtype.kind != "f":
-            steps.add(name)
-    return Content(directory, record, read_metrics(directory), results, places, steps)
+    places = {name: columns.add(results[name]) for name in results}
+    return Content(directory, record, read_metrics(directory), results, places)
 
 
 def shown(contents: Sequence[Content], names: Sequence[str], columns: Columns) -> dict[str, Any]:
@@ -132,7 +126,7 @@ def _signals(contents: Sequence[Content]) -> list[dict[str, Any]]:
             "unit": own.results.units.get(name, ""),
             "columns": [content.places.get(name) for content in contents],
         }
-        found.append(told | ({"steps": True} if name in own.steps else {}))
+        found.append(told | ({"steps": True} if name in own.record["texts"] else {}))
     return found
 
 

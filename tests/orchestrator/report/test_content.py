@@ -106,6 +106,15 @@ def test_texts_are_numbered(tmp_path):
     assert columns.told[place]["words"] == ["go", "stop"]
 
 
+def test_texts_change_in_steps(mine, tmp_path):
+    system = System(stop_time=1.0, step=0.1)
+    system.add("word", mine("Word"))
+    system.add("wave", mine("Wave"))
+    run(system, kind="plain", output=tmp_path / "run", figures=False)
+    data, _ = told(tmp_path / "run")
+    assert [signal["name"] for signal in data["signals"] if signal.get("steps")] == ["word.word"]
+
+
 def test_equal_columns_are_packed_once():
     columns = Columns()
     numbers, words = np.array([0.0, 1.0, 0.0]), np.array(["go", "stop", "go"], dtype=object)
