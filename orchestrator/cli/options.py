@@ -71,6 +71,14 @@ Isolate = Annotated[
     ),
 ]
 
+Workers = Annotated[
+    int | None,
+    typer.Option(min=0, help="Processes that run; as many as processors by default, 0 for this one alone."),
+]
+Scheduler = Annotated[
+    str | None, typer.Option(metavar="ADDRESS", help="A Dask scheduler to use instead: tcp://host:8786.")
+]
+
 
 class FormatName(StrEnum):
     """`figures.FORMATS`, as the command line needs them."""
@@ -114,6 +122,12 @@ def build_arguments(builds: list[str] | None) -> dict[str, Any]:
             raise ScenarioError(f"--with {text}: write NAME=VALUE, as in --with carriages=8")
         arguments[name.strip()] = parse_value(value)
     return arguments
+
+
+def check_workers(workers: int | None, scheduler: str | None) -> None:
+    """Refuse a number of workers for a scheduler, which has its own."""
+    if scheduler is not None and workers is not None:
+        raise typer.BadParameter("the scheduler has the workers that it has.", param_hint="'--workers'")
 
 
 def load_system(

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+from contextlib import contextmanager
 from enum import StrEnum
 from pathlib import Path
 from typing import Annotated, Any
@@ -20,11 +22,15 @@ from .options import (
     Preset,
     Quiet,
     Scenario,
+    Scheduler,
     Set,
     Step,
     Stop,
     Swap,
     With,
+    Workers,
+    check_workers,
+    interrupted,
     load_system,
 )
 
@@ -62,6 +68,8 @@ def falsify(
         MethodName, typer.Option(help="How to search: CMA-ES, the tree-structured Parzen estimator, or at random.")
     ] = MethodName.cma_es,
     seed: Seed = 0,
+    workers: Workers = None,
+    scheduler: Scheduler = None,
     resume: Resume = False,
     preset: Preset = None,
     settings: Set = None,
@@ -81,15 +89,17 @@ def falsify(
 
     What is found is a scenario, counterexample.toml; as many runs as the budget may be spent on making it small.
 
-    Exit codes: 0 not broken within the budget; 1 broken; 2 the input is wrong; 3 not broken, but runs failed.
+    Exit codes: 0 not broken within the budget; 1 broken; 2 the input is wrong; 3 not broken, but runs failed; 130
+    interrupted by Ctrl-C, 143 by SIGTERM, 129 by SIGHUP: --resume goes on.
     """
     from ..study.search import falsify as search
     from .printing import show_falsified, show_search
 
+    check_workers(workers, scheduler)
     system = load_system(scenario, preset, settings, builds, swaps, stop=stop, step=step)
     name = requirement or _only_requirement(system)
     directory = output or _directory("falsify", system, preset, name)
-    with show_search(f"{system.provenance.name}: {name}", quiet) as progress:
+    with show_search(f"{system.provenance.name}: {name}", quiet) as shown, _resumable():
         result = search(
             system,
             vary or (),
@@ -101,7 +111,10 @@ def falsify(
             kind=kind.value,
             resume=resume,
             figures=not no_figures,
-            progress=progress,
+            scheduler=scheduler,
+            workers=workers,
+            progress=shown.progress,
+            begun=shown.begun,
         )
     show_falsified(result, quiet)
     raise typer.Exit(FAILED if result.found.found else FMU_FAILED if result.found.failed else OK)
@@ -122,6 +135,8 @@ def optimize(
     ] = None,
     budget: Budget = 500,
     seed: Seed = 0,
+    workers: Workers = None,
+    scheduler: Scheduler = None,
     resume: Resume = False,
     preset: Preset = None,
     settings: Set = None,
@@ -141,17 +156,19 @@ def optimize(
     One objective is searched for by the tree-structured Parzen estimator and gives best.toml, several by NSGA-II and
     give a Pareto front of scenarios, pareto-1.toml and so on.
 
-    Exit codes: 0 found; 1 no run keeps the requirements; 2 the input is wrong; 3 none keeps them, and runs failed.
+    Exit codes: 0 found; 1 no run keeps the requirements; 2 the input is wrong; 3 none keeps them, and runs failed; 130
+    interrupted by Ctrl-C, 143 by SIGTERM, 129 by SIGHUP: --resume goes on.
     """
     from ..study.search import optimize as search
     from .printing import show_optimized, show_search
 
+    check_workers(workers, scheduler)
     if not objectives:
         raise ScenarioError(Problem("", "nothing is to be least", "name a metric, as in --minimize settling"))
     system = load_system(scenario, preset, settings, builds, swaps, stop=stop, step=step)
     directory = output or _directory("optimize", system, preset)
     how: Any = {"requirements": requirements or (), "budget": budget, "seed": seed, "kind": kind.value}
-    with show_search(system.provenance.name, quiet) as progress:
+    with show_search(system.provenance.name, quiet) as shown, _resumable():
         result = search(
             system,
             vary or (),
@@ -160,10 +177,27 @@ def optimize(
             **how,
             resume=resume,
             figures=not no_figures,
-            progress=progress,
+            scheduler=scheduler,
+            workers=workers,
+            progress=shown.progress,
+            begun=shown.begun,
         )
     show_optimized(result, quiet)
     raise typer.Exit(OK if result.found.best else FMU_FAILED if result.found.failed else FAILED)
+
+
+@contextmanager
+def _resumable() -> Iterator[None]:
+    """Tell how a search that a signal ended is gone on with, and end as signals do."""
+    from ..study.search import InterruptedSearch
+    from .lines import tell
+
+    try:
+        yield
+    except InterruptedSearch as end:
+        if end.directory is not None:
+            tell(f"interrupted; to go on: the same command with --resume -o {end.directory}")
+        raise typer.Exit(interrupted(end.signal)) from None
 
 
 def _only_requirement(system: System) -> str:

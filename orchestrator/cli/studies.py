@@ -19,11 +19,14 @@ from .options import (
     Preset,
     Quiet,
     Scenario,
+    Scheduler,
     Set,
     Step,
     Stop,
     Swap,
     With,
+    Workers,
+    check_workers,
     interrupted,
     load_system,
 )
@@ -63,13 +66,8 @@ def study(
         list[str] | None,
         typer.Option("--record", metavar="SIGNAL", help="Keep a signal over time: 'train[1].speed'; repeatable."),
     ] = None,
-    workers: Annotated[
-        int | None,
-        typer.Option(min=0, help="Processes that run; as many as processors by default, 0 for this one alone."),
-    ] = None,
-    scheduler: Annotated[
-        str | None, typer.Option(metavar="ADDRESS", help="A Dask scheduler to use instead: tcp://host:8786.")
-    ] = None,
+    workers: Workers = None,
+    scheduler: Scheduler = None,
     resume: Annotated[bool, typer.Option("--resume", help="Go on with the study in the directory.")] = False,
     output: Annotated[
         Path | None, typer.Option("--output", "-o", help="Directory; results/<scenario>-study by default.")
@@ -89,8 +87,7 @@ def study(
     from .lines import tell
     from .printing import show_runs, show_study
 
-    if scheduler is not None and workers is not None:
-        raise typer.BadParameter("the scheduler has the workers that it has.", param_hint="'--workers'")
+    check_workers(workers, scheduler)
     system = load_system(scenario, preset, settings, builds, swaps, stop=stop, step=step, algorithm=algorithm)
     plan = make_plan(system, vary or (), runs=runs, seed=seed, design=design)
     how: dict[str, Any] = {

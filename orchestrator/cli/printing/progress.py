@@ -7,6 +7,7 @@ import sys
 import threading
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
+from typing import TYPE_CHECKING
 
 from ....fmus import toolchain
 from ...run import CSV_FILE, Telling
@@ -14,6 +15,9 @@ from ...run import Progress as OnProgress
 from ...times import digits
 from ..lines import printable, tell
 from .console import open_console
+
+if TYPE_CHECKING:
+    from ...study.campaign import Pool
 
 
 class Shown:
@@ -159,3 +163,9 @@ def _lines(title: str, start: float, reached: float) -> OnProgress:
             tell(f"{title}: {10 * told} % of {digits(stop - start, start, stop)} s")
 
     return show
+
+
+def tell_pool(pool: Pool) -> None:
+    """Where one can look at what workers do."""
+    if pool.dashboard:
+        tell(f"what the workers do: {pool.dashboard}")

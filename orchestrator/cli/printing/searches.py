@@ -6,26 +6,42 @@ import math
 import sys
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
+from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 from rich.console import Console
 
 from ..lines import and_figures, counted, tell
 from .console import open_console, say
+from .progress import tell_pool
 from .tables import table
 
 if TYPE_CHECKING:
+    from ...study import Pool
     from ...study.search import Falsified, Optimized
 
 _MOST_LINES = 12
 """So many points of a Pareto front are shown; all are files."""
 
 
+@dataclass
+class ShownSearch:
+    """What is told of a search while it goes on.
+
+    Attributes:
+        progress: is called with how many runs are done, of how many, and what is best so far.
+        begun: is called with the workers once they are there.
+    """
+
+    progress: Callable[[int, int, str], None]
+    begun: Callable[[Pool], None]
+
+
 @contextmanager
-def show_search(title: str, quiet: bool) -> Iterator[Callable[[int, int, str], None]]:
+def show_search(title: str, quiet: bool) -> Iterator[ShownSearch]:
     """A bar over the runs of a search on a terminal, a line each 10 % otherwise, nothing when quiet."""
     if quiet:
-        yield lambda *_: None
+        yield ShownSearch(lambda *_: None, lambda _: None)
     elif sys.stderr.isatty():
         from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn, TimeRemainingColumn
 
@@ -33,11 +49,13 @@ def show_search(title: str, quiet: bool) -> Iterator[Callable[[int, int, str], N
         out = open_console(stderr=True)
         with Progress(*columns, TimeElapsedColumn(), TimeRemainingColumn(), console=out, transient=True) as bar:
             task = bar.add_task(title, total=None, told="")
-            yield lambda done, of, best: bar.update(
-                task, completed=done, total=of, told=", ".join(filter(None, (f"{done} of {of} runs", best)))
-            )
+
+            def show(done: int, of: int, best: str) -> None:
+                bar.update(task, completed=done, total=of, told=", ".join(filter(None, (f"{done} of {of} runs", best))))
+
+            yield ShownSearch(show, tell_pool)
     else:
-        yield _lines(title)
+        yield ShownSearch(_lines(title), tell_pool)
 
 
 def _lines(title: str) -> Callable[[int, int, str], None]:

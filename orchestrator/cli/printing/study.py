@@ -17,7 +17,7 @@ from rich.text import Text
 from ...study.analysis import SHARES, Estimate, Influence, Kept, Sensitivity, Spread, Summary, outputs_of, sensitivity
 from ..lines import and_figures, counted, tell
 from .console import open_console, say
-from .progress import show_compilations
+from .progress import show_compilations, tell_pool
 from .tables import SIDE_BY_SIDE, fits, table
 
 if TYPE_CHECKING:
@@ -179,10 +179,10 @@ def show_runs(title: str, quiet: bool) -> Iterator[ShownRuns]:
                 runs = f"{done} of {counted(count, 'run')}{f', {failed} failed' if failed else ''}"
                 bar.update(task, completed=done, total=count, runs=runs)
 
-            yield ShownRuns(show, _tell_pool)
+            yield ShownRuns(show, tell_pool)
     else:
         with show_compilations(quiet):
-            yield ShownRuns(_lines(title), _tell_pool)
+            yield ShownRuns(_lines(title), tell_pool)
 
 
 def show_study(study: Study, quiet: bool, figures: int = 0) -> None:
@@ -206,11 +206,6 @@ def show_study(study: Study, quiet: bool, figures: int = 0) -> None:
     if not quiet:
         files = "runs.parquet, study.json" + ", series.parquet" * bool(told["how"].get("record"))
         say(out, f"Files in {study.directory}: {files}{and_figures(figures)}", whole=True)
-
-
-def _tell_pool(pool: Pool) -> None:
-    if pool.dashboard:
-        tell(f"what the workers do: {pool.dashboard}")
 
 
 def _lines(title: str) -> Callable[[int, int, int], None]:

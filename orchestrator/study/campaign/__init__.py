@@ -7,18 +7,22 @@ reads that, and `replay` runs a row of it again.
 
 from .columns import Entry
 from .dataset import Dataset, parts_of
-from .parcel import packed
+from .flight import Point
+from .parcel import Parcel, packed
 from .pool import Pool, pool_for
 from .replay import Replayed, replay
-from .running import run_study
+from .running import need_packages, run_study
 from .study import Study
 
 __all__ = [
     "Dataset",
     "Entry",
+    "Parcel",
+    "Point",
     "Pool",
     "Replayed",
     "Study",
+    "need_packages",
     "packed",
     "parts_of",
     "pool_for",

@@ -1,9 +1,11 @@
 from .methods import METHODS
+from .preparation import InterruptedSearch
 from .running import Falsified, Optimized, falsify, optimize
 
 __all__ = [
     "METHODS",
     "Falsified",
+    "InterruptedSearch",
     "Optimized",
     "falsify",
     "optimize",

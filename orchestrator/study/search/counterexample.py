@@ -80,7 +80,7 @@ def write_counterexample(
     nominal, path = directory / NOMINAL, directory / COUNTEREXAMPLE
     system = changed_scenario(nominal, space, changes)
     write_scenario(path, system, ())
-    broken = execute(load(path), kind=kind)
+    broken = _run(path, kind)
     verdict = next((one for one in broken.requirements if one.name == requirement), None)
     if verdict is None or verdict.verdict != "fail":
         raise RailcosimError(
@@ -89,10 +89,17 @@ def write_counterexample(
     write_scenario(path, system, _comments(system, space, changes, verdict))
     figures = []
     if figure:
-        runs = {"nominal": execute(load(nominal), kind=kind), "counterexample": broken}
+        runs = {"nominal": _run(nominal, kind), "counterexample": broken}
         wanted = [figure_of(space, changes, verdict, broken)]
         figures = draw_compared(wanted, {name: run.results for name, run in runs.items()}, directory)
     return path, verdict, figures
+
+
+def _run(scenario: Path, kind: Kind) -> Run:
+    run = execute(load(scenario), kind=kind)
+    if run.signal:
+        raise KeyboardInterrupt
+    return run
 
 
 def _comments(system: System, space: Space, changes: Changes, verdict: Verdict) -> list[str]:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import json
 import math
 from collections.abc import Callable, Iterator, Mapping, Sequence
@@ -9,12 +10,12 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
-from ..campaign import Dataset, Entry, parts_of
+from ..campaign import Dataset, Entry, Point, parts_of
 from ..rows import Row
 
 Changes = Mapping[str, Any]
-Evaluate = Callable[[Sequence[Changes]], Iterator[Row]]
-"""Runs with given changes, in their order; what is not asked for need not be run."""
+Evaluate = Callable[[Sequence[Point]], Iterator[tuple[Point, Row]]]
+"""Runs points and gives each with its row, in any order; what is not asked for need not be run."""
 
 
 @dataclass(frozen=True)
@@ -56,7 +57,7 @@ class Evaluation:
 
 
 class Evaluations:
-    """The runs of a search, in the order in which they were asked for.
+    """The runs of a search, in the order in which they were asked for, whatever the order in which they come.
 
     Args:
         evaluate: runs the scenario with changes.
@@ -68,12 +69,13 @@ class Evaluations:
         self._evaluate, self._dataset = evaluate, dataset
         self._done: dict[str, Evaluation] = {}
         self._known: dict[str, Evaluation] = {}
+        self._taken: set[int] = set()
         self._next = 0
         if resumed:
             for evaluation in _read(dataset.directory):
                 self._known.setdefault(_text(evaluation.changes), evaluation)
-                self._next = max(self._next, evaluation.run + 1)
-            dataset.recover(self._next)
+                self._taken.add(evaluation.run)
+            dataset.recover(max(self._taken, default=-1) + 1)
         else:
             dataset.clear()
 
@@ -83,20 +85,50 @@ class Evaluations:
         return list(self._done.values())
 
     def run(self, many: Sequence[Changes]) -> Iterator[Evaluation]:
-        """The runs with given changes, one after another; those that were run before are known."""
-        fresh = self._evaluate([changes for changes in many if _text(changes) not in self._known])
+        """The runs with given changes, one after another; those that were run before are known.
+
+        Where the caller wants no more, those that came before their turn are forgotten, so that what is written does
+        not depend on how many run at a time; where they are cut short, they are kept for a search that goes on.
+
+        Raises:
+            KeyboardInterrupt: not all were run.
+        """
+        fresh = {text: changes for changes in many if (text := _text(changes)) not in self._known}
+        free = itertools.filterfalse(self._taken.__contains__, itertools.count(self._next))
+        points = {text: (next(free), changes) for text, changes in fresh.items()}
+        early: dict[int, tuple[Point, Row]] = {}
+        rows = self._evaluate([*points.values()])
         for changes in many:
-            known = self._known.get(_text(changes))
-            if known is None:
-                row = next(fresh)
-                known = Evaluation(
-                    self._next, changes, row.status, row.error, row.margins, row.scaled, row.verdicts, row.metrics
-                )
-                self._known[_text(changes)] = known
-                self._dataset.add(Entry(self._next, changes, row))
-                self._next += 1
-            self._done.setdefault(_text(changes), known)
+            text = _text(changes)
+            if text not in self._known:
+                number = points[text][0]
+                try:
+                    while number not in early:
+                        came = _next(rows)
+                        early[came[0][0]] = came
+                except BaseException:
+                    for point, row in early.values():
+                        self._keep(point, row)
+                    raise
+                self._keep(*early.pop(number))
+            known = self._done.setdefault(text, self._known[text])
             yield known
+
+    def _keep(self, point: Point, row: Row) -> None:
+        number, changes = point
+        self._known[_text(changes)] = Evaluation(
+            number, changes, row.status, row.error, row.margins, row.scaled, row.verdicts, row.metrics
+        )
+        self._taken.add(number)
+        while self._next in self._taken:
+            self._next += 1
+        self._dataset.add(Entry(number, changes, row))
+
+
+def _next(rows: Iterator[tuple[Point, Row]]) -> tuple[Point, Row]:
+    for came in rows:
+        return came
+    raise KeyboardInterrupt  # they end before their time where a user wants no more
 
 
 def _text(changes: Changes) -> str:

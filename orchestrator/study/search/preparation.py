@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Iterator, Mapping, Sequence
-from contextlib import contextmanager
+import signal
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -14,16 +16,30 @@ from ...errors import ScenarioError
 from ...evaluation import split_metric, value_name
 from ...fmi import Kind, Workspace
 from ...problems import Problem, suggestion
-from ...run import RunDirectory, check, execute
+from ...run import Interruption, RunDirectory, check, execute
+from ...scenario import is_structural
 from ...system import System
-from ..campaign import Dataset
+from ..campaign import Dataset, Parcel, Point, Pool, need_packages, packed, pool_for
+from ..design import Dimension
 from ..rows import Row
 from ..structure import Runner
 from .counterexample import NOMINAL, changed_scenario, scenario_text
-from .evaluations import Changes, Evaluations
+from .evaluations import Evaluations
 from .space import Space, make_space, read_space
 
 SEARCH_FILE = "search.json"
+
+
+class InterruptedSearch(KeyboardInterrupt):
+    """A signal has ended a search, which can be gone on with where it has a directory.
+
+    Attributes:
+        signal: its number. directory: that holds its runs; None before there is one.
+    """
+
+    def __init__(self, signal: int, directory: Path | None = None) -> None:
+        super().__init__()
+        self.signal, self.directory = signal, directory
 
 
 @dataclass(frozen=True)
@@ -56,6 +72,9 @@ def prepared(
     objectives: Mapping[str, str] | None = None,
     kind: Kind = "auto",
     resume: bool = False,
+    scheduler: str | None = None,
+    workers: int | None = None,
+    begun: Callable[[Pool], None] = lambda _: None,
 ) -> Iterator[Prepared]:
     """Make a search ready; its runs can be asked for while this is entered.
 
@@ -69,17 +88,22 @@ def prepared(
         objectives: metrics by flat name that the search is about, with what they are called.
         kind: how components become models.
         resume: whether runs that are there already count.
+        scheduler: as `run_study` has it.
+        workers: likewise.
+        begun: likewise.
 
     Raises:
         ScenarioError: something is wrong with the scenario, a requirement or what is varied.
-        RunError: the scenario as it stands cannot be run.
+        RunError: the scenario as it stands cannot be run, or the scheduler is gone.
+        InterruptedSearch: a signal has ended it.
     """
+    need_packages("pyarrow", *(["distributed"] if workers != 0 else []))
     dimensions, signals = read_space(vary)
     _check(system, requirements, [one.name for one in dimensions])
     system = system.changed(metrics={**system.judged.metrics, **(metrics or {})}, modified=True)
     nominal = execute(system, kind=kind)
     if nominal.error is not None:
-        raise nominal.error
+        raise InterruptedSearch(nominal.signal) if nominal.signal else nominal.error
     _check_objectives(objectives or {}, [value_name(one.name, k) for one in nominal.metrics for k in one.values])
     system, space = make_space(system, nominal.checked, nominal.results, dimensions, signals)
     with RunDirectory(Path(output), record=SEARCH_FILE) as place:
@@ -93,16 +117,40 @@ def prepared(
             raise
         order = [*system.judged.metrics, *system.judged.requirements]
         dataset = Dataset(place.path, space.keys, order, system.seed)
-        with Runner(place.path / NOMINAL, kind=kind) as runner:
-            evaluations = Evaluations(lambda many: _rows(runner, many), dataset, resumed=resume)
-            try:
-                yield Prepared(place.path, space, evaluations)
-            finally:
-                dataset.flush()
+        parcel = _packed(place.path / NOMINAL, dimensions, kind)
+        interruption = Interruption(lambda _: dataset.flush())
+        is_whole = False
+        try:
+            with interruption.listening(), suppress(KeyboardInterrupt), pool_for(parcel, scheduler, workers) as pool:
+                begun(pool)
+                run = partial(_rows, pool, interruption)
+                try:
+                    yield Prepared(place.path, space, Evaluations(run, dataset, resumed=resume))
+                    is_whole = True
+                finally:
+                    dataset.flush()
+        except Exception:
+            if not interruption.is_asked_for:  # a signal may have ended workers as well
+                raise
+    interruption.pass_on()
+    if not is_whole:
+        raise InterruptedSearch(interruption.number or signal.SIGINT, Path(output))
 
 
-def _rows(runner: Runner, many: Sequence[Changes]) -> Iterator[Row]:
-    return (runner.run(changes) for changes in many)
+def _rows(pool: Pool, interruption: Interruption, points: Sequence[Point]) -> Iterator[tuple[Point, Row]]:
+    return pool.rows(iter(points), len(points), lambda: interruption.is_asked_for)
+
+
+def _packed(nominal: Path, dimensions: Sequence[Dimension], kind: Kind) -> Parcel:
+    """What workers need: of the scenario, and of each model that may take the place of one of its own."""
+    how: dict[str, Any] = {"scenario": str(nominal), "kind": kind}
+    with Runner(**how) as runner:
+        systems = [runner.load({})]
+        for one in dimensions:
+            for value in one.values if is_structural(one.name) else ():
+                with suppress(ScenarioError):  # a run that has no system is refused
+                    systems.append(runner.load({one.name: value}))
+    return packed(how, systems, kind)
 
 
 def _check(system: System, requirements: Sequence[str], names: Sequence[str]) -> None:

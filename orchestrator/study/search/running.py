@@ -12,6 +12,7 @@ from ... import world
 from ...evaluation import Verdict
 from ...fmi import Kind
 from ...system import System
+from ..campaign import Pool
 from .counterexample import as_json, changed_scenario, describe, write_counterexample, write_scenario
 from .falsification import Falsification, search
 from .figures import draw_optimization
@@ -67,9 +68,12 @@ def falsify(
     method: str = next(iter(METHODS)),
     seed: int = 0,
     kind: Kind = "auto",
+    scheduler: str | None = None,
+    workers: int | None = None,
     resume: bool = False,
     figures: bool = True,
     progress: OnRun = lambda *_: None,
+    begun: Callable[[Pool], None] = lambda _: None,
 ) -> Falsified:
     """Search for the run that breaks a requirement.
 
@@ -82,16 +86,22 @@ def falsify(
         method: one of `METHODS`.
         seed: of the method's luck.
         kind: how components become models.
+        scheduler: the address of a Dask scheduler; without one workers are started on this machine.
+        workers: how many of them; by default as many as there are processors. With 0 all runs in this process. What
+            is found does not depend on it.
         resume: whether to go on with the search in the directory.
         figures: whether to draw.
         progress: told after each run.
+        begun: called with the pool once there is one.
 
     Raises:
         ScenarioError: something is wrong with the scenario, the requirement or what is varied.
-        RunError: the scenario as it stands cannot be run.
+        RunError: the scenario as it stands cannot be run, or the scheduler is gone.
+        InterruptedSearch: a signal has ended it: what was run is on disk, and `resume` goes on.
     """
     told = {"vary": list(vary), "requirement": requirement, "method": method, "seed": seed}
-    with prepared(system, vary, output, told, requirements=[requirement], kind=kind, resume=resume) as ready:
+    where: Any = {"kind": kind, "resume": resume, "scheduler": scheduler, "workers": workers, "begun": begun}
+    with prepared(system, vary, output, told, requirements=[requirement], **where) as ready:
         found = search(
             ready.space,
             ready.evaluations,
@@ -122,9 +132,12 @@ def optimize(
     budget: int = 500,
     seed: int = 0,
     kind: Kind = "auto",
+    scheduler: str | None = None,
+    workers: int | None = None,
     resume: bool = False,
     figures: bool = True,
     progress: OnRun = lambda *_: None,
+    begun: Callable[[Pool], None] = lambda _: None,
 ) -> Optimized:
     """Search for the changes that make metrics least while requirements hold.
 
@@ -137,19 +150,24 @@ def optimize(
         budget: how many runs may be spent.
         seed: of the search.
         kind: how components become models.
+        scheduler: the address of a Dask scheduler; without one workers are started on this machine.
+        workers: how many of them; by default as many as there are processors. With 0 all runs in this process. What
+            is found does not depend on it.
         resume: whether to go on with the search in the directory.
         figures: whether to draw.
         progress: told after each run.
+        begun: called with the pool once there is one.
 
     Raises:
         ScenarioError: something is wrong with the scenario, an objective, a requirement or what is varied.
-        RunError: the scenario as it stands cannot be run.
+        RunError: the scenario as it stands cannot be run, or the scheduler is gone.
+        InterruptedSearch: a signal has ended it: what was run is on disk, and `resume` goes on.
     """
     wanted, more = read_objectives(system, objectives)
     told = {"vary": list(vary), "minimize": list(objectives), "subject_to": list(requirements), "seed": seed}
-    with prepared(
-        system, vary, output, told, requirements=requirements, metrics=more, objectives=wanted, kind=kind, resume=resume
-    ) as ready:
+    about: Any = {"requirements": requirements, "metrics": more, "objectives": wanted}
+    where: Any = {"kind": kind, "resume": resume, "scheduler": scheduler, "workers": workers, "begun": begun}
+    with prepared(system, vary, output, told, **about, **where) as ready:
         found = minimize(
             ready.space,
             ready.evaluations,

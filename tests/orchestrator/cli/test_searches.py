@@ -31,11 +31,11 @@ end = "final(lag.x)"
 
 
 def falsify(scenario, *more):
-    return call(["falsify", str(scenario), "--kind", "plain", "--no-figures", *more])
+    return call(["falsify", str(scenario), "--kind", "plain", "--no-figures", "--workers", "0", *more])
 
 
 def optimize(scenario, *more):
-    return call(["optimize", str(scenario), "--kind", "plain", "--no-figures", *more])
+    return call(["optimize", str(scenario), "--kind", "plain", "--no-figures", "--workers", "0", *more])
 
 
 def test_a_requirement_is_broken(scenario, capsys):
@@ -111,5 +111,5 @@ def test_what_nothing_keeps(scenario, capsys):
 def test_a_bar_on_a_terminal(monkeypatch):
     monkeypatch.setattr("sys.stderr.isatty", lambda: True, raising=False)
     with show_search("title", quiet=False) as told:
-        told(1, 2, "least margin 3")
-        told(2, 2, "")
+        told.progress(1, 2, "least margin 3")
+        told.progress(2, 2, "")

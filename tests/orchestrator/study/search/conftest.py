@@ -37,16 +37,18 @@ def searched(tmp_path):
             tuple(Dimension.parse(f"{name}=0:1") for name in names), (), dict(zip(names, nominal, strict=True))
         )
 
-        def evaluate(many):
-            for changes in many:
-                ran.append(dict(changes))
-                try:
-                    value = margin(np.array([changes.get(name, x) for name, x in space.nominal.items()]))
-                except ArithmeticError as error:
-                    yield Row("failed", str(error))
-                    continue
-                verdict = "pass" if value >= 0.0 else "fail"
-                yield Row("completed", metrics={"value": value}, verdicts={"held": verdict}, margins={"held": value})
+        def evaluate(points):
+            for point in points:
+                ran.append(dict(point[1]))
+                yield point, row(point[1])
+
+        def row(changes):
+            try:
+                value = margin(np.array([changes.get(name, x) for name, x in space.nominal.items()]))
+            except ArithmeticError as error:
+                return Row("failed", str(error))
+            verdict = "pass" if value >= 0.0 else "fail"
+            return Row("completed", metrics={"value": value}, verdicts={"held": verdict}, margins={"held": value})
 
         ran = []
         evaluations = Evaluations(evaluate, Dataset(tmp_path, space.keys, ["held"], 0), **kept)

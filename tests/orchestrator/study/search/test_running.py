@@ -13,7 +13,7 @@ VARIED = ["target.value=signal(0, 3, 2)", "lag.rate=1:6"]
 
 
 def test_what_breaks_a_requirement_is_a_scenario_of_the_same_margin_to_the_bit(lagging, tmp_path):
-    found = falsify(lagging(), VARIED, "low", tmp_path / "a", budget=30, kind="plain", seed=2)
+    found = falsify(lagging(), VARIED, "low", tmp_path / "a", budget=30, kind="plain", workers=0, seed=2)
     assert found.found.found
     assert found.changes == ("target.value: 1 of its 2 values (1)",)
     runs = pd.read_parquet(tmp_path / "a" / "runs.parquet")
@@ -33,7 +33,7 @@ def test_what_breaks_a_requirement_is_a_scenario_of_the_same_margin_to_the_bit(l
 
 
 def test_a_search_is_gone_on_with_and_no_other(lagging, tmp_path):
-    how = {"budget": 4, "kind": "plain", "method": "random", "figures": False}
+    how = {"budget": 4, "kind": "plain", "workers": 0, "method": "random", "figures": False}
     with pytest.raises(ScenarioError, match="holds no search to go on with"):
         falsify(lagging(), ["lag.rate=1:6"], "low", tmp_path, resume=True, **how)
     first = falsify(lagging(), ["lag.rate=1:6"], "low", tmp_path, **how)
@@ -64,7 +64,7 @@ def test_a_search_is_gone_on_with_and_no_other(lagging, tmp_path):
 )
 def test_what_cannot_be_searched_is_told(lagging, tmp_path, vary, requirement, said):
     with pytest.raises(ScenarioError) as caught:
-        falsify(lagging(), [vary], requirement, tmp_path, kind="plain")
+        falsify(lagging(), [vary], requirement, tmp_path, kind="plain", workers=0)
     assert said in str(caught.value)
 
 
@@ -72,20 +72,27 @@ def test_a_scenario_without_requirements_has_none_to_break(lagging, tmp_path):
     system = lagging()
     system.judged.requirements = {}
     with pytest.raises(ScenarioError, match="the scenario has none"):
-        falsify(system, ["lag.rate=1:6"], "low", tmp_path, kind="plain")
+        falsify(system, ["lag.rate=1:6"], "low", tmp_path, kind="plain", workers=0)
 
 
 def test_a_scenario_that_does_not_run_is_not_searched(lagging, tmp_path, mine):
     system = lagging()
     system.add("fails", mine("Fails"), until=1.0)
     with pytest.raises(FmuError):
-        falsify(system, ["lag.rate=1:6"], "low", tmp_path, kind="plain")
+        falsify(system, ["lag.rate=1:6"], "low", tmp_path, kind="plain", workers=0)
 
 
 def test_the_best_is_a_scenario(lagging, tmp_path):
     system = lagging(metrics={"end": "final(lag.x)"})
     found = optimize(
-        system, ["lag.gain=1:2"], ["0 - final(lag.x)"], tmp_path, requirements=["low"], budget=25, kind="plain"
+        system,
+        ["lag.gain=1:2"],
+        ["0 - final(lag.x)"],
+        tmp_path,
+        requirements=["low"],
+        budget=25,
+        kind="plain",
+        workers=0,
     )
     (path,) = found.scenarios
     assert path.name == "best.toml"
@@ -102,7 +109,7 @@ def test_the_best_is_a_scenario(lagging, tmp_path):
 def test_of_several_objectives_there_is_a_front(lagging, tmp_path):
     system = lagging(metrics={"end": "final(lag.x)"})
     objectives = ["end", "0 - final(lag.x)", "0 - lag.rate"]
-    found = optimize(system, ["lag.gain=1:2", "lag.rate=1:2"], objectives, tmp_path, budget=9, kind="plain")
+    found = optimize(system, ["lag.gain=1:2", "lag.rate=1:2"], objectives, tmp_path, budget=9, kind="plain", workers=0)
     assert [path.name for path in found.scenarios] == [f"pareto-{k + 1}.toml" for k in range(len(found.found.best))]
     assert len(found.scenarios) > 1
     assert [path.name for path in found.figures] == ["pareto.png"]
@@ -115,6 +122,6 @@ def test_an_objective_is_a_single_number(lagging, tmp_path, mine):
     with pytest.raises(
         ScenarioError, match=r"--minimize end: it is not a single number; name one of end\[1\], end\[2\]"
     ):
-        optimize(system, ["lag.gain=1:2"], ["end"], tmp_path, kind="plain")
-    found = optimize(system, ["lag.gain=1:2"], ["end[2]"], tmp_path, budget=2, kind="plain", figures=False)
+        optimize(system, ["lag.gain=1:2"], ["end"], tmp_path, kind="plain", workers=0)
+    found = optimize(system, ["lag.gain=1:2"], ["end[2]"], tmp_path, budget=2, kind="plain", workers=0, figures=False)
     assert found.found.best
