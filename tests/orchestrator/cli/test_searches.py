@@ -1,8 +1,12 @@
 """The commands that search: what they print, and their exit codes."""
 
+import signal
+from pathlib import Path
+
 import pytest
 from railcosim.orchestrator.cli.app import call
 from railcosim.orchestrator.cli.printing.searches import show_search
+from railcosim.orchestrator.study import search
 
 
 @pytest.fixture
@@ -106,6 +110,30 @@ def test_what_nothing_keeps(scenario, capsys):
     assert "no run of 4 keeps low" in capsys.readouterr().out
     assert optimize(scenario, "--vary", "lag.gain=2:3") == 2
     assert "nothing is to be least; name a metric" in capsys.readouterr().err
+
+
+def test_a_search_that_is_interrupted(scenario, capsys, monkeypatch):
+    ended = search.InterruptedSearch(signal.SIGTERM, Path("there"))
+
+    def end(*_, **how):
+        told.append((how["workers"], how["scheduler"]))
+        raise ended
+
+    told = []
+    monkeypatch.setattr(search, "falsify", end)
+    monkeypatch.setattr(search, "optimize", end)
+    assert falsify(scenario, "--vary", "lag.gain=1:3") == 143
+    assert "interrupted; to go on: the same command with --resume -o there" in capsys.readouterr().err
+    ended = search.InterruptedSearch(signal.SIGINT)
+    assert optimize(scenario, "--vary", "lag.gain=1:3", "--minimize", "end") == 130
+    assert capsys.readouterr().err == ""
+    assert told == [(0, None)] * 2
+
+
+def test_a_scheduler_has_its_own_workers(scenario, capsys):
+    for run, more in ((falsify, ()), (optimize, ("--minimize", "end"))):
+        assert run(scenario, "--vary", "lag.gain=1:3", "--scheduler", "tcp://far:8786", *more) == 2
+        assert "the scheduler has the workers that it has" in capsys.readouterr().err
 
 
 def test_a_bar_on_a_terminal(monkeypatch):

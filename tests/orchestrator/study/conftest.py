@@ -1,6 +1,9 @@
 """A small system of toys that batches run."""
 
+import logging
+
 import pytest
+from distributed import LocalCluster
 from railcosim.orchestrator.scenario.loading import load
 
 TEXT = """
@@ -53,3 +56,11 @@ def scenario(tmp_path, mine):
 def system(scenario):
     """The system of the scenario."""
     return load(scenario)
+
+
+@pytest.fixture
+def scheduler():
+    """The address of one of Dask in this process, with a worker."""
+    how = {"n_workers": 1, "threads_per_worker": 2, "processes": False, "dashboard_address": None}
+    with LocalCluster(**how, silence_logs=logging.CRITICAL) as made:
+        yield made.scheduler_address

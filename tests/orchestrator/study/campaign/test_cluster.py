@@ -1,6 +1,5 @@
 """Runs on Dask: with a scheduler and a worker in this process, as on any that is there."""
 
-import logging
 import os
 import signal
 import threading
@@ -14,14 +13,6 @@ from railcosim.orchestrator.study.campaign import packed, pool_for, run_study, w
 from railcosim.orchestrator.study.campaign.cluster import Cluster
 
 from .conftest import plan_of, same
-
-
-@pytest.fixture
-def scheduler():
-    """The address of one with a worker."""
-    how = {"n_workers": 1, "threads_per_worker": 2, "processes": False, "dashboard_address": None}
-    with LocalCluster(**how, silence_logs=logging.CRITICAL) as made:
-        yield made.scheduler_address
 
 
 def test_a_study_is_the_same_on_workers(system, how, tmp_path, scheduler, undisturbed):

@@ -3,7 +3,9 @@
 import math
 
 import pytest
-from railcosim.orchestrator.study.search.evaluations import Evaluation
+from railcosim.orchestrator.study.campaign import Dataset
+from railcosim.orchestrator.study.rows import Row
+from railcosim.orchestrator.study.search.evaluations import Evaluation, Evaluations
 
 
 def test_a_score_is_the_scaled_margin_where_there_is_one():
@@ -27,6 +29,13 @@ def test_what_was_run_is_known(searched):
     assert [one.breaks("held") for one in found] == [False, True, False, True]
     assert ran == many[:2]
     assert [one.run for one in evaluations.done] == [0, 1]
+
+
+def test_what_is_asked_for_twice_at_once_is_run_once(searched):
+    _, evaluations, ran = searched(lambda x: float(x[0]))
+    found = evaluations.run([{"it.x0": 0.25}, {"it.x0": 0.25}, {"it.x0": 0.5}])
+    assert [one.margins["held"] for one in found] == [0.25, 0.25, 0.5]
+    assert len(ran) == 2
 
 
 def test_runs_are_asked_for_one_by_one(searched):
@@ -70,3 +79,57 @@ def test_whole_numbers_are_the_same_however_they_are_kept(searched, value):
     _, evaluations, ran = searched(lambda _: 1.0)
     list(evaluations.run([{"it.x0": 3}, {"it.x0": value}]))
     assert len(ran) == 1
+
+
+@pytest.fixture
+def backwards(tmp_path):
+    """Runs of which the last comes first, and what was asked for; a group is cut short after some."""
+
+    def build(cut=None, **kept):
+        def evaluate(points):
+            asked.append([number for number, _ in points])
+            for number, changes in [*reversed(points)][:cut]:
+                yield (number, changes), Row("completed", margins={"held": changes["x"]})
+
+        asked = []
+        return Evaluations(evaluate, Dataset(tmp_path, ["x"], ["held"], 0), **kept), asked
+
+    return build
+
+
+MANY = [{"x": 0.5}, {"x": 0.25}, {"x": 0.75}, {"x": 1.0}]
+
+
+def test_runs_are_told_and_numbered_as_they_were_asked_for(backwards):
+    evaluations, asked = backwards()
+    found = list(evaluations.run(MANY))
+    assert [(one.run, one.changes["x"], one.margins["held"]) for one in found] == [
+        (0, 0.5, 0.5),
+        (1, 0.25, 0.25),
+        (2, 0.75, 0.75),
+        (3, 1.0, 1.0),
+    ]
+    assert asked == [[0, 1, 2, 3]]
+
+
+def test_what_came_before_its_turn_is_forgotten_where_no_more_is_wanted(backwards):
+    evaluations, asked = backwards()
+    group = evaluations.run(MANY)
+    next(group)
+    group.close()
+    (after,) = evaluations.run([{"x": 2.0}])
+    assert after.run == 1
+    assert [one.run for one in evaluations.done] == [0, 1]
+    assert asked == [[0, 1, 2, 3], [1]]
+
+
+def test_what_came_before_its_turn_is_kept_where_runs_are_cut_short(backwards):
+    evaluations, _ = backwards(cut=2)
+    with pytest.raises(KeyboardInterrupt):
+        next(evaluations.run(MANY))
+    evaluations._dataset.flush()
+    resumed, asked = backwards(resumed=True)
+    assert [one.run for one in resumed.run(MANY)] == [0, 1, 2, 3]
+    assert asked == [[0, 1]]
+    (after,) = resumed.run([{"x": 2.0}])
+    assert after.run == 4

@@ -1,0 +1,122 @@
+"""Where a search runs: in one process or on workers it is the same, and a signal leaves what can be gone on with."""
+
+import signal
+
+import pytest
+from railcosim.orchestrator.errors import RailcosimError
+from railcosim.orchestrator.study.campaign import parts_of, worker
+from railcosim.orchestrator.study.search import InterruptedSearch, falsify, optimize, preparation
+
+VARIED = ["lag.gain=1:3"]
+
+
+def runs(directory):
+    """The runs of a search, without how long they took."""
+    import pyarrow.dataset
+
+    table = pyarrow.dataset.dataset([str(part) for part in parts_of(directory)]).to_table().sort_by("run")
+    return [{name: value for name, value in row.items() if name != "seconds"} for row in table.to_pylist()]
+
+
+def broken(system, directory, **how):
+    how = {"budget": 9, "kind": "plain", "figures": False, "workers": 0} | how
+    return falsify(system, VARIED, "low", directory, **how)
+
+
+def same(one, other):
+    """Whether two searches have the same end and the same runs, to the bit."""
+    texts = [repr((each.found, runs(each.directory))).replace(str(each.directory), "") for each in (one, other)]
+    return texts[0] == texts[1]
+
+
+@pytest.fixture
+def once(lagging, tmp_path):
+    """A search in this process that nothing disturbs."""
+    return broken(lagging(), tmp_path / "once")
+
+
+def test_a_search_is_the_same_on_workers(lagging, tmp_path, scheduler, once):
+    pools = []
+    found = broken(lagging(), tmp_path / "out", workers=None, scheduler=scheduler, begun=pools.append)
+    assert same(found, once)
+    assert (found.verdict, found.changes) == (once.verdict, once.changes)
+    assert len(pools) == 1
+    assert not worker._OPEN
+
+
+def test_models_that_take_the_place_of_others_reach_workers(lagging, tmp_path, scheduler, mine):
+    vary = [f"lag={mine('Lag')},{mine('LagWithSlope')},NoSuch"]
+    how = {"budget": 9, "kind": "plain", "figures": False}
+    here = optimize(lagging(), vary, ["0 - final(target.value)"], tmp_path / "here", workers=0, **how)
+    there = optimize(lagging(), vary, ["0 - final(target.value)"], tmp_path / "there", scheduler=scheduler, **how)
+    assert same(there, here)
+    assert here.found.failed
+
+
+@pytest.mark.parametrize("is_far", [False, True])
+def test_a_signal_leaves_a_search_that_goes_on_to_the_same_end(lagging, tmp_path, once, is_far, request):
+    where = {"workers": None, "scheduler": request.getfixturevalue("scheduler")} if is_far else {}
+
+    def ask(done, of, best):
+        if done == 3:
+            signal.raise_signal(signal.SIGTERM)
+
+    heard = []
+    before = signal.signal(signal.SIGTERM, lambda number, _: heard.append(number))
+    try:
+        with pytest.raises(InterruptedSearch) as ended:
+            broken(lagging(), tmp_path / "out", progress=ask, **where)
+    finally:
+        signal.signal(signal.SIGTERM, before)
+    assert (ended.value.signal, ended.value.directory, heard) == (signal.SIGTERM, tmp_path / "out", [signal.SIGTERM])
+    assert 3 <= len(runs(tmp_path / "out")) < len(runs(once.directory))
+    again = broken(lagging(), tmp_path / "out", resume=True)
+    assert repr(again.found) == repr(once.found)
+
+
+def test_what_breaks_when_a_signal_has_ended_workers_too_is_no_failure(lagging, tmp_path):
+    def end(done, of, best):
+        if is_asked:
+            signal.raise_signal(signal.SIGTERM)
+        raise RailcosimError("a worker is gone")
+
+    before = signal.signal(signal.SIGTERM, lambda *_: None)
+    try:
+        for is_asked, expected in ((True, InterruptedSearch), (False, RailcosimError)):
+            with pytest.raises(expected):
+                broken(lagging(), tmp_path / str(is_asked), progress=end)
+    finally:
+        signal.signal(signal.SIGTERM, before)
+
+
+def test_a_signal_during_the_nominal_run_leaves_nothing(lagging, tmp_path, monkeypatch):
+    execute = preparation.execute
+
+    def interrupted(system, **how):
+        run = execute(system, **how)
+        run.signal, run.error = signal.SIGINT, RailcosimError("interrupted")
+        return run
+
+    monkeypatch.setattr(preparation, "execute", interrupted)
+    with pytest.raises(InterruptedSearch) as ended:
+        broken(lagging(), tmp_path / "out")
+    assert (ended.value.signal, ended.value.directory) == (signal.SIGINT, None)
+    assert not (tmp_path / "out").exists()
+
+
+def test_a_signal_while_a_counterexample_is_written_is_none(lagging, tmp_path, monkeypatch, once):
+    from railcosim.orchestrator.study.search import counterexample
+
+    execute = counterexample.execute
+
+    def interrupted(system, **how):
+        run = execute(system, **how)
+        run.signal = signal.SIGINT
+        return run
+
+    with monkeypatch.context() as patch:
+        patch.setattr(counterexample, "execute", interrupted)
+        with pytest.raises(InterruptedSearch) as ended:
+            broken(lagging(), tmp_path / "out")
+    assert ended.value.signal == signal.SIGINT
+    assert same(broken(lagging(), tmp_path / "out", resume=True), once)
