@@ -15,6 +15,7 @@ from ...fmi import Kind
 from ...run import Run, execute
 from ...scenario import assignment, dump, load
 from ...system import System
+from .keeping import copy, kept
 from .space import Changes, Space
 
 NOMINAL, COUNTEREXAMPLE = "nominal.toml", "counterexample.toml"
@@ -51,13 +52,15 @@ def changed_scenario(nominal: Path, space: Space, changes: Changes) -> System:
 
 
 def scenario_text(system: System, comments: Sequence[str]) -> str:
-    """A scenario that stands alone, below comments."""
+    """A scenario below comments."""
     lines = [f"# {line}".rstrip() for line in comments]
     return "\n".join([*lines, "", dump(system)])
 
 
 def write_scenario(path: Path, system: System, comments: Sequence[str]) -> None:
-    """Write a scenario that stands alone, below comments."""
+    """Write a scenario below comments, and what it names beside it."""
+    system, copies = kept(system, path.parent)
+    copy(copies, path.parent)
     world.write_text(path, scenario_text(system, comments), encoding="utf-8")
 
 

@@ -25,6 +25,7 @@ from ..rows import Row
 from ..structure import Runner
 from .counterexample import NOMINAL, changed_scenario, scenario_text
 from .evaluations import Evaluations
+from .keeping import copy, kept
 from .space import Space, make_space, read_space
 
 SEARCH_FILE = "search.json"
@@ -181,10 +182,14 @@ def _check_objectives(objectives: Mapping[str, str], known: Sequence[str]) -> No
 def _begin(place: RunDirectory, system: System, told: Mapping[str, Any], resume: bool) -> None:
     """Write down what is searched; of a search that is gone on with it must be the same."""
     nominal, record = place.path / NOMINAL, place.path / SEARCH_FILE
+    system, copies = kept(
+        system, place.path
+    )  # of models that have changed there are other copies, and the text differs
     text = scenario_text(system, ["What is searched, with what is varied as it stands."])
     if not nominal.exists():
         if resume:
             raise ScenarioError(f"{place.given} holds no search to go on with; leave --resume out to begin one")
+        copy(copies, place.path)
         world.write_text(nominal, text, encoding="utf-8")
         world.write_text(record, json.dumps(told), encoding="utf-8")
         return
