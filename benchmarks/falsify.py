@@ -43,7 +43,7 @@ def main():
 
 def one(system, requirement, method, seed, budget):
     """After how many runs a search breaks the requirement, the nominal one not counted; None where it does not."""
-    with tempfile.TemporaryDirectory() as folder, prepared(system, VARIED, folder, {}) as ready:
+    with tempfile.TemporaryDirectory() as folder, prepared(system, VARIED, folder, {}, workers=0) as ready:
         found = search(
             ready.space, ready.evaluations, requirement, budget=budget + 1, method=method, seed=seed, shrinking=0
         )
