@@ -4,6 +4,7 @@ import signal
 
 import pytest
 from railcosim.orchestrator.errors import RailcosimError
+from railcosim.orchestrator.scenario import load
 from railcosim.orchestrator.study.campaign import parts_of, worker
 from railcosim.orchestrator.study.search import InterruptedSearch, falsify, optimize, preparation
 
@@ -120,3 +121,19 @@ def test_a_signal_while_a_counterexample_is_written_is_none(lagging, tmp_path, m
             broken(lagging(), tmp_path / "out")
     assert ended.value.signal == signal.SIGINT
     assert same(broken(lagging(), tmp_path / "out", resume=True), once)
+
+
+@pytest.mark.long
+def test_a_run_that_ends_its_worker_is_a_failed_one_of_the_search(hostile, tmp_path):
+    scenario = tmp_path / "hostile.toml"
+    scenario.write_text(
+        f'[simulation]\nstop_time = 1.0\nstep = 0.1\n[instances.bad]\nfmu = "{hostile()}"\n'
+        '[metrics]\nend = "final(bad.x)"'
+    )
+    vary = ["bad.u=1:4", 'bad.deed="","step kill 0.3"']
+    found = optimize(load(scenario), vary, ["end"], tmp_path / "out", budget=8, workers=2, figures=False).found
+    lost = [one for one in found.evaluations if one.changes.get("bad.deed")]
+    assert 0 < len(lost) == found.failed
+    assert all("it ended the process of its worker" in one.error for one in lost)
+    assert [one.run for one in found.evaluations] == list(range(8))
+    assert found.best
