@@ -103,8 +103,10 @@ def prepared(
     _check(system, requirements, [one.name for one in dimensions])
     system = system.changed(metrics={**system.judged.metrics, **(metrics or {})}, modified=True)
     nominal = execute(system, kind=kind)
+    if nominal.signal:
+        raise InterruptedSearch(nominal.signal)
     if nominal.error is not None:
-        raise InterruptedSearch(nominal.signal) if nominal.signal else nominal.error
+        raise nominal.error
     _check_objectives(objectives or {}, [value_name(one.name, k) for one in nominal.metrics for k in one.values])
     system, space = make_space(system, nominal.checked, nominal.results, dimensions, signals)
     with RunDirectory(Path(output), record=SEARCH_FILE) as place:
@@ -182,9 +184,7 @@ def _check_objectives(objectives: Mapping[str, str], known: Sequence[str]) -> No
 def _begin(place: RunDirectory, system: System, told: Mapping[str, Any], resume: bool) -> None:
     """Write down what is searched; of a search that is gone on with it must be the same."""
     nominal, record = place.path / NOMINAL, place.path / SEARCH_FILE
-    system, copies = kept(
-        system, place.path
-    )  # of models that have changed there are other copies, and the text differs
+    system, copies = kept(system, place.path)  # a model that has changed has another copy, and so the text differs
     text = scenario_text(system, ["What is searched, with what is varied as it stands."])
     if not nominal.exists():
         if resume:

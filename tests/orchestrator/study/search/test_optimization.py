@@ -33,10 +33,10 @@ def test_a_front_of_two_objectives(searched, monkeypatch):
     space, evaluations, _ = searched(lambda x: float(x[0]), (0.5,))
     original = evaluations._evaluate
 
-    def both(many):
-        for row in original(many):
+    def both(points):
+        for point, row in original(points):
             row.metrics["other"] = 1.0 - row.metrics["value"]
-            yield row
+            yield point, row
 
     monkeypatch.setattr(evaluations, "_evaluate", both)
     found = minimize(space, evaluations, {"value": "a", "other": "b"}, (), budget=21, seed=1)

@@ -1,9 +1,11 @@
 """Where a search runs: in one process or on workers it is the same, and a signal leaves what can be gone on with."""
 
 import signal
+from dataclasses import replace
+from pathlib import Path
 
 import pytest
-from railcosim.orchestrator.errors import RailcosimError
+from railcosim.orchestrator.errors import RailcosimError, ScenarioError
 from railcosim.orchestrator.scenario import load
 from railcosim.orchestrator.study.campaign import parts_of, worker
 from railcosim.orchestrator.study.search import InterruptedSearch, falsify, optimize, preparation
@@ -95,7 +97,7 @@ def test_a_signal_during_the_nominal_run_leaves_nothing(lagging, tmp_path, monke
 
     def interrupted(system, **how):
         run = execute(system, **how)
-        run.signal, run.error = signal.SIGINT, RailcosimError("interrupted")
+        run.signal = signal.SIGINT
         return run
 
     monkeypatch.setattr(preparation, "execute", interrupted)
@@ -121,6 +123,18 @@ def test_a_signal_while_a_counterexample_is_written_is_none(lagging, tmp_path, m
             broken(lagging(), tmp_path / "out")
     assert ended.value.signal == signal.SIGINT
     assert same(broken(lagging(), tmp_path / "out", resume=True), once)
+
+
+def test_a_search_goes_on_with_the_models_it_was_begun_with(lagging, mine, tmp_path):
+    own, system = tmp_path / "own.py", lagging()
+    own.write_text(Path(mine("Lag").rpartition(":")[0]).read_text())
+    system.instances["lag"] = replace(system.instances["lag"], model=f"{own}:Lag")
+    broken(system, tmp_path / "out", budget=1)
+    assert 'component = "models/own.py:Lag"' in (tmp_path / "out" / "nominal.toml").read_text()
+    assert broken(system, tmp_path / "out", budget=2, resume=True).found.runs == 2
+    own.write_text(own.read_text().replace("self.gain * self.u", "self.gain * self.u * 2"))
+    with pytest.raises(ScenarioError, match="holds another search"):
+        broken(system, tmp_path / "out", budget=3, resume=True)
 
 
 @pytest.mark.long
