@@ -171,16 +171,16 @@ def files_of(system: System) -> Iterator[str]:
     came = system.provenance
     path = os.path.abspath(came.path)
     yield path
-    yield from _named_in(tomllib.loads(came.text), os.path.dirname(path))
+    yield from named_in(tomllib.loads(came.text), os.path.dirname(path))
     for instance in system.instances.values():
-        yield from _named_in([instance.model, instance.build], os.getcwd())
+        yield from named_in([instance.model, instance.build], os.getcwd())
 
 
-def _named_in(value: Any, folder: str) -> Iterator[str]:
+def named_in(value: Any, folder: str) -> Iterator[str]:
     """The files that texts name, in whatever lists and tables."""
     if isinstance(value, dict | list):
         for inner in value.values() if isinstance(value, dict) else value:
-            yield from _named_in(inner, folder)
+            yield from named_in(inner, folder)
     elif isinstance(value, str):
         code, _ = file_and_class(value)
         file = os.path.abspath(os.path.join(folder, code or value))

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import os
 import signal
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
@@ -19,7 +20,7 @@ from ...problems import Problem, suggestion
 from ...run import Interruption, RunDirectory, check, execute
 from ...scenario import is_structural
 from ...system import System
-from ..campaign import Dataset, Parcel, Point, Pool, need_packages, packed, pool_for
+from ..campaign import Dataset, Parcel, Point, Pool, digest_of, named_in, need_packages, packed, pool_for
 from ..design import Dimension
 from ..rows import Row
 from ..structure import Runner
@@ -48,10 +49,12 @@ class Prepared:
     """A search about to begin.
 
     Attributes:
-        directory: for all that it writes. space: what is varied. evaluations: the runs.
+        directory: for all that it writes. told: what makes it the one it is. space: what is varied. evaluations: the
+            runs.
     """
 
     directory: Path
+    told: Mapping[str, Any]
     space: Space
     evaluations: Evaluations
 
@@ -109,6 +112,8 @@ def prepared(
         raise nominal.error
     _check_objectives(objectives or {}, [value_name(one.name, k) for one in nominal.metrics for k in one.values])
     system, space = make_space(system, nominal.checked, nominal.results, dimensions, signals)
+    varied = [file for one in dimensions for file in named_in([*one.values], os.getcwd())]
+    told = {**told, "models": sorted({digest_of(Path(file)) for file in varied})}
     with RunDirectory(Path(output), record=SEARCH_FILE) as place:
         _begin(place, system, told, resume)
         # Keys that mean nothing, and values that nothing takes, are told here and not by every run.
@@ -128,7 +133,7 @@ def prepared(
                 begun(pool)
                 run = partial(_rows, pool, interruption)
                 try:
-                    yield Prepared(place.path, space, Evaluations(run, dataset, resumed=resume))
+                    yield Prepared(place.path, told, space, Evaluations(run, dataset, resumed=resume))
                     is_whole = True
                 finally:
                     dataset.flush()

@@ -118,7 +118,7 @@ def falsify(
             )
             changes = tuple(describe(ready.space, found.changes))
             result = Falsified(found, Path(output), verdict, scenario, changes, tuple(drawn))
-        _note(ready, told | {"budget": budget} | _of_falsification(result))
+        _note(ready, {**ready.told, "budget": budget} | _of_falsification(result))
     return result
 
 
@@ -181,7 +181,7 @@ def optimize(
         drawn = (draw_optimization(found, ready.directory, system.provenance.name),) if figures else ()
         changes = tuple(tuple(describe(ready.space, best.changes)) for best in found.best)
         result = Optimized(found, Path(output), paths, changes, drawn)
-        _note(ready, told | {"budget": budget} | _of_optimization(result))
+        _note(ready, {**ready.told, "budget": budget} | _of_optimization(result))
     return result
 
 

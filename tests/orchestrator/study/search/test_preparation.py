@@ -1,6 +1,7 @@
 """Where a search runs: in one process or on workers it is the same, and a signal leaves what can be gone on with."""
 
 import signal
+from contextlib import nullcontext
 from dataclasses import replace
 from pathlib import Path
 
@@ -135,6 +136,18 @@ def test_a_search_goes_on_with_the_models_it_was_begun_with(lagging, mine, tmp_p
     own.write_text(own.read_text().replace("self.gain * self.u", "self.gain * self.u * 2"))
     with pytest.raises(ScenarioError, match="holds another search"):
         broken(system, tmp_path / "out", budget=3, resume=True)
+
+
+def test_a_search_goes_on_with_the_models_it_varies(lagging, mine, tmp_path):
+    own, toys = tmp_path / "own.py", mine("Lag").rpartition(":")[0]
+    own.write_text(Path(toys).read_text())
+    how = {"kind": "plain", "workers": 0, "figures": False, "method": "random"}
+    for budget, is_other in ((1, False), (2, False), (3, True)):
+        if is_other:
+            own.write_text(own.read_text().replace("self.gain * self.u", "self.gain * self.u * 2"))
+        with pytest.raises(ScenarioError, match="holds another search") if is_other else nullcontext():
+            vary = [f"lag={own}:Lag,{toys}:Lag"]
+            falsify(lagging(), vary, "low", tmp_path / "out", budget=budget, resume=budget > 1, **how)
 
 
 @pytest.mark.long
