@@ -9,6 +9,7 @@ runs count, and "> 300" is a median of those.
 import argparse
 import statistics
 import tempfile
+from functools import partial
 from pathlib import Path
 
 from railcosim.orchestrator import load
@@ -45,7 +46,14 @@ def one(system, requirement, method, seed, budget):
     """After how many runs a search breaks the requirement, the nominal one not counted; None where it does not."""
     with tempfile.TemporaryDirectory() as folder, prepared(system, VARIED, folder, {}, workers=0) as ready:
         found = search(
-            ready.space, ready.evaluations, requirement, budget=budget + 1, method=method, seed=seed, shrinking=0
+            ready.space,
+            ready.evaluations,
+            requirement,
+            budget=budget + 1,
+            method=method,
+            seed=seed,
+            shrinking=0,
+            slope=partial(ready.slopes.at, requirement),
         )
     return found.runs - 1 if found.found else None
 

@@ -43,7 +43,7 @@ def model_header(component: Component, traced: Traced, guid: str) -> str:
     variables = scalar_variables(component)
     references = {v.name: v.reference for v in variables}
     layout = traced.layout
-    held = _held(component)
+    held = held_outputs(component)
     texts = [v for v in variables if v.slot.type is str]
     real_inputs = [v for v in variables if v.slot.type is float and v.causality == "input"]
     states = [v for v in variables if isinstance(v.slot.declaration, State) and not v.is_start]
@@ -101,7 +101,7 @@ def model_header(component: Component, traced: Traced, guid: str) -> str:
     return "\n".join(parts)
 
 
-def _held(component: Component) -> list[bool]:
+def held_outputs(component: Component) -> list[bool]:
     """For each scalar output, whether it keeps its sample's value over a step: all of an array, or none."""
     if not component.is_sampled:
         return [False for slot in component.of(Output) for _ in slot.scalars]

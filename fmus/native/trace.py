@@ -173,6 +173,30 @@ class Traced:
     reinitialised: tuple[str, ...]
 
 
+@dataclass(frozen=True)
+class Expressions:
+    """A component's methods as CasADi expressions.
+
+    Attributes:
+        layout: where the values stand.
+        clock, values: what they are expressions of.
+        outputs, derivatives, initial, update, keep: a column each; that of ``update`` is the next memory and tape row,
+            then the states that it re-initialises.
+        started: names of the scalars that ``initial`` computes. reinitialised: of those states.
+    """
+
+    layout: Layout
+    clock: Any
+    values: Any
+    outputs: list[Any]
+    derivatives: list[Any]
+    initial: list[Any]
+    update: list[Any]
+    keep: list[Any]
+    started: tuple[str, ...]
+    reinitialised: tuple[str, ...]
+
+
 def layout(component: Component) -> Layout:
     """The places of a component's values."""
     variables = scalar_variables(component)
@@ -197,12 +221,50 @@ def trace(component: Component, prefix: str) -> Traced:
     Raises:
         TracingError: an equation cannot be traced; component, method and construct are named.
     """
-    with _simplification(False):  # rearranged operations would round differently from the Python they came from
-        return _Tracer(component, prefix).trace()
+    with simplification(False):
+        return _code(expressions(component), prefix)
+
+
+def expressions(component: Component) -> Expressions:
+    """A component's equations run on symbols, as they stand.
+
+    Raises:
+        TracingError: as `trace` does.
+    """
+    with simplification(False):  # rearranged operations would round differently from the Python they came from
+        return _Tracer(component).expressions()
+
+
+def _code(found: Expressions, prefix: str) -> Traced:
+    functions = {
+        "outputs": found.outputs,
+        "derivatives": found.derivatives,
+        "initial": found.initial,
+        "update": found.update,
+        "keep": found.keep,
+    }
+    arguments = [("clock", found.clock), ("values", found.values)]
+    code = [function(f"{prefix}_{name}", arguments, column) for name, column in functions.items() if column]
+    along = {"directional": [*found.outputs, *found.derivatives], "initial_directional": found.initial}
+    for name, column in along.items():
+        if column:
+            code.append(_directional(f"{prefix}_{name}", arguments, column))
+    return Traced("\n".join(code), found.layout, found.started, found.reinitialised)
+
+
+def _directional(name: str, arguments: list[tuple[str, Any]], column: list[Any]) -> str:
+    """The derivative of expressions along a direction in the space of the values, ``seed``."""
+    values = arguments[1][1]
+    seed = ca.SX.sym("seed", values.shape[0])
+    # Simplified, or x**2 at a negative x gives NaN: its rule adds 0 * log(x) for an exponent that does not vary.
+    with simplification(True):
+        derivative = ca.densify(ca.jtimes(ca.vertcat(*column), values, seed))
+        results = [derivative[k] for k in range(len(column))]
+        return function(name, [*arguments, ("seed", seed)], results)
 
 
 @contextlib.contextmanager
-def _simplification(wanted: bool) -> Iterator[None]:
+def simplification(wanted: bool) -> Iterator[None]:
     """CasADi's simplification of each operation as it is recorded: a global option of its own."""
     before = ca.GlobalOptions.getSimplificationOnTheFly()
     ca.GlobalOptions.setSimplificationOnTheFly(wanted)
@@ -213,9 +275,8 @@ def _simplification(wanted: bool) -> Iterator[None]:
 
 
 class _Tracer:
-    def __init__(self, component: Component, prefix: str) -> None:
+    def __init__(self, component: Component) -> None:
         self.name = type(component).__name__
-        self.prefix = prefix
         self.layout = layout(component)
         self.clock = ca.SX.sym("clock", 2)
         self.values = ca.SX.sym("values", self.layout.values)
@@ -244,7 +305,7 @@ class _Tracer:
     def _cells(self, references: Iterable[int], shape: tuple[int, ...]) -> Any:
         return _arranged([Symbol(self.values[k]) for k in references], shape)
 
-    def trace(self) -> Traced:
+    def expressions(self) -> Expressions:
         outputs = self._results("outputs", [*self.probe.of(Output)])
         derivatives = self._results("derivatives", [*self.probe.of(State)])
         kept = [*self.probe.of(State, Memory)]
@@ -258,33 +319,18 @@ class _Tracer:
         again = [slot for slot in self.probe.of(State) if slot.name in updated]
         update = self._flat(updated, [*remembered, *again], "update")
         keep = [_expression(self._call("keep"))]
-        functions = {
-            "outputs": outputs,
-            "derivatives": derivatives,
-            "initial": initial,
-            "update": update if self.probe.is_sampled else [],
-            "keep": keep if self.layout.tape[1] else [],
-        }
-        arguments = [("clock", self.clock), ("values", self.values)]
-        code = [function(f"{self.prefix}_{name}", arguments, column) for name, column in functions.items() if column]
-        for name, column in {"directional": [*outputs, *derivatives], "initial_directional": initial}.items():
-            if column:
-                code.append(self._directional(name, arguments, column))
-        return Traced(
-            "\n".join(code),
+        return Expressions(
             self.layout,
+            self.clock,
+            self.values,
+            outputs,
+            derivatives,
+            initial,
+            update if self.probe.is_sampled else [],
+            keep if self.layout.tape[1] else [],
             tuple(name for slot in computed for name in slot.scalars),
             tuple(name for slot in again for name in slot.scalars),
         )
-
-    def _directional(self, name: str, arguments: list[tuple[str, Any]], column: list[Any]) -> str:
-        """The derivative of expressions along a direction in the space of the values, ``seed``."""
-        seed = ca.SX.sym("seed", self.layout.values)
-        # Simplified, or x**2 at a negative x gives NaN: its rule adds 0 * log(x) for an exponent that does not vary.
-        with _simplification(True):
-            derivative = ca.densify(ca.jtimes(ca.vertcat(*column), self.values, seed))
-            results = [derivative[k] for k in range(len(column))]
-            return function(f"{self.prefix}_{name}", [*arguments, ("seed", seed)], results)
 
     def _results(self, method: Method, slots: list[Slot]) -> list[Any]:
         return self._flat(self._returned(method), slots, method)

@@ -41,6 +41,7 @@ class MethodName(StrEnum):
     cma_es = "cma-es"
     tpe = "tpe"
     random = "random"
+    gradient = "gradient"
 
 
 Vary = Annotated[
@@ -65,7 +66,8 @@ def falsify(
     ] = None,
     budget: Budget = 500,
     method: Annotated[
-        MethodName, typer.Option(help="How to search: CMA-ES, the tree-structured Parzen estimator, or at random.")
+        MethodName,
+        typer.Option(help="How to search: CMA-ES, the tree-structured Parzen estimator, at random, or by gradients."),
     ] = MethodName.cma_es,
     seed: Seed = 0,
     workers: Workers = None,

@@ -74,6 +74,14 @@ class Batch:
         """Give everything back; no run may follow."""
         self._held.close()
 
+    def checked(self, changes: Mapping[str, Any]) -> Checked:
+        """The system with changes, found fit to run.
+
+        Raises:
+            ScenarioError: it is not.
+        """
+        return self._revision.of(changes)
+
     def run(self, changes: Mapping[str, Any] | None = None) -> Row:
         """One run. What fails in it is told by its status, and never raised.
 

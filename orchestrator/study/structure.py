@@ -9,6 +9,7 @@ from typing import Any
 
 from ..errors import ScenarioError
 from ..fmi import Kind
+from ..run import Checked
 from ..scenario import assignment, is_structural, load
 from ..system import System
 from .batch import Batch
@@ -94,6 +95,15 @@ class Runner:
             self._batches[key] = made
         self._batches[key] = self._batches.pop(key)  # the last is the one used last
         return self._batches[key]
+
+    def checked(self, changes: Mapping[str, Any]) -> Checked:
+        """The system with changes of any kind, found fit to run.
+
+        Raises:
+            ScenarioError: it is not.
+        """
+        structure = {key: value for key, value in changes.items() if is_structural(key)}
+        return self.batch(structure).checked({key: value for key, value in changes.items() if key not in structure})
 
     def run(self, changes: Mapping[str, Any] | None = None) -> Row:
         """One run. What fails in it is told by its status, and never raised.

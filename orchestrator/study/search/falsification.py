@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 from typing import Any
 
 from .evaluations import Evaluation, Evaluations
-from .methods import METHODS
+from .methods import METHODS, Slope, flat
 from .shrinking import shrink
 from .space import Space
 
@@ -51,6 +51,7 @@ def search(
     method: str = "cma-es",
     seed: int = 0,
     shrinking: int | None = None,
+    slope: Slope = flat,
     told: Told | None = None,
 ) -> Falsification:
     """Look for changes that break a requirement; the first run is that of the scenario as it stands.
@@ -63,6 +64,7 @@ def search(
         method: one of `METHODS`.
         seed: of the method's luck.
         shrinking: how many runs may be spent on making small what is found; as many as on the search by default.
+        slope: of the requirement's margin, where the method needs it.
         told: told of each run.
     """
     nearest: Evaluation | None = None
@@ -83,7 +85,7 @@ def search(
         return nearest is not None and nearest.breaks(requirement)
 
     first = judged(next(evaluations.run([{}])))
-    moving = METHODS[method](space, seed, space.origin(), first)
+    moving = METHODS[method](space, seed, space.origin(), first, slope)
     while count < budget and not is_broken():
         points = moving.ask()
         scores = []

@@ -1,4 +1,4 @@
-"""How a search moves in the cube: uniformly at random, by CMA-ES, or by Optuna's tree-structured Parzen estimator.
+"""How a search moves in the cube: at random, by CMA-ES, by Optuna's tree-structured Parzen estimator, by gradients.
 
 A method is asked for so many points and told what they are worth. Which points it asks for depends on its seed and on
 what it was told, and on nothing else: not on how many workers there are.
@@ -18,9 +18,11 @@ from numpy.typing import NDArray
 from .space import Space
 
 Array = NDArray[np.float64]
+Slope = Callable[[Array], Array]
+"""The gradient of what is sought the least of, at a point, (size,)."""
 
 _WIDTH = 0.3
-"""Of CMA-ES's first steps, as a part of the cube."""
+"""Of the first steps of CMA-ES and of a descent, as a part of the cube."""
 _NEAR = 0.01
 """Steps so small, as a part of the cube, count as stuck: digits of a margin that holds break nothing."""
 _MOST = 64
@@ -30,15 +32,21 @@ _GROUP = 4
 _RANDOM_GROUP = 16
 
 
+def flat(point: Array) -> Array:
+    """No slope."""
+    return np.zeros_like(point)
+
+
 class Method(ABC):
     """A way to look for the least score.
 
     Args:
         space: what is varied. seed: of its luck. first, score: the scenario's own point, and what it is worth.
+        slope: of the score, for a method that uses it.
     """
 
-    def __init__(self, space: Space, seed: int, first: Array, score: float) -> None:
-        self._space, self._seed, self._first, self._score = space, seed, first, score
+    def __init__(self, space: Space, seed: int, first: Array, score: float, slope: Slope = flat) -> None:
+        self._space, self._seed, self._first, self._score, self._slope = space, seed, first, score, slope
         self._luck = np.random.default_rng(seed)
 
     @abstractmethod
@@ -64,8 +72,8 @@ class Random(Method):
 class CmaEs(Method):
     """Covariance matrix adaptation from the scenario's own point; started anew elsewhere, twice as wide, when stuck."""
 
-    def __init__(self, space: Space, seed: int, first: Array, score: float) -> None:
-        super().__init__(space, seed, first, score)
+    def __init__(self, space: Space, seed: int, first: Array, score: float, slope: Slope = flat) -> None:
+        super().__init__(space, seed, first, score, slope)
         self._population = 4 + int(3 * math.log(space.size))
         self._strategy = self._start(first)
 
@@ -101,8 +109,8 @@ class CmaEs(Method):
 class Tpe(Method):
     """Optuna's tree-structured Parzen estimator over all axes at once."""
 
-    def __init__(self, space: Space, seed: int, first: Array, score: float) -> None:
-        super().__init__(space, seed, first, score)
+    def __init__(self, space: Space, seed: int, first: Array, score: float, slope: Slope = flat) -> None:
+        super().__init__(space, seed, first, score, slope)
         self._study, self._axes = open_study(space, seed)
         if not math.isnan(score):
             add_known(self._study, self._axes, first, [score])
@@ -118,8 +126,53 @@ class Tpe(Method):
             tell_trial(self._study, trial, [score])
 
 
-METHODS: dict[str, Callable[[Space, int, Array, float], Method]] = {"cma-es": CmaEs, "tpe": Tpe, "random": Random}
+class Gradient(Method):
+    """Projected descent by the score's slope from the scenario's own point; started anew elsewhere when stuck.
+
+    The length of a step, along the axis that moves most, is doubled where a run was worth less, and else quartered.
+    What is no number stays as it was drawn at the start.
+    """
+
+    def __init__(self, space: Space, seed: int, first: Array, score: float, slope: Slope = flat) -> None:
+        super().__init__(space, seed, first, score, slope)
+        self._length = _WIDTH
+        self._direction = self._downwards(first, score)
+
+    def _downwards(self, at: Array, score: float) -> Array | None:
+        """Where to go from a point of the cube, 1 along the axis that moves most; None where nowhere is lower."""
+        self._at, self._score = at, score
+        if math.isnan(score):
+            return None
+        slope = np.array(self._slope(at))
+        slope[((at <= 0.0) & (slope > 0.0)) | ((at >= 1.0) & (slope < 0.0))] = 0.0
+        most = float(np.abs(slope).max())
+        return -slope / most if 0.0 < most < math.inf else None
+
+    def ask(self) -> list[Array]:
+        """The next point of a descent, or where another begins."""
+        if self._direction is None:
+            self._asked = self._luck.random(self._space.size)
+        else:
+            self._asked = np.clip(self._at + self._length * self._direction, 0.0, 1.0)
+        return [self._asked]
+
+    def tell(self, scores: Sequence[float]) -> None:
+        """A failed run is no step down, and no descent begins there."""
+        if self._direction is None:
+            self._length = _WIDTH
+            self._direction = self._downwards(self._asked, scores[0])
+        elif scores[0] < self._score:
+            self._length = min(2.0 * self._length, 1.0)
+            self._direction = self._downwards(self._asked, scores[0])
+        else:
+            self._length /= 4.0
+            self._direction = None if self._length < _NEAR else self._direction
+
+
+METHODS: dict[str, type[Method]] = {"cma-es": CmaEs, "tpe": Tpe, "random": Random, "gradient": Gradient}
 """The methods by name, the default one first."""
+SLOPING = frozenset({"gradient"})
+"""Those that need slopes."""
 
 
 def open_study(space: Space, seed: int, objectives: int = 1) -> tuple[Any, Mapping[str, Any]]:

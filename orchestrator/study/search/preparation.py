@@ -6,7 +6,7 @@ import json
 import os
 import signal
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from contextlib import contextmanager, suppress
+from contextlib import ExitStack, contextmanager, suppress
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
@@ -27,6 +27,7 @@ from ..structure import Runner
 from .counterexample import NOMINAL, changed_scenario, scenario_text
 from .evaluations import Evaluations
 from .keeping import copy, kept
+from .slopes import Slopes, traced
 from .space import Space, make_space, read_space
 
 SEARCH_FILE = "search.json"
@@ -50,13 +51,14 @@ class Prepared:
 
     Attributes:
         directory: for all that it writes. told: what makes it the one it is. space: what is varied. evaluations: the
-            runs.
+            runs. slopes: of their margins.
     """
 
     directory: Path
     told: Mapping[str, Any]
     space: Space
     evaluations: Evaluations
+    slopes: Slopes
 
     @property
     def nominal(self) -> Path:
@@ -79,6 +81,7 @@ def prepared(
     scheduler: str | None = None,
     workers: int | None = None,
     begun: Callable[[Pool], None] = lambda _: None,
+    sloping: bool = False,
 ) -> Iterator[Prepared]:
     """Make a search ready; its runs can be asked for while this is entered.
 
@@ -95,6 +98,7 @@ def prepared(
         scheduler: as `run_study` has it.
         workers: likewise.
         begun: likewise.
+        sloping: whether the search needs slopes.
 
     Raises:
         ScenarioError: something is wrong with the scenario, a requirement or what is varied.
@@ -119,7 +123,10 @@ def prepared(
         # Keys that mean nothing, and values that nothing takes, are told here and not by every run.
         try:
             with Workspace() as workspace:
-                check(changed_scenario(place.path / NOMINAL, space, space.changes(space.origin())), workspace, kind)
+                first = changed_scenario(place.path / NOMINAL, space, space.changes(space.origin()))
+                checked = check(first, workspace, kind)
+            if sloping:
+                traced(checked)
         except ScenarioError:  # there was no search
             world.unlink(place.path / NOMINAL)
             raise
@@ -129,11 +136,13 @@ def prepared(
         interruption = Interruption(lambda _: dataset.flush())
         is_whole = False
         try:
-            with interruption.listening(), suppress(KeyboardInterrupt), pool_for(parcel, scheduler, workers) as pool:
+            with interruption.listening(), suppress(KeyboardInterrupt), ExitStack() as stack:
+                pool = stack.enter_context(pool_for(parcel, scheduler, workers))
+                runner = stack.enter_context(Runner(place.path / NOMINAL, kind=kind))  # loads nothing but for slopes
                 begun(pool)
-                run = partial(_rows, pool, interruption)
+                evaluations = Evaluations(partial(_rows, pool, interruption), dataset, resumed=resume)
                 try:
-                    yield Prepared(place.path, told, space, Evaluations(run, dataset, resumed=resume))
+                    yield Prepared(place.path, told, space, evaluations, Slopes(runner.checked, space))
                     is_whole = True
                 finally:
                     dataset.flush()

@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -16,7 +17,7 @@ from ..campaign import Pool
 from .counterexample import as_json, changed_scenario, describe, write_counterexample, write_scenario
 from .falsification import Falsification, search
 from .figures import draw_optimization
-from .methods import METHODS
+from .methods import METHODS, SLOPING
 from .optimization import Optimization, minimize, read_objectives
 from .preparation import SEARCH_FILE, Prepared, prepared
 
@@ -101,7 +102,8 @@ def falsify(
     """
     told = {"vary": list(vary), "requirement": requirement, "method": method, "seed": seed}
     where: Any = {"kind": kind, "resume": resume, "scheduler": scheduler, "workers": workers, "begun": begun}
-    with prepared(system, vary, output, told, requirements=[requirement], **where) as ready:
+    sloping = method in SLOPING
+    with prepared(system, vary, output, told, requirements=[requirement], sloping=sloping, **where) as ready:
         found = search(
             ready.space,
             ready.evaluations,
@@ -109,6 +111,7 @@ def falsify(
             budget=budget,
             method=method,
             seed=seed,
+            slope=partial(ready.slopes.at, requirement),
             told=lambda done, of, least: progress(done, of, f"least margin {least:.4g}"),
         )
         result = Falsified(found, Path(output))
