@@ -94,9 +94,8 @@ class Slopes:
         def slope(name: str, place: int) -> float:
             return _steepest(judge, run, float(verdict.margin or 0.0), name, place)
 
-        for name in verdict.blame:
-            if name in loop.parameters:
-                found[loop.places[name]] += slope(name, first)
+        for name in judge.needed_signals & run.parameters.keys():
+            found[loop.places[name]] = slope(name, first)
         moving = [name for name in verdict.blame if name in run.flight.columns]
         for place in range(first, min(first + ahead + 1, len(time))):
             found += loop.pull(run.flight, {name: slope(name, place) for name in moving}, place)

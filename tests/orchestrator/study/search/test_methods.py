@@ -61,3 +61,33 @@ def test_cma_es_starts_anew_where_it_is_stuck():
     """On a plateau it gives up, and begins elsewhere with twice the population."""
     _, points = least("cma-es", PLANE, lambda _: 1.0, 40)
     assert 40 * 6 < len(points) < 40 * 64
+
+
+def descent(worth, slope, first, groups, *, space=PLANE):
+    """The points that a descent asks for."""
+    method = METHODS["gradient"](space, 3, np.array(first), worth(np.array(first)), slope)
+    points = []
+    for _ in range(groups):
+        points += method.ask()
+        method.tell([worth(points[-1])])
+    return np.array(points)
+
+
+def test_a_descent_goes_down_along_the_sides_of_the_cube():
+    """Least at x = 0 and y = 0.9: x stops at its side, and y goes on."""
+    points = descent(
+        lambda p: 3.0 * p[0] + (p[1] - 0.9) ** 2, lambda p: np.array([3.0, 2.0 * (p[1] - 0.9)]), [0.5, 0.1], 8
+    )
+    assert points[0].tolist() == pytest.approx([0.2, 0.1 + 0.3 * 1.6 / 3.0])
+    assert np.abs(points - [0.0, 0.9]).max(axis=1).min() < 0.06
+
+
+def test_a_descent_begins_anew_where_it_is_stuck_or_runs_fail():
+    """A slope that misleads: steps are quartered until they are small, then a start is drawn."""
+    points = descent(lambda p: float(p[0]), lambda p: np.array([-1.0, 0.0]), [0.5, 0.5], 4)
+    assert np.abs(points[:3, 0] - 0.5) == pytest.approx([0.3, 0.075, 0.01875])
+    assert points[3, 1] != 0.5
+    failing = descent(lambda _: math.nan, lambda p: np.ones(2), [0.5, 0.5], 3)
+    assert len(np.unique(failing[:, 0])) == 3
+    cornered = descent(lambda p: float(p.sum()), lambda p: np.array([1.0, -1.0]), [0.0, 1.0], 1)
+    assert ((cornered > 0.0) & (cornered < 1.0)).all()

@@ -125,3 +125,19 @@ def test_an_objective_is_a_single_number(lagging, tmp_path, mine):
         optimize(system, ["lag.gain=1:2"], ["end"], tmp_path, kind="plain", workers=0)
     found = optimize(system, ["lag.gain=1:2"], ["end[2]"], tmp_path, budget=2, kind="plain", workers=0, figures=False)
     assert found.found.best
+
+
+def test_a_descent_breaks_a_requirement_in_few_runs(lagging, tmp_path):
+    """The nominal run, and one step along the slope."""
+    found = falsify(
+        lagging(), ["target.value=signal(0, 3, 2)"], "low", tmp_path, kind="plain", method="gradient", figures=False
+    )
+    assert (found.found.found, found.found.runs) == (True, 2)
+
+
+def test_a_system_without_gradients_is_told_before_there_is_a_search(lagging, mine, tmp_path):
+    system = lagging()
+    system.add("noise", mine("Noisy"))
+    with pytest.raises(ScenarioError, match="instance 'noise': Noisy draws random numbers; choose another --method"):
+        falsify(system, ["lag.rate=1:6"], "low", tmp_path, kind="plain", method="gradient")
+    assert not falsify(system, ["lag.rate=1:6"], "low", tmp_path, kind="plain", budget=2, figures=False).found.found

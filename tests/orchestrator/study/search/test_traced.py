@@ -1,5 +1,7 @@
 """The traced closed loop: the run itself, its exact gradients, and the systems that have none."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from railcosim.orchestrator import System
@@ -31,10 +33,12 @@ def pushed(mine):
         system.add("spring", mine("Affine"), gain=-4.0)
         system.add("mass", mine("Mass"), x=2.0, max_step=0.01)
         system.add("echo", mine("Sampled"))
+        system.add("other", mine("Sampled"))
         system.connect("mass.x", "spring.u")
         system.connect("target.value", "spring.w", scale=2.0, offset=0.5)
         system.connect("spring.y", "mass.a")
         system.connect("mass.v", "echo.u")
+        system.connect("echo.y", "other.u")
         return system
 
     return build
@@ -47,25 +51,20 @@ def test_the_loop_is_the_run_and_its_gradient_that_of_runs(pushed, loop_of, algo
     checked, loop = loop_of(system)
     results = execute(system, kind="plain").results
     given = loop.values(checked)
-    names = ["mass.x", "mass.v", "spring.y", "echo.y", "target.value"]
+    names = ["mass.x", "mass.v", "spring.y", "echo.y", "other.y", "target.value"]
     flight = loop.fly(given, names)
     assert np.array_equal(flight.columns["time"], results.time)
     for name in names:
         assert flight.columns[name] == pytest.approx(results[name], rel=1e-10, abs=1e-10)
-    step = 1e-4
+    step, nominal = 1e-4, {"mass.x": 2.0, "spring.gain": -4.0, "target.values[1]": 1.0, "target.values[2]": 3.0}
     with Batch(system, kind="plain", record=["mass.x", "echo.y"]) as batch:
-        for place in (250, 130, 100):
-            pulled = loop.pull(flight, {"mass.x": 1.0, "echo.y": 2.0}, place)
-            for key, start in {
-                "mass.x": 2.0,
-                "spring.gain": -4.0,
-                "target.values[1]": 1.0,
-                "target.values[2]": 3.0,
-            }.items():
-                ends = [batch.run({key: start + by}).series for by in (step, -step)]
-                sums = [series["mass.x"][place] + 2.0 * series["echo.y"][place] for series in ends]
-                at = loop.places.get(f"{key}_start", loop.places[key])
-                assert pulled[at] == pytest.approx((sums[0] - sums[1]) / (2.0 * step), rel=1e-6, abs=1e-8), key
+        for key, start in nominal.items():
+            ends = [batch.run({key: start + by}).series for by in (step, -step)]
+            high, low = (series["mass.x"] + 2.0 * series["echo.y"] for series in ends)
+            at = loop.places.get(f"{key}_start", loop.places[key])
+            for place in (250, 130, 100):
+                pulled = loop.pull(flight, {"mass.x": 1.0, "echo.y": 2.0}, place)[at]
+                assert pulled == pytest.approx((high - low)[place] / (2.0 * step), rel=1e-6, abs=1e-8), key
 
 
 def test_start_values_that_are_computed_count_at_the_first_point(mine, loop_of):
@@ -116,3 +115,10 @@ def test_what_has_no_gradient_is_told_with_the_remedy(pushed, mine, loop_of, cha
         loop_of(changed if isinstance(changed, System) else system)
     assert said in str(refused.value)
     assert "choose another --method" in str(refused.value)
+
+
+def test_an_fmu_of_a_user_has_no_gradient(pushed, workspace):
+    checked = check(pushed(), workspace, "plain")
+    others = checked.models | {"mass": replace(checked.models["mass"], kind="fmu")}
+    with pytest.raises(ScenarioError, match=r"instance 'mass': .*Mass is an FMU whose equations are not known"):
+        TracedLoop(replace(checked, models=others))
