@@ -102,8 +102,12 @@ class Runner:
         Raises:
             ScenarioError: it is not.
         """
-        structure = {key: value for key, value in changes.items() if is_structural(key)}
-        return self.batch(structure).checked({key: value for key, value in changes.items() if key not in structure})
+        structure, values = _parted(changes)
+        try:
+            return self.batch(structure).checked(values)
+        except ScenarioError:  # as in `run`; with everything alone, what is wrong is said
+            with Batch(self.load(changes), **self._options) as batch:
+                return batch.checked({})
 
     def run(self, changes: Mapping[str, Any] | None = None) -> Row:
         """One run. What fails in it is told by its status, and never raised.
@@ -116,12 +120,12 @@ class Runner:
             KeyboardInterrupt: the user stops it.
         """
         changes = changes or {}
-        structure = {key: value for key, value in changes.items() if is_structural(key)}
+        structure, values = _parted(changes)
         try:
             batch = self.batch(structure)
         except ScenarioError:  # a structure may fit the values alone that are changed with it: a list for each train
             return self._alone(changes)
-        return batch.run({key: value for key, value in changes.items() if key not in structure})
+        return batch.run(values)
 
     def _alone(self, changes: Mapping[str, Any]) -> Row:
         try:
@@ -129,3 +133,9 @@ class Runner:
                 return batch.run()
         except ScenarioError as error:
             return Row("refused", str(error))
+
+
+def _parted(changes: Mapping[str, Any]) -> tuple[dict[str, Any], dict[str, Any]]:
+    """The changes that are structural, and those of values."""
+    structure = {key: value for key, value in changes.items() if is_structural(key)}
+    return structure, {key: value for key, value in changes.items() if key not in structure}

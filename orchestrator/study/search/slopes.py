@@ -106,7 +106,7 @@ class Slopes:
         for axis, (key, choices) in enumerate(zip(self._space.keys, self._space.choices, strict=True)):
             ends = np.array([point, point])
             ends[:, axis] = np.clip(point[axis] + np.array([-_STEP, _STEP]), 0.0, 1.0)
-            if not choices and not is_structural(key):
+            if pulled.any() and not choices and not is_structural(key):
                 low, high = (loop.values(self._checked(self._space.changes(end))) for end in ends)
                 found[axis] = pulled @ (high - low) / (ends[1, axis] - ends[0, axis])
         return found

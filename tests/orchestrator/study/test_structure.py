@@ -50,6 +50,10 @@ def test_a_structure_may_fit_the_values_alone_that_come_with_it(scenario):
             runner.run(changes), execute(load(scenario, settings=["lag.count=3", "lag.rate=[1, 2, 4]"]), kind="plain")
         )
         row = runner.run({"lag.count": 3})
+        assert [runner.checked(changes).wiring.starts[f"lag[{i}]"]["rate"] for i in (1, 2, 3)] == [1.0, 2.0, 4.0]
+        assert runner.checked({"lag[1].rate": 5.0}).wiring.starts["lag[1]"]["rate"] == 5.0
+        with pytest.raises(ScenarioError, match="rate"):
+            runner.checked({"lag.count": 3})
     with pytest.raises(ScenarioError) as caught:
         load(scenario, settings=["lag.count=3"])
     assert (row.status, row.error) == ("refused", str(caught.value))
