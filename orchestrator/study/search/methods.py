@@ -25,6 +25,8 @@ _WIDTH = 0.3
 """Of the first steps of CMA-ES and of a descent, as a part of the cube."""
 _NEAR = 0.01
 """Steps so small, as a part of the cube, count as stuck: digits of a margin that holds break nothing."""
+_LITTLE = 1e-3
+"""Which part of the largest slope counts as none."""
 _MOST = 64
 """The largest population of CMA-ES: on a plateau it is stuck each time at once."""
 _GROUP = 4
@@ -129,8 +131,9 @@ class Tpe(Method):
 class Gradient(Method):
     """Projected descent by the score's slope from the scenario's own point; started anew elsewhere when stuck.
 
-    The length of a step, along the axis that moves most, is doubled where a run was worth less, and else quartered.
-    What is no number stays as it was drawn at the start.
+    All axes with a slope move by the same length: in the cube that is steepest, and a corner, where most requirements
+    break, is few steps away. The length is doubled where a run was worth less, and else quartered. What is no number
+    stays as it was drawn at the start.
     """
 
     def __init__(self, space: Space, seed: int, first: Array, score: float, slope: Slope = flat) -> None:
@@ -139,14 +142,14 @@ class Gradient(Method):
         self._direction = self._downwards(first, score)
 
     def _downwards(self, at: Array, score: float) -> Array | None:
-        """Where to go from a point of the cube, 1 along the axis that moves most; None where nowhere is lower."""
+        """Where to go from a point of the cube, -1, 0 or 1 along each axis; None where nowhere is lower."""
         self._at, self._score = at, score
         if math.isnan(score):
             return None
         slope = np.array(self._slope(at))
         slope[((at <= 0.0) & (slope > 0.0)) | ((at >= 1.0) & (slope < 0.0))] = 0.0
         most = float(np.abs(slope).max())
-        return -slope / most if 0.0 < most < math.inf else None
+        return np.where(np.abs(slope) > _LITTLE * most, -np.sign(slope), 0.0) if 0.0 < most < math.inf else None
 
     def ask(self) -> list[Array]:
         """The next point of a descent, or where another begins."""
