@@ -153,7 +153,7 @@ class TracedLoop:
         """A run with given values, keeping signals by name."""
         settling = [given]
         for _ in self._steps:
-            settling.append(np.asarray(self._sweep(settling[-1])).ravel())
+            settling.append(_array(self._sweep(settling[-1])))
             if np.array_equal(settling[-1], settling[-2]):
                 break
         rows = [self.places[name] for name in names]
@@ -161,8 +161,8 @@ class TracedLoop:
         count = count_steps(self._stepping.start_time, self._stepping.stop_time, self._stepping.step) or 0
         for begin in range(0, count, _CHUNK):
             values = self._forward(stops[-1], begin, min(_CHUNK, count - begin))
-            kept.append(values[rows])
-            stops.append(values[:, -1])
+            kept.append(values[rows, :].full())
+            stops.append(_array(values[:, -1]))
         signals = np.concatenate(kept, axis=1)
         return Flight(
             given, settling, stops, {"time": self._times(0, count + 1), **dict(zip(names, signals, strict=True))}
@@ -171,14 +171,14 @@ class TracedLoop:
     def _times(self, begin: int, count: int) -> Array:
         return np.asarray(self._stepping.start_time + self._stepping.step * np.arange(begin, begin + count))
 
-    def _forward(self, values: Array, begin: int, count: int) -> Array:
+    def _forward(self, values: Array, begin: int, count: int) -> Any:
         """The values after each of some steps, (size, count)."""
         if count in self._step:
-            return np.asarray(self._step[count](values, self._times(begin, count)))
+            return self._step[count](values, self._times(begin, count))
         found = [values]
         for time in self._times(begin, count):
-            found.append(np.asarray(self._step[1](found[-1], time)).ravel())
-        return np.array(found[1:]).T
+            found.append(self._step[1](found[-1], time))
+        return ca.horzcat(*found[1:])
 
     def pull(self, flight: Flight, weights: Mapping[str, float], place: int) -> Array:
         """The gradient of a weighted sum of signals at a communication point by its number.
@@ -192,20 +192,25 @@ class TracedLoop:
         for chunk in range((place - 1) // _CHUNK, -1, -1):
             begin = chunk * _CHUNK
             count, values = min(_CHUNK, place - begin), flight.stops[chunk]
-            passed = np.column_stack([values, self._forward(values, begin, count)])[:, count - 1 :: -1]
-            times = self._times(begin, count)[::-1]
-            for seed_of, point, time in self._chunks(count, passed, times):
-                seed = np.asarray(seed_of(seed, point, time))[:, -1]
+            passed = ca.horzcat(values, self._forward(values, begin, count))[:, count - 1 :: -1]
+            seed = self._pulled(seed, passed, self._times(begin, count)[::-1])
         for values in reversed(flight.settling[:-1]):
-            seed = np.asarray(self._sweep_back(seed, values)).ravel()
+            seed = _array(self._sweep_back(seed, values))
         return seed
 
-    def _chunks(self, count: int, passed: Array, times: Array) -> Iterator[tuple[Any, Array, Array]]:
+    def _pulled(self, seed: Array, passed: Any, times: Array) -> Array:
+        """A gradient with respect to what was some steps before; the values there are given, the last first."""
+        count = len(times)
         if count in self._back:
-            yield self._back[count], passed, times
-        else:
-            for point, time in zip(passed.T, times, strict=True):
-                yield self._back[1], point, time
+            return _array(self._back[count](seed, passed, times)[:, -1])
+        for k, time in enumerate(times):
+            seed = _array(self._back[1](seed, passed[:, k], time))
+        return seed
+
+
+def _array(column: Any) -> Array:
+    """A column of CasADi's."""
+    return np.asarray(column.full()).ravel()
 
 
 def _problem(name: str, message: str) -> Problem:
