@@ -65,7 +65,8 @@ class Slopes:
         loop = self._loop(checked)
         given = loop.values(checked)
         text = checked.system.judged.requirements[requirement]
-        judge = Judge({}, {requirement: text}, list(loop.places), loop.parameters)
+        left = checked.wiring.left  # of what a model was swapped for: values that it does not have
+        judge = Judge({}, {requirement: text}, [*loop.places, *left], [*loop.parameters, *left])
         looked = judge.needed_signals & loop.places.keys()
         moving = looked - set(loop.parameters)
         flight = loop.fly(given, moving)
@@ -94,7 +95,7 @@ class Slopes:
         def slope(name: str, place: int) -> float:
             return _steepest(judge, run, float(verdict.margin or 0.0), name, place)
 
-        for name in judge.needed_signals & run.parameters.keys():
+        for name in judge.needed_signals & set(loop.parameters):
             found[loop.places[name]] = slope(name, first)
         moving = [name for name in verdict.blame if name in run.flight.columns]
         for place in range(first, min(first + ahead + 1, len(time))):
@@ -117,11 +118,12 @@ class _Run:
 
     def __init__(self, loop: TracedLoop, checked: Checked, flight: Flight) -> None:
         self.loop, self.flight, self._checked = loop, flight, checked
-        self.parameters = {name: float(flight.given[loop.places[name]]) for name in loop.parameters}
+        given = {name: float(flight.given[loop.places[name]]) for name in loop.parameters}
+        self.parameters: dict[str, Any] = {**checked.wiring.left, **given}
 
     def value(self, name: str, place: int) -> float:
         """Of a parameter, or of a signal at a point."""
-        return self.parameters[name] if name in self.parameters else float(self.flight.columns[name][place])
+        return float(self.parameters[name] if name in self.parameters else self.flight.columns[name][place])
 
     def results(self, columns: Mapping[str, Array], parameters: Mapping[str, float] | None = None) -> Signals:
         """The run, with some other columns or parameters."""

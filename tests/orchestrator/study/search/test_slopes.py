@@ -27,7 +27,7 @@ def system(mine):
     """A lag after a schedule, and its echo."""
     made = System(stop_time=2.0, step=0.1, requirements=REQUIREMENTS)
     made.add("target", "Schedule", {"points": 1}, values=1.0)
-    made.add("lag", mine("Lag"), rate=5.0)
+    made.add("lag", mine("Lag"), rate=5.0, gain=1.0)
     made.add("echo", mine("Sampled"))
     made.add("level", mine("Level"))
     made.connect("lag.x", "level.u")
@@ -46,6 +46,15 @@ def test_the_gradient_of_a_margin_is_that_of_runs(system, requirement):
     wanted = [(high.margins[requirement] - low.margins[requirement]) / (2.0 * step) for high, low in ends]
     assert found == pytest.approx(np.array(wanted), abs=1e-5 * np.abs(wanted).max())
     assert np.abs(found).max() > 0.01
+
+
+def test_a_requirement_may_speak_of_what_a_model_was_swapped_for(system, mine):
+    """The new lag has no gain; the requirement is about the old one's."""
+    system.instances["lag"].model, system.instances["lag"].swapped = mine("LagWithSlope"), True
+    with Batch(system, kind="plain") as batch:
+        space = Space((Dimension.parse("lag.rate=1:6"),), (), {})
+        found = Slopes(batch.checked, space).at("own", np.array([0.5]))
+    assert found == pytest.approx([-0.5])  # the margin falls by a tenth of the rate, whose range is five
 
 
 def test_what_has_no_order_and_a_truth_have_none(system, mine):
