@@ -81,7 +81,8 @@ class Slopes:
         """The traced loop of a structure; values may be others."""
         made = [f"{x.name} {x.model} {sorted(x.build.items())}" for x in checked.system.instances.values()]
         links = [(x.source, x.target, x.scale, x.offset) for x in checked.wiring.links]
-        key = repr((checked.system.stepping, checked.order.sequence, made, links))
+        sub_steps = [starts.get("max_step") for starts in checked.wiring.starts.values()]
+        key = repr((checked.system.stepping, checked.order.sequence, made, links, sub_steps))
         if key not in self._loops:
             self._loops[key] = traced(checked)
         return self._loops[key]
