@@ -107,14 +107,18 @@ class Judge:
                 for name, metric in self._metrics.items()
             ]
 
-    def verdicts(self, signals: Signals) -> list[Verdict]:
+    def verdicts(self, signals: Signals, *, scaled: bool = False) -> list[Verdict]:
         """How a run keeps the requirements.
+
+        Args:
+            signals: the run.
+            scaled: whether margins, and what decides them, are those of robustness.
 
         Raises:
             ExpressionError: for what was told before the run.
         """
         run = Prepared(self._plan, signals)
-        return [_known(requirement).evaluate(run) for requirement in self._requirements.values()]
+        return [_known(requirement).evaluate(run, scaled=scaled) for requirement in self._requirements.values()]
 
     def values(self, signals: Signals) -> dict[str, float]:
         """The values of the metrics of a run by `value_names`; NaN where one cannot be evaluated."""

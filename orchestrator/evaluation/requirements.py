@@ -143,8 +143,12 @@ class Requirement:
             return [Problem("", number, "compare it, as in abs(x) <= 1")]
         return problems
 
-    def evaluate(self, signals: Signals) -> Verdict:
+    def evaluate(self, signals: Signals, *, scaled: bool = False) -> Verdict:
         """Judge a run.
+
+        Args:
+            signals: the run.
+            scaled: whether the margin, and what decides it, are those of robustness.
 
         Raises:
             ExpressionError: for what `check` would have told.
@@ -157,12 +161,12 @@ class Requirement:
         if not indices:
             return Verdict(self.name, self.text, "inconclusive", reason="no signal has such an index")
         try:
-            seen = [(index, self._decision(signals, times, index)) for index in indices]
+            seen = [(index, self._decision(signals, times, index, scaled=scaled)) for index in indices]
             if not seen[0][1].points:
                 return Verdict(self.name, self.text, "inconclusive", reason="no recorded point lies in its window")
             index, worst = min(seen, key=lambda found: found[1].badness)
             verdict, reason = self._verdict(worst, signals, times.end)
-            robustness = self._scaled(signals, times, dict(seen))
+            robustness = _finite(worst.decisive.value) if scaled else self._scaled(signals, times, dict(seen))
         except WindowError as error:
             return Verdict(self.name, self.text, "inconclusive", reason=str(error))
         extreme, culprit = worst.decisive, worst.culprit()

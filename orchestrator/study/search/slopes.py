@@ -1,4 +1,4 @@
-"""`Slopes`: the gradient of a requirement's margin in the cube that a search moves in.
+"""`Slopes`: the gradient of a requirement's scaled margin in the cube that a search moves in.
 
 Almost everywhere a margin has the gradient of the comparison that decides it, at the instant that does. How it changes
 with the signals there is found by moving each of them a little in the judged run; how these change with all that the
@@ -45,7 +45,7 @@ def traced(checked: Checked) -> TracedLoop:
 
 
 class Slopes:
-    """Gradients of a system's margins.
+    """Gradients of a system's margins, scaled as runs are judged by.
 
     Args:
         checked: the system with changes. space: what is varied.
@@ -56,7 +56,7 @@ class Slopes:
         self._loops: dict[str, TracedLoop] = {}
 
     def at(self, requirement: str, point: Array) -> Array:
-        """The gradient of a requirement's margin at a point of the cube, (size,); zero where it has none.
+        """The gradient of a requirement's scaled margin at a point of the cube, (size,); zero where it has none.
 
         Raises:
             ScenarioError: the system has no gradients; what stands against it, and the remedy.
@@ -71,7 +71,7 @@ class Slopes:
         moving = looked - set(loop.parameters)
         flight = loop.fly(given, moving)
         run = _Run(loop, checked, flight)
-        verdict = judge.verdicts(run.results({}))[0]
+        verdict = judge.verdicts(run.results({}), scaled=True)[0]
         if verdict.margin is None or verdict.time is None:
             return np.zeros(self._space.size)
         pulled = self._pulled(run, judge, verdict, text.count("at_sample("))
@@ -151,6 +151,6 @@ def _steepest(judge: Judge, run: _Run, margin: float, name: str, place: int) -> 
             column = np.array(run.flight.columns[name])
             column[place] += step
             moved = run.results({name: column})
-        found = judge.verdicts(moved)[0].margin
+        found = judge.verdicts(moved, scaled=True)[0].margin
         slopes.append(0.0 if found is None else (found - margin) / step)
     return max(slopes, key=abs)

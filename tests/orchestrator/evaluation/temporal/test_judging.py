@@ -5,8 +5,8 @@ import pytest
 from railcosim.orchestrator.evaluation import parse_requirement, robustness, signals
 
 
-def judge(text, run):
-    return parse_requirement("r", text).evaluate(run)
+def judge(text, run, **how):
+    return parse_requirement("r", text).evaluate(run, **how)
 
 
 def test_a_verdict_is_what_the_values_say(case, logic):
@@ -70,12 +70,15 @@ def test_the_signal_and_the_instant_that_decide(cars, text, verdict, margin, tim
     found = judge(text, cars)
     assert (found.verdict, found.margin, found.time, found.blame) == (verdict, margin, time, names[blame])
     assert found.robustness == pytest.approx(scaled)
+    assert judge(text, cars, scaled=True).margin == pytest.approx(scaled)
 
 
 def test_margins_of_unlike_signals_compare(cars):
     """4 m/s is 4 clear margins, 5 m half of one: what decides the margin in plain numbers is another."""
     found = judge("always car[1].v < 7 and car[1].x - car[2].x > -5", cars)
     assert (found.margin, found.blame, found.robustness) == (4.0, ("car[1].v",), 0.5)
+    found = judge("always car[1].v < 7 and car[1].x - car[2].x > -5", cars, scaled=True)
+    assert (found.margin, found.blame, found.robustness) == (0.5, ("car[1].x", "car[2].x"), 0.5)
     assert judge("always car[1].on or car[1].v < 1", cars).robustness == 1.0
     assert judge("finally car[1].on", cars).robustness is None
     assert judge("finally car[1].on", cars).blame == ("car[1].on",)
