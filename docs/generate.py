@@ -13,10 +13,12 @@ from pathlib import Path
 from typing import Any
 
 import component_page
+import json_page
 import typer
 from latex2mathml.converter import convert
 from mkdocs.config.defaults import MkDocsConfig
 from mkdocs.structure.files import File, Files
+from mkdocs.structure.pages import Page
 from railcosim.components import CATALOGUE
 from railcosim.orchestrator.cli.app import app
 from typer.main import get_command
@@ -62,6 +64,11 @@ def on_files(files: Files, config: MkDocsConfig) -> Files:
         if "Components" in section:
             section["Components"] = ["components/index.md", *_navigation()]
     return files
+
+
+def on_page_markdown(markdown: str, page: Page, **_: Any) -> str:
+    """The page about JSON, with the documents of all commands."""
+    return f"{markdown}\n{json_page.tables()}" if page.file.src_uri == "reference/json.md" else markdown
 
 
 def on_page_content(content: str, **_: Any) -> str:

@@ -8,6 +8,7 @@ from typing import Annotated, Any
 import typer
 
 from .. import world
+from .documents import Answer
 from .options import (
     FAILED,
     FMU_FAILED,
@@ -62,7 +63,7 @@ def compare(
     figure_format: FigureFormat = None,
     dpi: Dpi = None,
     quiet: Quiet = False,
-) -> None:
+) -> Answer:
     """Run variants side by side: one table of metrics, a winner per row, overlaid figures.
 
     Variants: each SCENARIO as it stands, then under each --preset, then with each --swap. Several changes to one
@@ -71,6 +72,7 @@ def compare(
     """
     from ..comparison import compare as compare_systems
     from ..comparison import read_directions, variants
+    from .documents import compare_document
     from .printing import show_comparison, show_page, show_progress
 
     if report:
@@ -99,18 +101,20 @@ def compare(
         directions=read_directions(directions or (), metrics),
         progress=lambda name, start: show_progress(name, quiet, start),
     )
-    show_comparison(comparison, quiet)
     ran = [variant.run.directory for variant in comparison.variants if variant.run and variant.run.directory]
+    page = None
     if report and ran:
         from ..report import REPORT_FILE, write_report
 
         page = write_report(ran, directory / REPORT_FILE, comparison.names if len(ran) == len(comparison.names) else ())
+
+    def show() -> None:
+        show_comparison(comparison, quiet)
         show_page(page, quiet)
-    if comparison.interrupted:
-        raise typer.Exit(interrupted(comparison.interrupted))
-    if comparison.broken:
-        raise typer.Exit(FMU_FAILED)
-    raise typer.Exit(FAILED if comparison.requirement_failed else OK)
+
+    code = FMU_FAILED if comparison.broken else FAILED if comparison.requirement_failed else OK
+    code = interrupted(comparison.interrupted) if comparison.interrupted else code
+    return Answer(lambda: compare_document(comparison, page), show, code)
 
 
 def linearize(
@@ -143,7 +147,7 @@ def linearize(
     figure_format: FigureFormat = None,
     dpi: Dpi = None,
     quiet: Quiet = False,
-) -> None:
+) -> Answer:
     """Linearize the closed loop at a time of a run: eigenvalues, stability, step and Bode figures, string stability.
 
     Exit codes: 0 stable (string stability is told, not judged); 1 not stable; 2 the input is wrong; 3 an FMU failed.
@@ -156,6 +160,7 @@ def linearize(
         write_linear,
     )
     from ..linearization import linearize as linearize_system
+    from .documents import linearize_document
     from .lines import and_figures
     from .printing import open_console, say, show_progress
     from .printing.linear import show_linear
@@ -181,8 +186,12 @@ def linearize(
     drawn: Any = {"duration": duration, "dpi": dpi} | ({"format": figure_format.value} if figure_format else {})
     figures = [] if no_figures else draw_linear(model, found, passings, directory, **drawn)
     write_linear(directory, model, found, passings, figures)
-    if not quiet:
-        out = open_console()
-        show_linear(out, model, found, passings)
-        say(out, f"Files in {directory}: linear.json{and_figures(len(figures))}", whole=True)
-    raise typer.Exit(OK if found.verdict == "stable" else FAILED)
+
+    def show() -> None:
+        if not quiet:
+            out = open_console()
+            show_linear(out, model, found, passings)
+            say(out, f"Files in {directory}: linear.json{and_figures(len(figures))}", whole=True)
+
+    code = OK if found.verdict == "stable" else FAILED
+    return Answer(lambda: linearize_document(model, found, passings, directory, figures), show, code)

@@ -3,17 +3,19 @@
 from __future__ import annotations
 
 import logging
+import sys
 from collections.abc import Sequence
-from typing import Annotated
+from typing import Annotated, Any
 
 import typer
 
 from ...components.errors import ComponentError
 from .. import world
-from ..errors import FmuError, RailcosimError, RunError, ScenarioError
+from ..errors import RailcosimError
 from . import analysis, models, reports, runs, scenarios, searches, studies
-from .lines import Log, folded, tell
-from .options import FMU_FAILED, OK, WRONG_INPUT
+from .documents import answering, fail, failed, wants_json
+from .lines import Log
+from .options import OK
 from .streams import flush_streams, secure_streams
 from .supervision import supervised
 
@@ -24,6 +26,9 @@ app = typer.Typer(
     rich_markup_mode=None,
     pretty_exceptions_enable=False,
 )
+
+_USAGE: Any = typer.BadParameter.__mro__[2]
+"""`ClickException`: where it is imported from differs between versions of typer."""
 
 
 def main() -> None:
@@ -42,26 +47,17 @@ def _command() -> int:
 
 def call(arguments: Sequence[str] | None = None) -> int:
     """Run a command, with the arguments of the process by default, and return its exit code."""
+    words = sys.argv[1:] if arguments is None else arguments
     try:
-        app(arguments)
-    except RunError as error:
-        what = "an FMU" if isinstance(error, FmuError) else "the run"
-        return _fail([f"{what} failed: {error}"], FMU_FAILED)
-    except ScenarioError as error:
-        return _fail(folded(error.problems), WRONG_INPUT)
-    except (RailcosimError, ComponentError) as error:
-        return _fail([str(error)], WRONG_INPUT)
-    except OSError as error:
-        return _fail([f"{error.filename or 'a file'}: {error.strerror or error}"], WRONG_INPUT)
-    except SystemExit as end:
-        return end.code if isinstance(end.code, int) else OK
-    return OK
-
-
-def _fail(messages: Sequence[str], code: int) -> int:
-    for message in messages:
-        tell(f"error: {message}")
-    return code
+        code = app(list(words), standalone_mode=False)
+    except _USAGE as error:
+        if wants_json(words):
+            return fail([error.format_message()], error.exit_code, words)
+        error.show()
+        return int(error.exit_code)
+    except (RailcosimError, ComponentError, OSError) as error:
+        return fail(failed(error), arguments=words)
+    return code if isinstance(code, int) else OK
 
 
 def _version(wanted: bool) -> None:
@@ -81,8 +77,8 @@ def options(
     """Co-simulate trains, cruise controllers and ATO controllers as FMUs."""
 
 
-app.command()(runs.run)
-app.command("list")(scenarios.list_all)
+app.command()(answering(runs.run))
+app.command("list")(answering(scenarios.list_all, "list"))
 for command in (
     scenarios.check,
     runs.plot,
@@ -100,7 +96,7 @@ for command in (
     studies.study,
     studies.replay,
 ):
-    app.command()(command)
+    app.command()(answering(command))
 
 
 if __name__ == "__main__":

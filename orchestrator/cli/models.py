@@ -9,6 +9,7 @@ from typing import Annotated
 import typer
 
 from ..errors import ScenarioError
+from .documents import Answer, written
 from .options import (
     FAILED,
     OK,
@@ -37,7 +38,8 @@ def describe(
         ),
     ],
     builds: Annotated[list[str] | None, typer.Option("--with", help="Give a build argument: carriages=8.")] = None,
-) -> None:
+    quiet: Quiet = False,
+) -> Answer:
     """Show what a component, any FMU or a scenario is.
 
     Of a model its variables by causality, with units, start values and direct dependencies; its build arguments, where
@@ -51,7 +53,8 @@ def describe(
     from ..problems import Problem, suggestion
     from ..scenario import shipped
     from ..times import digits
-    from .printing import open_console, say, show_compilations, show_interface, show_system
+    from .documents import describe_document, scenario_document
+    from .printing import open_console, show_compilations, show_model, show_system
 
     arguments = build_arguments(builds)
     is_scenario = name.endswith(".toml") or name in dict(shipped())
@@ -61,18 +64,16 @@ def describe(
     if is_fmu and arguments:
         raise ScenarioError(f"{name} is built already; it takes no --with {', '.join(arguments)}")
     if is_scenario:
-        show_system(open_console(), load_system(name, None, None, builds, None))
-        return
+        system = load_system(name, None, None, builds, None)
+        return Answer(lambda: scenario_document(system), lambda: show_system(open_console(), system))
     if not (is_fmu or name in CATALOGUE or ".py:" in name):
         known = (*CATALOGUE, *dict(shipped()))
         remedy = suggestion(name, known) or "'orchestrate list' has them; a file is named with its ending"
         raise ScenarioError(Problem("", f"there is no component or shipped scenario {name!r}", remedy))
-    with show_compilations(quiet=False, doing=f"reading {name}"), Workspace() as workspace:
+    with show_compilations(quiet, doing=f"reading {name}"), Workspace() as workspace:
         path, _, lacks = (Path(name), "", "") if is_fmu else package(name, arguments)
         interface = load_fmu(path, workspace).interface
-    out = open_console()
     annotation = interface.annotation or Annotation()
-    say(out, interface.model, "bold")
     facts = {
         "": interface.description,
         "note": annotation.note,
@@ -87,12 +88,7 @@ def describe(
         "default step": "" if interface.default_step is None else f"{digits(interface.default_step)} s",
         "saves its state": "yes" if interface.can_save_state else "no",
     }
-    for label, fact in facts.items():
-        if fact:
-            say(out, f"{label}: {fact}" if label else fact)
-    for warning in interface.warnings:
-        say(out, f"warning: {warning}", "yellow")
-    show_interface(out, interface)
+    return Answer(lambda: describe_document(interface, facts), lambda: show_model(open_console(), interface, facts))
 
 
 def build(
@@ -111,7 +107,7 @@ def build(
     ] = None,
     output: Annotated[Path | None, typer.Option("--output", "-o", help="Directory for the FMUs.")] = None,
     quiet: Quiet = False,
-) -> None:
+) -> Answer:
     """Build FMUs to keep, for other tools or for --swap; prints the files it wrote."""
     from ...components import CATALOGUE
     from ...fmus.release import default_directory, release
@@ -122,7 +118,7 @@ def build(
     if not wanted:
         raise ScenarioError(f"name the components to build, or --all; there is {', '.join(CATALOGUE)}")
     with show_compilations(quiet):
-        written = release(
+        paths = release(
             tuple(dict.fromkeys(wanted)),
             build_arguments(builds),
             output or default_directory(),
@@ -131,8 +127,7 @@ def build(
             checksums=every,
             tell=(lambda line: None) if quiet else tell,
         )
-    for path in written:
-        print(path)
+    return written(paths, quiet)
 
 
 def pack(
@@ -154,24 +149,32 @@ def pack(
         str | None, typer.Option(help="all, or some of linux64,win64,darwin64; this machine's by default.")
     ] = None,
     trust: Trust = False,
-) -> None:
+    quiet: Quiet = False,
+) -> Answer:
     """Write one FMU that holds a whole scenario, for another tool to run as a block."""
     from ..packing import pack as pack_system
+    from .documents import pack_document
     from .printing import open_console, say, show_compilations, show_notes
 
     system = load_system(scenario, preset, settings, builds, swaps, stop=stop, step=step, algorithm=algorithm)
-    with show_compilations(quiet=False):
+    with show_compilations(quiet):
         packed = pack_system(system, output, expose=expose or (), platforms=(platforms or "").split(","), trusted=trust)
-    out = open_console()
-    show_notes(out, packed.notes)
-    shown = f"{len(packed.exposed)} variables, for {', '.join(packed.platforms)}"
-    say(out, f"{packed.path}: {len(system.instances)} FMUs as one, {shown}", whole=True)
+
+    def show() -> None:
+        out = open_console()
+        show_notes(out, packed.notes)
+        shown = f"{len(packed.exposed)} variables, for {', '.join(packed.platforms)}"
+        if not quiet:
+            say(out, f"{packed.path}: {len(system.instances)} FMUs as one, {shown}", whole=True)
+
+    return Answer(lambda: pack_document(packed, len(system.instances)), show)
 
 
 def validate(
     fmu: Annotated[Path, typer.Argument(help="Any FMI co-simulation FMU, ours or not.")],
     timeout: Annotated[float, typer.Option(min=0.1, help="Longest time for one probe, in s.")] = PROBE_SECONDS,
-) -> None:
+    quiet: Quiet = False,
+) -> Answer:
     """Check any FMU: archive, description, and probes that cannot take this program down.
 
     Probes execute the code of the FMU, with your rights.
@@ -179,17 +182,28 @@ def validate(
     Exit codes: 0 nothing failed; 1 something did; 2 the file is no FMU that could be used.
     """
     from ..validation import validate as validate_fmu
+    from .documents import validate_document
     from .printing import open_console, show_compilations, show_report
 
-    with show_compilations(quiet=False, doing=f"reading and trying {fmu}"):
+    with show_compilations(quiet, doing=f"reading and trying {fmu}"):
         report = validate_fmu(fmu, timeout=timeout)
-    show_report(open_console(), report)
-    raise typer.Exit(OK if report.passed else FAILED)
+    return Answer(
+        lambda: validate_document(report),
+        lambda: show_report(open_console(), report, quiet),
+        OK if report.passed else FAILED,
+    )
 
 
-def new(path: Annotated[Path, typer.Argument(help="The file to write, such as my_controller.py.")]) -> None:
+def new(
+    path: Annotated[Path, typer.Argument(help="The file to write, such as my_controller.py.")],
+    quiet: Quiet = False,
+) -> Answer:
     """Write a commented controller to start from; it runs."""
+    from .documents import new_document
+    from .lines import printable
     from .skeleton import write_skeleton
 
     name = write_skeleton(path)
-    print(f"{path} written. Try it:\n  orchestrate run comfort_cruise --swap cruise={shlex.quote(f'{path}:{name}')}")
+    swap = shlex.quote(f"cruise={path}:{name}")
+    hint = printable(f"{path} written. Try it:\n  orchestrate run comfort_cruise --swap {swap}")
+    return Answer(lambda: new_document(path, name), lambda: None if quiet else print(hint))

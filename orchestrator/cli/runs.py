@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections import Counter
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -10,6 +9,7 @@ import typer
 
 from .. import world
 from ..errors import ScenarioError
+from .documents import Answer, written
 from .options import (
     FAILED,
     OK,
@@ -33,8 +33,8 @@ from .options import (
 )
 
 if TYPE_CHECKING:
-    from ..evaluation import ComparedValue
-    from ..run import Finding, Run, StepCheck
+    from ..run import Run, StepCheck
+    from .documents import CaseDocument
 
 
 def run(
@@ -86,7 +86,7 @@ def run(
     figure_format: FigureFormat = None,
     dpi: Dpi = None,
     quiet: Quiet = False,
-) -> None:
+) -> Answer:
     """Run a scenario: results, metrics, verdicts, figures.
 
     A run executes the code of all FMUs and Python components that the scenario names, with your rights.
@@ -99,6 +99,7 @@ def run(
     from ..isolation import isolate
     from ..run import add_step_check, check_step, execute, go_on, read_checkpoint
     from ..scenario import load
+    from .documents import run_document
     from .printing import show_page, show_progress, show_run
 
     if report:
@@ -138,15 +139,22 @@ def run(
         verdict = check_step(outcome, second)
         if outcome.directory is not None:
             add_step_check(outcome.directory, verdict)
-    show_run(outcome, second, verdict, quiet)
+    page = None
     if report and outcome.directory is not None:
         from ..report import write_report
 
-        show_page(write_report([outcome.directory]), quiet)
-    for ended in (outcome, second):
-        if ended is not None and ended.status == "failed" and ended.error is not None:
-            raise ended.error
-    raise typer.Exit(_exit_code(outcome, second, verdict))
+        page = write_report([outcome.directory])
+
+    def show() -> None:
+        show_run(outcome, second, verdict, quiet)
+        show_page(page, quiet)
+
+    return Answer(
+        lambda: run_document(outcome, second, verdict, page),
+        show,
+        _exit_code(outcome, second, verdict),
+        next((each.error for each in (outcome, second) if each and each.status == "failed" and each.error), None),
+    )
 
 
 def _at_half_the_step(outcome: Run, kind: KindName, quiet: bool) -> Run | None:
@@ -175,7 +183,7 @@ def reproduce(
     ] = None,
     kind: Kind = KindName.auto,
     quiet: Quiet = False,
-) -> None:
+) -> Answer:
     """Run every published case and print what a source says beside what is measured.
 
     Claim, known and measured value, tolerance and verdict, under the command that shows them; of our own references
@@ -186,12 +194,10 @@ def reproduce(
     from ..comparison import published_cases
     from ..evaluation import BAD
     from ..run import execute
-    from .printing import in_one_line, open_console, say, show_cases, show_findings, show_values, summary
+    from .documents import CaseDocument, reproduce_document
+    from .printing import show_cases, show_reproduced
 
-    published: dict[str, list[ComparedValue]] = {}
-    failed: dict[str, list[ComparedValue]] = {}
-    every: list[ComparedValue] = []
-    noticed: dict[str, list[Finding]] = {}
+    done: list[CaseDocument] = []
     cases = published_cases(paper)
     with show_cases(len(cases), quiet) as tell:
         for case in cases:
@@ -201,30 +207,11 @@ def reproduce(
                 raise outcome.error
             if outcome.status == "interrupted":
                 raise typer.Exit(interrupted(outcome.signal))
-            noticed[case.command.removeprefix("orchestrate run ")] = outcome.findings
-            found = [*outcome.published, *outcome.references]
-            every += found
-            for groups, rows in (
-                (published, outcome.published),
-                (failed, [row for row in (found if quiet else outcome.references) if row.verdict in BAD]),
-            ):
-                if rows:
-                    groups[case.command] = rows
-    out = open_console()
-    for title, findings in () if quiet else noticed.items():
-        show_findings(findings, title, out)
-    if published and not quiet:
-        show_values(out, "Published values", published)
-    if failed:
-        show_values(out, "Missed" if quiet else "References that are missed", failed)
-    bad = any(row.verdict in BAD for row in every)
-    if quiet:
-        kinds = Counter(finding.kind for findings in noticed.values() for finding in findings)
-        found_too = "".join(f"; {count} {kind}" for kind, count in kinds.items())
-        say(out, in_one_line(every) + found_too, "bold red" if bad else "green")
-    for line, worse in () if quiet else summary([], every):
-        say(out, line, "bold red" if worse else "green")
-    raise typer.Exit(FAILED if bad else OK)
+            done.append(
+                CaseDocument(case.command, outcome.status, outcome.findings, outcome.published, outcome.references)
+            )
+    missed = any(row.verdict in BAD for case in done for row in (*case.published, *case.references))
+    return Answer(lambda: reproduce_document(done), lambda: show_reproduced(done, quiet), FAILED if missed else OK)
 
 
 def plot(
@@ -233,10 +220,12 @@ def plot(
         list[str] | None,
         typer.Argument(help="Expressions such as 'train[:].speed'; without, the run's figures."),
     ] = None,
+    *,
     output: Annotated[Path | None, typer.Option("--output", "-o", help="Where to draw; RESULTS by default.")] = None,
     figure_format: FigureFormat = None,
     dpi: Dpi = None,
-) -> None:
+    quiet: Quiet = False,
+) -> Answer:
     """Draw a run's figures again, or chosen signals.
 
     Of a run that was killed, or still goes on, it writes results.csv as well.
@@ -249,10 +238,9 @@ def plot(
     problems = [] if signals else check_figures(loaded.figures, [*loaded.names(), *loaded.parameters])
     if problems:
         raise ScenarioError(problems)
-    if (results / ROWS_FILE).is_file():
-        print(recover_rows(results))
+    recovered = [recover_rows(results)] if (results / ROWS_FILE).is_file() else []
     figures = [{"title": ", ".join(signals), "y": signals}] if signals else loaded.figures
     directory = output or results
     world.mkdir(directory, parents=True, exist_ok=True)
-    for path in draw(written_as(figures, figure_format and figure_format.value, dpi), loaded, directory):
-        print(path)
+    drawn = draw(written_as(figures, figure_format and figure_format.value, dpi), loaded, directory)
+    return written([*recovered, *drawn], quiet)

@@ -4,32 +4,28 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from .options import Algorithm, Preset, Scenario, Set, Step, Stop, Swap, Trust, With, load_system
+from .documents import Answer
+from .options import Algorithm, Preset, Quiet, Scenario, Set, Step, Stop, Swap, Trust, With, load_system
 
 if TYPE_CHECKING:
+    from ..run import Checked
     from ..system import System
 
 
-def list_all() -> None:
+def list_all() -> Answer:
     """List the shipped scenarios, components and master algorithms."""
     from ...components import CATALOGUE
     from ...fmus.references import summary
     from ..master import ALGORITHMS
     from ..scenario import listed
-    from .printing import open_console, say
+    from .documents import list_document
+    from .printing import show_list
 
-    out = open_console()
-    say(out, "Scenarios (orchestrate run NAME)", "bold")
-    for scenario in listed():
-        say(out, f"  {scenario.name}: {scenario.title}")
-        for preset, what in scenario.presets.items():
-            say(out, f"      --preset {preset}" + (f": {what}" if what else ""), "dim")
-    say(out, "Components (orchestrate describe NAME)", "bold")
-    for name, component in CATALOGUE.items():
-        say(out, f"  {name}: {summary(component)}")
-    say(out, "Master algorithms (orchestrate run SCENARIO --algorithm NAME)", "bold")
-    for name, algorithm in ALGORITHMS.items():
-        say(out, f"  {name}: {algorithm.summary()}")
+    scenarios = listed()
+    components = {name: summary(component) for name, component in CATALOGUE.items()}
+    algorithms = {name: algorithm.summary() for name, algorithm in ALGORITHMS.items()}
+    found = (scenarios, components, algorithms)
+    return Answer(lambda: list_document(*found), lambda: show_list(*found))
 
 
 def check(
@@ -43,7 +39,8 @@ def check(
     step: Step = None,
     algorithm: Algorithm = None,
     trust: Trust = False,
-) -> None:
+    quiet: Quiet = False,
+) -> Answer:
     """Find what is wrong before a run, and show how the run would step.
 
     Of an FMU nothing is executed. The file of a Python component is, because it is imported.
@@ -51,34 +48,31 @@ def check(
     from ..fmi import Workspace
     from ..run import check as check_system
     from ..run import describe_stepping
-    from ..times import digits
-    from ..wiring import describe_topology
-    from .lines import counted
-    from .printing import open_console, say, show_compilations, show_notes
+    from .documents import check_document
+    from .printing import show_check, show_compilations
 
     system = load_system(scenario, preset, settings, builds, swaps, stop=stop, step=step, algorithm=algorithm)
     study = _study(system)
-    out = open_console()
-    with Workspace() as workspace, show_compilations(quiet=False, doing="reading what it is made of"):
+    with Workspace() as workspace, show_compilations(quiet, doing="reading what it is made of"):
         checked = check_system(system, workspace, trusted=trust)
-    say(out, system.provenance.title or system.provenance.name, "bold")
-    connections = len(checked.wiring.links)
-    facts = (
-        f"{len(system.instances)} instances, {connections} scalar connections, step {digits(system.stepping.step)} s"
+    stepping = [*describe_stepping(checked), *_delays(system), *_topology(checked)]
+    return Answer(
+        lambda: check_document(system, checked, stepping, study),
+        lambda: show_check(system, checked, [*stepping, *study], quiet),
     )
-    say(out, facts, "dim")
-    for line in describe_stepping(checked):
-        say(out, line)
-    for connection in system.connections:
-        if connection.delay:
-            points = counted(connection.delay, "communication point")
-            say(out, f"delay: {connection.target} receives {connection.source} {points} later")
-    for line in describe_topology({name: model.interface for name, model in checked.models.items()}, checked.wiring):
-        say(out, line)
-    for line in study:
-        say(out, line)
-    show_notes(out, checked.notes)
-    say(out, "no errors", "green")
+
+
+def _delays(system: System) -> list[str]:
+    from .lines import counted
+
+    late = [(each, counted(each.delay, "communication point")) for each in system.connections if each.delay]
+    return [f"delay: {each.target} receives {each.source} {points} later" for each, points in late]
+
+
+def _topology(checked: Checked) -> list[str]:
+    from ..wiring import describe_topology
+
+    return list(describe_topology({name: model.interface for name, model in checked.models.items()}, checked.wiring))
 
 
 def _study(system: System) -> list[str]:

@@ -13,6 +13,7 @@ import typer
 from ..errors import ScenarioError
 from ..problems import Problem
 from ..system import System
+from .documents import Answer
 from .options import (
     FAILED,
     FMU_FAILED,
@@ -86,7 +87,7 @@ def falsify(
     ] = None,
     no_figures: NoFigures = False,
     quiet: Quiet = False,
-) -> None:
+) -> Answer:
     """Search for the run that breaks a requirement, and make what is found as small as it can be.
 
     What is found is a scenario, counterexample.toml; as many runs as the budget may be spent on making it small.
@@ -95,6 +96,7 @@ def falsify(
     interrupted by Ctrl-C, 143 by SIGTERM, 129 by SIGHUP: --resume goes on.
     """
     from ..study.search import falsify as search
+    from .documents import falsify_document
     from .printing import show_falsified, show_search
 
     check_workers(workers, scheduler)
@@ -118,8 +120,8 @@ def falsify(
             progress=shown.progress,
             begun=shown.begun,
         )
-    show_falsified(result, quiet)
-    raise typer.Exit(FAILED if result.found.found else FMU_FAILED if result.found.failed else OK)
+    code = FAILED if result.found.found else FMU_FAILED if result.found.failed else OK
+    return Answer(lambda: falsify_document(result), lambda: show_falsified(result, quiet), code)
 
 
 def optimize(
@@ -152,7 +154,7 @@ def optimize(
     ] = None,
     no_figures: NoFigures = False,
     quiet: Quiet = False,
-) -> None:
+) -> Answer:
     """Search for the values that make metrics least while requirements hold.
 
     One objective is searched for by the tree-structured Parzen estimator and gives best.toml, several by NSGA-II and
@@ -162,6 +164,7 @@ def optimize(
     interrupted by Ctrl-C, 143 by SIGTERM, 129 by SIGHUP: --resume goes on.
     """
     from ..study.search import optimize as search
+    from .documents import optimize_document
     from .printing import show_optimized, show_search
 
     check_workers(workers, scheduler)
@@ -184,8 +187,8 @@ def optimize(
             progress=shown.progress,
             begun=shown.begun,
         )
-    show_optimized(result, quiet)
-    raise typer.Exit(OK if result.found.best else FMU_FAILED if result.found.failed else FAILED)
+    code = OK if result.found.best else FMU_FAILED if result.found.failed else FAILED
+    return Answer(lambda: optimize_document(result), lambda: show_optimized(result, quiet), code)
 
 
 @contextmanager

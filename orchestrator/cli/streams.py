@@ -7,6 +7,8 @@ import io
 import os
 import select
 import sys
+from collections.abc import Iterator
+from contextlib import contextmanager
 from typing import Any, BinaryIO, TextIO, cast
 
 from .. import world
@@ -29,10 +31,32 @@ def secure_streams() -> None:
     sys.stderr = _secured(sys.stderr, 2)
 
 
+@contextmanager
+def aside() -> Iterator[None]:
+    """Keep standard output free for what is printed afterwards: until then all goes to standard error.
+
+    In the process of a command that is for good what an FMU prints, too: its C library may print it late.
+    """
+    kept, raw = sys.stdout, _raw(sys.stdout)
+    if isinstance(raw, _Tolerant) and raw.fileno() == 1:
+        kept.flush()
+        kept = _secured(kept, os.dup(1))
+        os.dup2(2, 1)
+    sys.stdout = sys.stderr
+    try:
+        yield
+    finally:
+        sys.stdout = kept
+
+
+def _raw(stream: TextIO) -> object:
+    return getattr(getattr(stream, "buffer", None), "raw", None)
+
+
 def flush_streams() -> None:
     """See to it that nothing stays behind; say what was lost, if anybody hears."""
     sys.stdout.flush()
-    raw = getattr(getattr(sys.stdout, "buffer", None), "raw", None)
+    raw = _raw(sys.stdout)
     if isinstance(raw, _Tolerant) and raw.trouble not in (None, errno.EPIPE):
         print(f"warning: what was printed is lost: {os.strerror(raw.trouble or 0)}", file=sys.stderr)
     sys.stderr.flush()

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from ..names import SignalName
+from .documents import Answer
 from .options import (
     FAILED,
     FMU_FAILED,
@@ -74,7 +75,7 @@ def study(
     ] = None,
     no_figures: Annotated[bool, typer.Option("--no-figures", help="Draw nothing.")] = False,
     quiet: Quiet = False,
-) -> None:
+) -> Answer:
     """Run a scenario many times, with other values each time: one table of all runs.
 
     A run executes the code of all FMUs and Python components that the scenario names, with your rights, on all workers.
@@ -84,6 +85,7 @@ def study(
     """
     from ..study.campaign import run_study
     from ..study.design import make_plan, plan_notes
+    from .documents import study_document
     from .lines import tell
     from .printing import show_runs, show_study
 
@@ -117,10 +119,12 @@ def study(
             begun=shown.begun,
         )
     figures = [] if no_figures or done.signal else done.draw()
-    show_study(done, quiet, len(figures))
-    if done.signal:
-        raise typer.Exit(interrupted(done.signal))
-    raise typer.Exit(FMU_FAILED if done.broken else FAILED if done.failed else OK)
+    code = FMU_FAILED if done.broken else FAILED if done.failed else OK
+    return Answer(
+        lambda: study_document(done, figures),
+        lambda: show_study(done, quiet, len(figures)),
+        interrupted(done.signal) if done.signal else code,
+    )
 
 
 def _isolating(system: System, names: list[str]) -> list[str]:
@@ -146,12 +150,13 @@ def replay(
     ] = None,
     no_figures: Annotated[bool, typer.Option("--no-figures", help="Draw nothing.")] = False,
     quiet: Quiet = False,
-) -> None:
+) -> Answer:
     """Run one run of a study again, as a single run with all results and figures, to the same bits.
 
     Exit codes: those of run; and 1 where it is not what the study has, to the bit.
     """
     from ..study.campaign import replay as replay_run
+    from .documents import replay_document
     from .lines import tell
     from .printing import show_progress, show_run
 
@@ -166,12 +171,15 @@ def replay(
             progress=progress,
             writing=progress and progress.writing,
         )
-    show_run(again.run, None, None, quiet)
-    for line in (*again.notes, *(f"not the same as in the study: {what}" for what in again.differences)):
-        tell(f"warning: {line}")
-    if not again.differences and not quiet:
-        tell(f"run {number} of {directory}: the same to the bit")
-    raise typer.Exit(_exit_code(again.run, bool(again.differences)))
+
+    def show() -> None:
+        show_run(again.run, None, None, quiet)
+        for line in (*again.notes, *(f"not the same as in the study: {what}" for what in again.differences)):
+            tell(f"warning: {line}")
+        if not again.differences and not quiet:
+            tell(f"run {number} of {directory}: the same to the bit")
+
+    return Answer(lambda: replay_document(again), show, _exit_code(again.run, bool(again.differences)))
 
 
 def _exit_code(run: Run, differs: bool) -> int:

@@ -14,7 +14,7 @@ from pathlib import Path
 from .. import world
 from ..fmi.guard import NOTES, described, share_notes
 from ..isolation import CRASHES, end_with_parent, signal_name
-from .lines import tell
+from .documents import fail
 from .options import FMU_FAILED, interrupted
 
 _ASKING = {signal.SIGINT, signal.SIGTERM, *({signal.SIGHUP} if os.name == "posix" else ())}
@@ -115,8 +115,7 @@ def _interrupted(child: int, number: int) -> int:
     seen = described(NOTES.under_way())
     why = f"interrupted{f': {seen} does not return' if seen else ''}"
     _conclude(child, "interrupted", why)
-    tell(f"error: {why}; {_ISOLATE}")
-    return interrupted(number)
+    return fail([f"{why}; {_ISOLATE}"], interrupted(number), sys.argv[1:])
 
 
 def _conclude(child: int, status: str, why: str) -> None:
@@ -134,10 +133,13 @@ def _untimely(child: int, code: int, mask: Iterable[int]) -> int:
         seen = described(NOTES.under_way())
         why = f"{seen or 'something in the run, most likely an FMU,'} {what}"
         _conclude(child, "failed", why)
-        tell(f"error: {why}; {_ISOLATE if seen else _REMEDY}")
-        return FMU_FAILED
+        return fail([f"{why}; {_ISOLATE if seen else _REMEDY}"], FMU_FAILED, sys.argv[1:])
     if name == "SIGKILL":
-        tell("error: the process was killed (SIGKILL), most likely by the system, for lack of memory")
+        fail(
+            ["the process was killed (SIGKILL), most likely by the system, for lack of memory"],
+            128 - code,
+            sys.argv[1:],
+        )
     else:
         signal.signal(-code, signal.SIG_DFL)
     signal.pthread_sigmask(signal.SIG_SETMASK, mask)

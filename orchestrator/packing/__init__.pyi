@@ -1,5 +1,6 @@
-from .container import pack
+from .container import Packed, pack
 
 __all__ = [
+    "Packed",
     "pack",
 ]

@@ -4,7 +4,7 @@ from .checkpoint import CHECKPOINT_FILE, read_checkpoint
 from .directory import RunDirectory
 from .ending import Interruption, conclude
 from .execution import at_half_the_step, execute, go_on, resume, run
-from .outcome import Run
+from .outcome import Run, Status
 from .record import add_step_check, read_metrics
 from .record import read as read_record
 from .recording import CSV_FILE, ROWS_FILE, Results, Telling, recover_rows
@@ -28,6 +28,7 @@ __all__ = [
     "Revision",
     "Run",
     "RunDirectory",
+    "Status",
     "StepChange",
     "StepCheck",
     "Telling",

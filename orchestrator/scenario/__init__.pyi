@@ -1,7 +1,7 @@
 from .changes import split_assignment
 from .loading import dump, load
 from .patterns import NAME
-from .shipped import listed, shipped
+from .shipped import Listed, listed, shipped
 from .toml_source import parse_value
 from .trust import import_notes, untrusted_code
 from .values import SEED, assignment, changed, is_structural
@@ -9,6 +9,7 @@ from .values import SEED, assignment, changed, is_structural
 __all__ = [
     "NAME",
     "SEED",
+    "Listed",
     "assignment",
     "changed",
     "dump",

@@ -52,7 +52,7 @@ def show_notes(out: Console, notes: Iterable[str]) -> None:
         say(out, f"note: {note}", "yellow")
 
 
-def show_page(page: Path, quiet: bool) -> None:
-    """Say where a page is."""
-    if not quiet:
+def show_page(page: Path | None, quiet: bool) -> None:
+    """Say where a page is, if there is one."""
+    if page is not None and not quiet:
         say(open_console(), f"Report: {page}", whole=True)

@@ -15,6 +15,17 @@ from .listing import show_listing
 from .tables import table, verdict
 
 
+def show_model(out: Console, interface: Interface, facts: Mapping[str, str]) -> None:
+    """What a model is, a fact a line, what is wrong with it, and its variables."""
+    say(out, interface.model, "bold")
+    for label, fact in facts.items():
+        if fact:
+            say(out, f"{label}: {fact}" if label else fact)
+    for warning in interface.warnings:
+        say(out, f"warning: {warning}", "yellow")
+    show_interface(out, interface)
+
+
 def show_interface(out: Console, interface: Interface) -> None:
     """Every variable of an FMU by causality: unit, start, and what an output depends on directly."""
     for causality, title in (
@@ -65,11 +76,14 @@ def _start(value: object) -> str:
     return f"{value:.10g}" if isinstance(value, float) else str(value)
 
 
-def show_report(out: Console, report: Report) -> None:
-    """One row a check, and the verdict in a line."""
+def show_report(out: Console, report: Report, quiet: bool = False) -> None:
+    """One row a check, and the verdict in a line; when quiet, only what is wrong."""
     made = table("", ("check", "verdict", "what was found"), fold=("what was found",))
-    for finding in report.findings:
+    shown = [each for each in report.findings if not quiet or each.verdict in ("warning", "fail")]
+    for finding in shown:
         made.add_row(Text(finding.check), verdict(finding.verdict), Text(finding.detail))
+    if quiet and not shown:
+        return
     say(out, f"{report.path}: {report.interface.model}", "bold")
     out.print(made)
     found = Counter(finding.verdict for finding in report.findings)

@@ -2,13 +2,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterable, Sequence
+from collections.abc import Collection, Iterable, Mapping, Sequence
+from typing import TYPE_CHECKING
 
 from rich.cells import cell_len
 from rich.console import Console
 from rich.text import Text
 
 from ..lines import printable
+from .console import open_console, say
+
+if TYPE_CHECKING:
+    from ...scenario import Listed
 
 _GAP = "  "
 _NARROWEST = 10
@@ -78,3 +83,19 @@ def _line(cells: Sequence[str], widths: Sequence[int], to_right: Sequence[bool])
         blank = " " * (width - _length(cell))
         padded.append(blank + cell if at_right else cell + blank)
     return _GAP.join(padded).rstrip()
+
+
+def show_list(scenarios: Iterable[Listed], components: Mapping[str, str], algorithms: Mapping[str, str]) -> None:
+    """What there is: scenarios with their presets; components and master algorithms with what they are."""
+    out = open_console()
+    say(out, "Scenarios (orchestrate run NAME)", "bold")
+    for scenario in scenarios:
+        say(out, f"  {scenario.name}: {scenario.title}")
+        for preset, what in scenario.presets.items():
+            say(out, f"      --preset {preset}" + (f": {what}" if what else ""), "dim")
+    say(out, "Components (orchestrate describe NAME)", "bold")
+    for name, what in components.items():
+        say(out, f"  {name}: {what}")
+    say(out, "Master algorithms (orchestrate run SCENARIO --algorithm NAME)", "bold")
+    for name, what in algorithms.items():
+        say(out, f"  {name}: {what}")

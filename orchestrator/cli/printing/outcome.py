@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
-from typing import Any
+from collections import Counter
+from collections.abc import Iterator, Mapping, Sequence
+from typing import TYPE_CHECKING, Any
 
 from rich.console import Console
 
 from ....fmus.references import file_and_class
-from ...evaluation import compare_metrics
+from ...evaluation import BAD, compare_metrics
 from ...run import CHECKPOINT_FILE, Finding, Run, StepChange, StepCheck
 from ...times import digits
 from ..lines import and_figures, counted
@@ -16,7 +17,10 @@ from .console import open_console, say, show_notes
 from .findings import show_findings
 from .metrics import show_metrics
 from .tables import prefixed
-from .verdicts import by_source, not_judged_at_all, show_requirements, show_values, summary
+from .verdicts import by_source, in_one_line, not_judged_at_all, show_requirements, show_values, summary
+
+if TYPE_CHECKING:
+    from ..documents import CaseDocument
 
 _OWN = "References (our own integrations)"
 _SHOWN = 3
@@ -63,6 +67,29 @@ def show_run(outcome: Run, second: Run | None, step: StepCheck | None, quiet: bo
     if not quiet:
         files = f"results.csv, units.json, metrics.json, run.json{and_figures(len(outcome.figures))}"
         say(out, f"Files in {outcome.directory}: {files}", whole=True)
+
+
+def show_reproduced(cases: Sequence[CaseDocument], quiet: bool) -> None:
+    """What sources say beside what is measured; when quiet, only what is missed, and one line."""
+    out, every = open_console(), [row for case in cases for row in (*case.published, *case.references)]
+    missed = {
+        case.command: [row for row in (*(case.published if quiet else ()), *case.references) if row.verdict in BAD]
+        for case in cases
+    }
+    missed = {command: rows for command, rows in missed.items() if rows}
+    published = {case.command: case.published for case in cases if case.published}
+    for case in () if quiet else cases:
+        show_findings(case.findings, case.command.removeprefix("orchestrate run "), out)
+    if published and not quiet:
+        show_values(out, "Published values", published)
+    if missed:
+        show_values(out, "Missed" if quiet else "References that are missed", missed)
+    if quiet:
+        kinds = Counter(finding.kind for case in cases for finding in case.findings)
+        found_too = "".join(f"; {count} {kind}" for kind, count in kinds.items())
+        say(out, in_one_line(every) + found_too, "bold red" if any(row.verdict in BAD for row in every) else "green")
+    for line, worse in () if quiet else summary([], every):
+        say(out, line, "bold red" if worse else "green")
 
 
 def _show_tables(out: Console, outcome: Run, second: Run | None) -> None:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Iterable, Sequence
+from typing import TYPE_CHECKING
 
 from rich.console import Console
 from rich.text import Text
@@ -13,8 +14,25 @@ from ...scenario import import_notes
 from ...system import Connection, Event, Instance, Provenance, System
 from ...times import digits
 from ..lines import counted
-from .console import say, show_notes
+from .console import open_console, say, show_notes
 from .tables import table
+
+if TYPE_CHECKING:
+    from ...run import Checked
+
+
+def show_check(system: System, checked: Checked, lines: Iterable[str], quiet: bool) -> None:
+    """How a scenario without errors would be run; when quiet, only what a user should know."""
+    out, connections = open_console(), len(checked.wiring.links)
+    if not quiet:
+        say(out, system.provenance.title or system.provenance.name, "bold")
+        step = digits(system.stepping.step)
+        say(out, f"{len(system.instances)} instances, {connections} scalar connections, step {step} s", "dim")
+        for line in lines:
+            say(out, line)
+    show_notes(out, checked.notes)
+    if not quiet:
+        say(out, "no errors", "green")
 
 
 def show_system(out: Console, system: System) -> None:

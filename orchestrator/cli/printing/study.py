@@ -14,7 +14,7 @@ from rich.console import Console
 from rich.table import Table
 from rich.text import Text
 
-from ...study.analysis import SHARES, Estimate, Influence, Kept, Sensitivity, Spread, Summary, outputs_of, sensitivity
+from ...study.analysis import SHARES, Estimate, Influence, Kept, Sensitivity, Spread, Summary
 from ..lines import and_figures, counted, tell
 from .console import open_console, say
 from .progress import show_compilations, tell_pool
@@ -190,9 +190,8 @@ def show_study(study: Study, quiet: bool, figures: int = 0) -> None:
     out = open_console(stderr=quiet)
     count, told = study.told["runs"], study.told
     if not quiet:
-        frame = study.frame()
         say(out, str(told["title"] or told["scenario"]), "bold")
-        show_summary(out, study.summary(), (sensitivity(frame, study.plan, name) for name in outputs_of(frame)))
+        show_summary(out, study.summary(), study.sensitivities())
         out.print()
     failing = [name for name, verdicts in study.verdicts.items() if verdicts["fail"]]
     line = f"{len(study)} of {counted(count, 'run')}"

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 from ... import world
 from ...errors import ScenarioError
-from ..analysis import Summary, draw_study, summarize
+from ..analysis import Sensitivity, Summary, draw_study, outputs_of, sensitivity, summarize
 from ..design import Plan
 from .columns import unified
 from .dataset import METADATA, SERIES, parts_of, sorted_tables
@@ -83,6 +83,11 @@ class Study:
     def summary(self, *, level: float = 0.95) -> Summary:
         """How often requirements hold and how metrics are spread, with intervals of a level of confidence."""
         return summarize(self.frame(), self.plan, level=level)
+
+    def sensitivities(self) -> list[Sensitivity]:
+        """What the parameters do to each output, the outputs of interest first."""
+        frame = self.frame()
+        return [sensitivity(frame, self.plan, name) for name in outputs_of(frame)]
 
     def draw(self) -> list[Path]:
         """Draw the pictures of what came out into the directory, as far as there is anything.

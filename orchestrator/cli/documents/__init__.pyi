@@ -1,0 +1,44 @@
+from .analysis import compare_document, linearize_document
+from .answer import Answer, answering, fail, failed, wants_json
+from .catalogue import DOCUMENTS
+from .envelope import Document, Failure, Mistake
+from .listing import list_document
+from .models import describe_document, new_document, pack_document, validate_document
+from .plain import plain, text_of
+from .runs import CaseDocument, reproduce_document, run_document
+from .scenarios import check_document, scenario_document
+from .searches import falsify_document, optimize_document
+from .studies import replay_document, study_document
+from .written import FilesDocument, written
+
+__all__ = [
+    "DOCUMENTS",
+    "Answer",
+    "CaseDocument",
+    "Document",
+    "Failure",
+    "FilesDocument",
+    "Mistake",
+    "answering",
+    "check_document",
+    "compare_document",
+    "describe_document",
+    "fail",
+    "failed",
+    "falsify_document",
+    "linearize_document",
+    "list_document",
+    "new_document",
+    "optimize_document",
+    "pack_document",
+    "plain",
+    "replay_document",
+    "reproduce_document",
+    "run_document",
+    "scenario_document",
+    "study_document",
+    "text_of",
+    "validate_document",
+    "wants_json",
+    "written",
+]

@@ -1,0 +1,35 @@
+"""The document of each command."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from .analysis import CompareDocument, LinearizeDocument
+from .listing import ListDocument
+from .models import ModelDocument, NewDocument, PackDocument, ValidateDocument
+from .runs import ReproduceDocument, RunDocument
+from .scenarios import CheckDocument, ScenarioDocument
+from .searches import FalsifyDocument, OptimizeDocument
+from .studies import ReplayDocument, StudyDocument
+from .written import FilesDocument
+
+DOCUMENTS: dict[str, Any] = {
+    "run": RunDocument,
+    "list": ListDocument,
+    "check": CheckDocument,
+    "plot": FilesDocument,
+    "reproduce": ReproduceDocument,
+    "report": FilesDocument,
+    "describe": ModelDocument | ScenarioDocument,
+    "build": FilesDocument,
+    "pack": PackDocument,
+    "validate": ValidateDocument,
+    "new": NewDocument,
+    "compare": CompareDocument,
+    "linearize": LinearizeDocument,
+    "falsify": FalsifyDocument,
+    "optimize": OptimizeDocument,
+    "study": StudyDocument,
+    "replay": ReplayDocument,
+}
+"""The type of `Document.result` by command."""
