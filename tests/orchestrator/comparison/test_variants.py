@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 import typer
 from railcosim.orchestrator.cli import analysis as cli_analysis
+from railcosim.orchestrator.cli.documents import answering
 from railcosim.orchestrator.comparison.preference import better, read_directions, winners
 from railcosim.orchestrator.comparison.variants import compare, variants
 from railcosim.orchestrator.errors import ScenarioError
@@ -206,8 +207,8 @@ def test_names_that_give_one_folder_are_told_apart(small, tmp_path):
 @pytest.fixture(scope="module")
 def orchestrate():
     app = typer.Typer()
-    app.command()(cli_analysis.linearize)
-    app.command()(cli_analysis.compare)
+    app.command()(answering(cli_analysis.linearize))
+    app.command()(answering(cli_analysis.compare))
 
     def invoke(*arguments):
         with pytest.MonkeyPatch.context() as patch:
