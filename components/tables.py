@@ -25,12 +25,13 @@ class Column:
 
     Attributes:
         name: its key. unit: SI unit, for messages.
-        type: float, int, bool, or the `Table` that stands in it.
+        type: float, int, bool, str, or the `Table` that stands in it.
         sign: of a number.
         within: the bounds beyond which it cannot be meant: almost surely it is in another unit.
         after: the column whose value it must exceed: one to its left, or by its own name itself in the row before.
         default: what it is where a row leaves it out; without one it is required.
         word: a text that may stand there instead.
+        choices: the texts that may stand there, of a text that is not free.
         note: what the value means, where its name does not say it.
     """
 
@@ -42,6 +43,7 @@ class Column:
     after: str = ""
     default: Any = _REQUIRED
     word: str = ""
+    choices: tuple[str, ...] = ()
     note: str = ""
 
     def read(self, value: Any) -> Any:
@@ -51,7 +53,12 @@ class Column:
             ValueError: it is of another type or sign, beyond its bounds, or not a number.
         """
         if isinstance(self.type, Table):
-            return self.type.read(value)
+            return self.type.record(value) if self.type.single else self.type.read(value)
+        if self.type is str:
+            if not isinstance(value, str) or (self.choices and value not in self.choices):
+                wanted = f"one of {', '.join(map(repr, self.choices))}" if self.choices else "a text"
+                raise ValueError(f"{self.name!r} must be {wanted}, not {value!r}")
+            return value
         if (self.word and value == self.word) or (self.type is bool and isinstance(value, bool)):
             return value
         if self.type is bool:
@@ -79,6 +86,7 @@ class Table:
         whole: makes the table's object of its rows.
         by_place: whether a row is a list of its values, not a table of them by name.
         may_be_empty: whether there may be no row.
+        single: whether it is one row that stands by itself, not a list of rows.
     """
 
     what: str
@@ -87,6 +95,7 @@ class Table:
     whole: Callable[[Sequence[Any]], Any] = tuple
     by_place: bool = False
     may_be_empty: bool = False
+    single: bool = False
 
     def read(self, data: Any) -> Any:
         """The table of a list of rows.

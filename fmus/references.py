@@ -9,7 +9,6 @@ import hashlib
 import importlib
 import importlib.machinery
 import importlib.util
-import json
 import sys
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
@@ -17,11 +16,17 @@ from pathlib import Path
 from types import CodeType, ModuleType
 from typing import Any
 
+from .. import models
 from ..components import CATALOGUE, Component, ComponentError
 from ..components.errors import BuildArgumentError, did_you_mean
+from .foreign import DATA_SUFFIXES, ForeignError, read_data
 
 _PRESENT = sys.stdlib_module_names | {"numpy", __package__.partition(".")[0]}
 """What every component file may import."""
+
+_SHIPPED = Path(models.__file__ or "").resolve().parent
+_DATA_FOLDERS = ("lines", "rolling_stock")
+"""Of the shipped data, relative to the scenarios."""
 
 _MOST = 1 << 24
 """Bytes of a data file: as much as of a scenario."""
@@ -109,22 +114,36 @@ def _imported_modules(file: Path) -> Iterator[str]:
             yield node.module.partition(".")[0]
 
 
+def names_data(value: Any) -> bool:
+    """Whether a build argument names a data file: a text that ends in ``.json``, or of railML ``.railml``, ``.xml``."""
+    return isinstance(value, str) and value.endswith(DATA_SUFFIXES)
+
+
+def data_file(name: str, folder: Path | None = None) -> Path:
+    """The data file of a name: in a folder, the current one by default, or else a line or a train that is shipped."""
+    own, shipped = (folder or Path()) / name, _SHIPPED / name
+    return shipped if not own.exists() and Path(name).parts[0] in _DATA_FOLDERS and shipped.is_file() else own
+
+
 def read_arguments(arguments: Mapping[str, Any] | None) -> dict[str, Any]:
-    """Build arguments with data files read: a text that ends in ``.json`` names one.
+    """Build arguments with the data files read that they name.
 
     Raises:
-        ComponentError: the file is missing, too large or not JSON.
+        ComponentError: the file is missing, too large or not JSON, or a value of a foreign format is unusable.
     """
     given = dict(arguments or {})
     for name, value in given.items():
-        if isinstance(value, str) and value.endswith(".json"):
+        if names_data(value):
             try:
-                size = Path(value).stat().st_size
+                file = data_file(value)
+                size = file.stat().st_size
                 if size > _MOST:
                     raise ComponentError(f"{name}: {value} has {size >> 20} MiB; no more than {_MOST >> 20} are read")
-                given[name] = json.loads(Path(value).read_text(encoding="utf-8"))
+                given[name] = read_data(value, file.read_bytes())
             except OSError as error:
                 raise ComponentError(f"{name}: {value} cannot be read: {error.strerror or error}") from error
+            except ForeignError as error:
+                raise ComponentError(f"{name}: {value}: {error}") from error
             except ValueError as error:
                 raise ComponentError(f"{name}: {value} is not JSON: {error}") from error
             except RecursionError:
@@ -143,7 +162,7 @@ def build_with(cls: type[Component], arguments: Mapping[str, Any] | None) -> Com
         return cls(**read_arguments(given))
     except BuildArgumentError as error:
         file = given.get(error.argument)
-        if not isinstance(file, str) or not file.endswith(".json"):
+        if not names_data(file):
             raise
         raise ComponentError(f"{file}: {error}") from error
 

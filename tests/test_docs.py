@@ -172,7 +172,7 @@ def test_own_controller_keeps_its_promise_of_less_than_forty_lines() -> None:
 def test_the_page_on_components_explains_every_declaration_method_and_key_of_a_line() -> None:
     from railcosim.components import declarations
     from railcosim.components.component import Method
-    from railcosim.components.environment.line import SECTIONS
+    from railcosim.components.environment.track import SECTIONS
 
     text = (ROOT / "docs" / "write_a_component.md").read_text(encoding="utf-8")
     abstract = {"Declaration", "Variable"}
@@ -181,6 +181,17 @@ def test_the_page_on_components_explains_every_declaration_method_and_key_of_a_l
     keys = [column.name for column in SECTIONS.columns]
     wanted = [*(kind.__name__ for kind in kinds if kind.__name__ not in abstract), *get_args(Method), *keys]
     assert sorted(rows) == sorted(wanted)
+
+
+def test_the_page_on_lines_and_trains_explains_every_key() -> None:
+    from railcosim.components.environment.track import LINE
+    from railcosim.components.trains.rolling_stock import TRAIN
+
+    text = (ROOT / "docs" / "lines_and_trains.md").read_text(encoding="utf-8")
+    tables = [text[text.index(title) :].partition("\n## ")[0] for title in ("## A line", "## A train")]
+    for table, kind in zip(tables, (LINE, TRAIN), strict=True):
+        cells = re.findall(r"^\| (`[^|]*)\|", table, re.MULTILINE)
+        assert sorted(re.findall(r"`(\w+)`", " ".join(cells))) == sorted(column.name for column in kind.columns)
 
 
 @pytest.mark.parametrize("page", PAGES, ids=lambda page: page.name)

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
-from ..maths import where
+from ..maths import logical_and, minimum, where
 from ..tables import FASTEST, Column, Table
 
 _ROUNDING = 1e-6
@@ -30,6 +30,14 @@ class SpeedLimit:
         result: Any = self.steps[0][1]
         for begin, speed in self.steps:
             result = where(place > begin + _ROUNDING, speed, result)
+        return result
+
+    def lowest(self, rear: Any, front: Any) -> Any:
+        """The lowest limit in m/s between two places, the rear one's included."""
+        result = self.at(rear)
+        for begin, speed in self.steps:
+            entered = logical_and(front > begin + _ROUNDING, rear <= begin + _ROUNDING)
+            result = where(entered, minimum(result, speed), result)
         return result
 
 

@@ -8,8 +8,8 @@ from typing import Any, NamedTuple
 
 from ..component import Values
 from ..declarations import Data, Input, Memory, Noise, Output, Parameter, Size, State
-from ..environment.line import SECTIONS
-from ..maths import clip, maximum, minimum, piecewise_constant, sin, where
+from ..environment.track import DESCRIPTION, read_line
+from ..maths import clip, maximum, minimum, sin, where
 from .metro_line import MILD
 from .port import STARTING, Train
 from .vehicles import REPEATED, SUBWAY, VEHICLES, distribute, pattern
@@ -74,7 +74,7 @@ class MultipleUnit(TripTrain, ABC):
 
     vehicles = Size(6, minimum=2, description="number of vehicles")
     consist = Data(SUBWAY, convert=VEHICLES.read, description=f"{VEHICLES.description}; {REPEATED}")
-    line = Data(MILD, convert=SECTIONS.read, description=SECTIONS.description)
+    line = Data(MILD, convert=read_line, description=DESCRIPTION)
 
     max_step = Parameter("s", 0.01, minimum=0.0, description="longest integration step inside a communication step")
     load_factor = Parameter("1", 1.0, minimum=0.01, description="masses over those of the vehicles' table")
@@ -159,8 +159,7 @@ class MultipleUnit(TripTrain, ABC):
         """Force of the built-in line against each vehicle at its position in N."""
         line, found = self.line, []
         for mass, x in zip(self._masses(), positions, strict=True):
-            whole = mass * piecewise_constant(x, line.positions, line.resistances)
-            turning = mass * piecewise_constant(x, line.positions, line.opposing)
+            whole, turning = (mass * resistance for resistance in line.resistance(x))
             found.append(Resistance(whole, whole - 2.0 * turning))
         return found
 

@@ -51,9 +51,10 @@ def _is_ceiling(name: str, instance: str) -> bool:
 
 
 def gradients_of(record: Mapping[str, Any]) -> list[dict[str, float]]:
-    """Where along the line which gradient begins: of the first model that was built with a profile of it."""
+    """Where along the line which gradient begins: of the first model that was built with a line."""
     for told in record.get("instances", {}).values():
-        profile = told.get("build", {}).get("profile")
-        if isinstance(profile, list) and all(isinstance(p, Mapping) and "position" in p for p in profile):
-            return [{"from": float(p["position"]), "gradient": float(p.get("gradient", 0.0))} for p in profile]
+        line = told.get("build", {}).get("line")
+        sections = line.get("sections") if isinstance(line, Mapping) else line
+        if isinstance(sections, list) and all(isinstance(p, Mapping) and "position" in p for p in sections):
+            return [{"from": float(p["position"]), "gradient": float(p.get("gradient", 0.0))} for p in sections]
     return []

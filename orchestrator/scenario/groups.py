@@ -11,8 +11,10 @@ import os
 import re
 from collections.abc import Callable, Collection
 from dataclasses import dataclass, field
+from pathlib import Path
 from typing import Any
 
+from ...fmus.references import data_file, names_data
 from .. import world
 from ..errors import ScenarioError
 from ..fmi import is_fmu_name
@@ -188,13 +190,13 @@ def _existing(text: str, folder: str) -> str:
 
 
 def build_argument(value: Any, folder: str) -> Any:
-    """A build argument as it is: a text that ends in `.json` names a file and becomes an absolute path.
+    """A build argument as it is: a text that names a data file becomes an absolute path.
 
     Raises:
         ScenarioError: there is no such file, or the value is a date or a time.
     """
-    if isinstance(value, str) and value.endswith(".json"):
-        return _existing(value, folder)
+    if names_data(value):
+        return _existing(str(data_file(value, Path(folder))), folder)
     if not is_plain(value, tables=True):
         raise ScenarioError(
             Problem("", "takes numbers, texts, true or false, lists and tables of these", "quote a date")

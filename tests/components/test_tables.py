@@ -119,14 +119,14 @@ def test_a_number_beyond_all_bounds_is_refused_not_crashed_on():
 @pytest.mark.parametrize(
     ("build", "said"),
     [
-        (lambda: Line(profile=[{"position": 0.0, "gradient": 5.0}]), "section 1: 'gradient' is 5.0 (rise over run)"),
-        (lambda: Line(profile=[{"position": 0.0}, {"position": 9.0, "gradient": -20}]), "section 2: 'gradient' is -20"),
-        (lambda: Line(profile=[{"position": 0.0, "tunnel": -1.0}]), "'tunnel' is -1.0 (its length, in m)"),
+        (lambda: Line(line=[{"position": 0.0, "gradient": 5.0}]), "section 1: 'gradient' is 5.0 (rise over run)"),
+        (lambda: Line(line=[{"position": 0.0}, {"position": 9.0, "gradient": -20}]), "section 2: 'gradient' is -20"),
+        (lambda: Line(line=[{"position": 0.0, "tunnel": -1.0}]), "'tunnel' is -1.0 (its length, in m)"),
         (
-            lambda: Line(profile=[{"position": 0.0, "resistance": 20.0}]),
+            lambda: Line(line=[{"position": 0.0, "resistance": 20.0}]),
             "'resistance' is 20.0 (further resistance to motion, in",
         ),
-        (lambda: Line(profile=[{"position": 0.0, "radius": 0.8}]), "'radius' is in m, 0 for straight track: 0.8"),
+        (lambda: Line(line=[{"position": 0.0, "radius": 0.8}]), "'radius' is in m, 0 for straight track: 0.8"),
         (lambda: Protection(limits=[[0.0, 300.0]]), "speed limit 1: 'speed' is 300.0 (in m/s)"),
         (lambda: ReferenceProfile(profile={"speed": 250.0, "jerk": 0.1}), "'speed' is 250.0 (in m/s)"),
         (
@@ -143,5 +143,5 @@ def test_what_no_train_can_have_is_refused_with_the_unit_that_is_meant(build, sa
 
 def test_what_trains_have_is_taken():
     """Lisbon's trams, a tram's curve, the Gotthard base tunnel; a record run."""
-    Line(profile=[{"position": 0.0, "gradient": 0.135, "radius": 11.0, "tunnel": 57.1e3}])
+    Line(line=[{"position": 0.0, "gradient": 0.135, "radius": 11.0, "tunnel": 57.1e3}])
     Protection(limits=[[0.0, 574.8 / 3.6]])

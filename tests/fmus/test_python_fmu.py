@@ -18,7 +18,7 @@ ARGUMENTS = {
     "Schedule": {"points": 3},
     "Chain": {"masses": 4},
     "RadioLink": {"messages": 4, "outages": [[1.0, 1.4]]},
-    "Line": {"profile": [{"position": -2.0, "gradient": 0.01}, {"position": 1.0, "gradient": -0.02, "radius": 7e3}]},
+    "Line": {"line": [{"position": -2.0, "gradient": 0.01}, {"position": 1.0, "gradient": -0.02, "radius": 7e3}]},
 }
 AGED = {"age_limit": 0.2, "degraded_age": 0.5}
 STARTS = {

@@ -5,7 +5,7 @@ import zipfile
 import pytest
 from railcosim.components import ComponentError
 from railcosim.fmus.build import build, plain
-from railcosim.fmus.references import imports_of, resolve
+from railcosim.fmus.references import build_with, imports_of, resolve
 
 USER = (
     "from railcosim.components import Component, Output\n\n\nclass C(Component):\n    y = Output('1')\n\n"
@@ -80,9 +80,9 @@ def test_a_file_edited_within_the_second_is_read_again(write_component):
 def test_a_data_file_is_read_and_belongs_to_the_identity(tmp_path):
     line = tmp_path / "line.json"
     line.write_text('[{"position": 0.0, "gradient": 0.005}]', encoding="utf-8")
-    first = build("Line", {"profile": str(line)})
+    first = build("Line", {"line": str(line)})
     line.write_text('[{"position": 0.0, "gradient": 0.006}]', encoding="utf-8")
-    assert build("Line", {"profile": str(line)}) != first
+    assert build("Line", {"line": str(line)}) != first
 
 
 @pytest.mark.parametrize(
@@ -93,15 +93,15 @@ def test_a_data_file_that_cannot_be_used(tmp_path, text, complaint):
     if text is not None:
         path.write_text(text, encoding="utf-8")
     with pytest.raises(ComponentError, match=complaint):
-        build("Line", {"profile": str(path)})
+        build("Line", {"line": str(path)})
 
 
 def test_a_vast_data_file_is_not_read(tmp_path):
     path = tmp_path / "line.json"
     with path.open("wb") as stream:
         stream.truncate(100 << 20)
-    with pytest.raises(ComponentError, match=r"^profile: .*line\.json has 100 MiB; no more than 16 are read$"):
-        build("Line", {"profile": str(path)})
+    with pytest.raises(ComponentError, match=r"^line: .*line\.json has 100 MiB; no more than 16 are read$"):
+        build("Line", {"line": str(path)})
 
 
 def test_what_is_wrong_in_a_data_file_is_told_with_the_file(tmp_path):
@@ -109,10 +109,8 @@ def test_what_is_wrong_in_a_data_file_is_told_with_the_file(tmp_path):
     path.write_text('[{"position": 0.0}, {"position": 100.0, "gradient": 5.0}]')
     for make in (build, plain):
         with pytest.raises(ComponentError) as told:
-            make("Line", {"profile": str(path)})
-        assert str(told.value).startswith(
-            f"{path}: Line: build argument 'profile' is unusable: section 2: 'gradient' is"
-        )
+            make("Line", {"line": str(path)})
+        assert str(told.value).startswith(f"{path}: Line: build argument 'line' is unusable: section 2: 'gradient' is")
 
 
 def test_what_an_import_executes_is_known_before(tmp_path):
@@ -129,3 +127,14 @@ def test_what_an_import_executes_is_known_before(tmp_path):
     assert sorted(found.files) == sorted((tmp_path / name).resolve() for name in ("own.py", "helper.py", "dated.py"))
     own = (tmp_path / "own.py").resolve()
     assert found.others == {"scipy": own, "data": own, str(own.parent / "folder"): own}
+
+
+def test_shipped_data_are_found_by_name_where_the_folder_has_none(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    assert len(build_with(resolve("Line"), {"line": "lines/yizhuang.json"}).line.stops) == 27
+    (tmp_path / "lines").mkdir()
+    (tmp_path / "lines" / "yizhuang.json").write_text('[{"position": 0.0}]', encoding="utf-8")
+    assert build_with(resolve("Line"), {"line": "lines/yizhuang.json"}).line.stops == ()
+    for name in ("lines/nowhere.json", "hilly_line.json"):
+        with pytest.raises(ComponentError, match="cannot be read"):
+            build_with(resolve("Line"), {"line": name})

@@ -15,7 +15,7 @@ from typing import Any, NamedTuple
 
 from railcosim import models
 
-from ....fmus.references import file_and_class, imports_of
+from ....fmus.references import file_and_class, imports_of, names_data
 from ... import world
 from ...errors import ScenarioError, naming
 from ...fmi import is_fmu_name, packaged
@@ -184,7 +184,7 @@ def named_in(value: Any, folder: str) -> Iterator[str]:
     elif isinstance(value, str):
         code, _ = file_and_class(value)
         file = os.path.abspath(os.path.join(folder, code or value))
-        if (code or is_fmu_name(value) or value.endswith(".json")) and os.path.isfile(file):
+        if (code or is_fmu_name(value) or names_data(value)) and os.path.isfile(file):
             yield file
             yield from map(str, imports_of(Path(file)).files if code else ())
 

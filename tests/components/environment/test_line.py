@@ -3,6 +3,7 @@
 import pytest
 from railcosim.components import ComponentError, Line
 
+RESISTANCES = ("line_resistance", "curve_resistance")
 PROFILE = [
     {"position": 0.0},
     {"position": 1e3, "gradient": 0.01},
@@ -10,6 +11,11 @@ PROFILE = [
     {"position": 3e3, "resistance": 0.05},
     {"position": 4e3, "tunnel": 1500.0},
 ]
+
+
+def resistances(**values):
+    found = Line(**values).outputs()
+    return tuple(found[name] for name in RESISTANCES)
 
 
 @pytest.mark.parametrize(
@@ -26,14 +32,13 @@ PROFILE = [
     ],
 )
 def test_sections(position, expected, opposing):
-    both = {"line_resistance": expected, "curve_resistance": opposing}
-    assert Line(profile=PROFILE, position=position).outputs() == pytest.approx(both, abs=1e-12)
-    half = Line(profile=PROFILE, position=position, factor=0.5).outputs()
-    assert half == pytest.approx({name: 0.5 * value for name, value in both.items()}, abs=1e-12)
+    assert resistances(line=PROFILE, position=position) == pytest.approx((expected, opposing), abs=1e-12)
+    half = resistances(line=PROFILE, position=position, factor=0.5)
+    assert half == pytest.approx((0.5 * expected, 0.5 * opposing), abs=1e-12)
 
 
 def test_without_data_the_line_is_level():
-    assert Line(position=5e3).outputs() == {"line_resistance": 0.0, "curve_resistance": 0.0}
+    assert resistances(position=5e3) == (0.0, 0.0)
 
 
 @pytest.mark.parametrize(
@@ -51,15 +56,13 @@ def test_without_data_the_line_is_level():
         [{"position": 0.0, "gradient": "steep"}],
     ],
 )
-def test_unusable_lines_are_refused(profile):
-    with pytest.raises(ComponentError, match="profile"):
-        Line(profile=profile)
+def test_unusable_sections_are_refused(profile):
+    with pytest.raises(ComponentError, match="'line' is unusable"):
+        Line(line=profile)
 
 
-def test_further_gradients_are_added_to_those_of_the_profile():
-    line = Line(points=2, position=150.0, positions=[0.0, 100.0], gradients=[0.01, -0.02], factor=0.5)
-    assert line.outputs() == {"line_resistance": 0.5 * 9.81 * -0.02, "curve_resistance": 0.0}
+def test_further_gradients_are_added_to_those_of_the_line():
+    further = {"points": 2, "positions": [0.0, 100.0], "gradients": [0.01, -0.02]}
+    assert resistances(**further, position=150.0, factor=0.5) == (0.5 * 9.81 * -0.02, 0.0)
     section = [{"position": 0.0, "gradient": 0.03, "resistance": 0.1}]
-    steep = Line(profile=section, points=2, position=50.0, positions=[0.0, 100.0], gradients=[0.01, -0.02])
-    assert steep.outputs()["line_resistance"] == 9.81 * 0.03 + 0.1 + 9.81 * 0.01
-    assert steep.outputs()["curve_resistance"] == 0.1
+    assert resistances(**further, line=section, position=50.0) == (9.81 * 0.03 + 0.1 + 9.81 * 0.01, 0.1)

@@ -74,12 +74,16 @@ def test_what_models_were_built_with_is_shown():
                 "build": {"schedule": [{"carriage": 1, "from": 10.0, "until": 20.0}, {"from": 200.0, "until": 300}]}
             },
             "radio": {"build": {"outages": [[60.0, 72.0]], "messages": 16}},
-            "line": {"build": {"profile": [{"position": 0.0}, {"position": 500.0, "gradient": 0.01}]}},
+            "line": {"build": {"line": [{"position": 0.0}, {"position": 500.0, "gradient": 0.01}]}},
         },
     }
     bands = [(band["from"], band["until"], band["label"]) for band in _bands(record)]
     assert bands == [(10.0, 20.0, "faults: schedule"), (60.0, 72.0, "radio: outages")]
-    assert gradients_of(record) == [{"from": 0.0, "gradient": 0.0}, {"from": 500.0, "gradient": 0.01}]
+    steps = [{"from": 0.0, "gradient": 0.0}, {"from": 500.0, "gradient": 0.01}]
+    assert gradients_of(record) == steps
+    line = record["instances"]["line"]["build"]
+    line["line"] = {"name": "a line with more than sections", "sections": line["line"]}
+    assert gradients_of(record) == steps
 
 
 def test_trains(tmp_path):

@@ -115,7 +115,7 @@ CURVE = [{"position": 0.0, "gradient": 0.01, "radius": 300.0}]
 def test_what_belongs_beside_an_input_comes_from_where_that_comes(resolve, more, start, sources):
     """Curves and tunnels, which only oppose motion, from the line that gives the slope; unless told otherwise."""
     system = System()
-    system.add("line", "Line", build={"profile": CURVE}, position=0.0)
+    system.add("line", "Line", build={"line": CURVE}, position=0.0)
     system.add("train", "PointMassTrain", **{"force": 0.0} | start)
     for source, target in (("line.line_resistance", "train.line_resistance"), *more):
         system.connect(source, target, scale=0.5)

@@ -1,0 +1,6 @@
+"""Other people's formats of lines and trains, read into this project's own: units and values are checked here."""
+
+from .quantities import ForeignError
+from .reading import DATA_SUFFIXES, read_data
+
+__all__ = ["DATA_SUFFIXES", "ForeignError", "read_data"]
