@@ -75,7 +75,7 @@ class Library:
                 return False
             world.sleep(_LOOK)
             patience -= _LOOK
-        unload(self._dll._handle)
+        unload(self._dll._handle, self.addresses.values())
         return True
 
 

@@ -6,7 +6,7 @@ import ctypes
 import logging
 import os
 import sys
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any, Protocol
@@ -53,6 +53,8 @@ if sys.platform.startswith("linux"):
     _CLOSE.restype, _CLOSE.argtypes = ctypes.c_int, (ctypes.c_void_p,)
 
 _LIVING: dict[int, Owner] = {}
+_FUNCTIONS: dict[int, str] = {}
+"""The functions of loaded libraries by their address."""
 _WILLS: list[Callable[[FmuError], None]] = []
 
 
@@ -128,6 +130,7 @@ def guarded(function: Any, address: int, name: str) -> Any:
     """A function of a library, as ctypes has it, guarded."""
     if calls is None:
         return function
+    _FUNCTIONS[address] = name
     NOTES.tell(address, name)
     return calls.Call(function, address, name.endswith("DoStep"))
 
@@ -151,8 +154,15 @@ def loading(path: Path) -> Iterator[None]:
     calls.watch(count)
 
 
-def unload(handle: int) -> None:
-    """Take a library out of memory, while others use the interpreter, too."""
+def unload(handle: int, addresses: Iterable[int]) -> None:
+    """Take a library out of memory, while others use the interpreter, too.
+
+    Args:
+        handle: of the library.
+        addresses: of its functions.
+    """
+    for address in addresses:
+        _FUNCTIONS.pop(address, None)
     if _CLOSE is None:
         import fmpy  # noqa: PLC0415 (a parent that waits for a command to end takes no library out)
 
@@ -193,6 +203,8 @@ def dismiss(owner: Owner) -> None:
         del _LIVING[number]
     if not _LIVING:
         NOTES.forget()
+        for address, function in _FUNCTIONS.items():  # the library of an instance that was lost stays loaded
+            NOTES.tell(address, function)
 
 
 # -------------------------------------------------------------------- runs
