@@ -79,7 +79,8 @@ class Repeater:
         self._interfaces, self._links = interfaces, checked.wiring.links
         fixed = {f"{name}.{v.name}": v.start for name, face in interfaces.items() for v in face.of("parameter")}
         self._fixed: dict[str, Any] = fixed
-        self._names = [name for name in signal_names(interfaces, checked.wiring) if name not in fixed]
+        constant = fixed.keys() | checked.wiring.left.keys()
+        self._names = [name for name in signal_names(interfaces, checked.wiring) if name not in constant]
         self._units = checked.units
 
     def fly(self, checked: Checked, interruption: Interruption) -> Flown | None:

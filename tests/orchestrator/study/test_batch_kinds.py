@@ -130,6 +130,13 @@ def test_a_coupling_that_diverges_is_told_as_of_a_single_run(mine):
     check(system, [{}, {"a.w": 0.5}], "a.y", kind="plain")
 
 
+def test_what_speaks_of_a_value_that_a_swapped_model_lacks_is_judged(mine):
+    system = System(step=0.25, stop_time=1.0, metrics={"share": "final(it.x) / it.gain"})
+    system.judged.requirements["below"] = "always it.x <= it.gain"
+    system.add("it", mine("LagWithSlope"), gain=2.0).swapped = True
+    check(system, [{"it.gain": gain} for gain in GAINS], "it.x", kind="plain")
+
+
 def test_texts_and_wholes_keep_their_types(by_hand):
     system = of(by_hand(1, options=("-DRESET=0",)), "x", word="one")
     with Batch(system, record=["it.said", "it.m"]) as batch:
