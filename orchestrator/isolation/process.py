@@ -110,7 +110,11 @@ class HostProcess:
         )
         self._door = Door(end, self._wait, self._moment)
         _, body = self._told(self._door.receive)
-        self._limit, self.pid = messages.content(body)
+        try:
+            limit, pid = messages.content(body)
+            self._limit, self.pid = None if limit is None else int(limit), int(pid)
+        except (ValueError, TypeError) as error:
+            raise self.garbled(error) from error
         self.is_ready = True
 
     def send(self, frames: bytes) -> None:
@@ -144,7 +148,7 @@ class HostProcess:
         except (OSError, EOFError) as error:
             raise self._is_lost() from error
 
-    def garbled(self, error: ValueError) -> HostLostError:
+    def garbled(self, error: Exception) -> HostLostError:
         """How it is lost that sends what cannot be read, most likely because an FMU writes there; it is ended."""
         end_process(self._process)
         return self._lost(f"its process sends what cannot be read ({error}) and was ended")

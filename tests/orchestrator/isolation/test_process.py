@@ -229,6 +229,14 @@ def test_what_cannot_be_read_is_no_answer(apart, monkeypatch):
     assert not Path(f"/proc/{it.pid}").exists()
 
 
+@pytest.mark.parametrize("told", [b"{", b"[1]", b'[0, "seven"]', b"7"])
+def test_what_cannot_be_read_is_no_sign_of_life(apart, monkeypatch, told):
+    read = doorbell.content
+    monkeypatch.setattr(doorbell, "content", lambda body: read(told))
+    with pytest.raises(FmuError, match="its process sends what cannot be read"):
+        apart(begun=True)
+
+
 @pytest.mark.parametrize(
     ("where", "call"), [("instantiate", "Instantiate"), ("step", "DoStep"), ("free", "FreeInstance")]
 )
