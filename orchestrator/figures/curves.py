@@ -61,9 +61,7 @@ def _entry(x: Any, text: str, label: str, entry: int, signals: Signals) -> list[
     """The lines of one entry of `y`: one a row or value of i."""
     expression = parse(text, FUNCTIONS)
     names = [*signals.names(), *signals.parameters]
-    constants: dict[str, Any] = {}
-    if isinstance(x, Mapping):
-        constants[x["name"]] = np.linspace(x["from"], x["to"], x.get("points", 400))
+    constants = _constants(x)
     drawn: list[tuple[Array, Array, str, str]] = []
     for index in expression.instances(names):
         if x is None and signals.points > MOST_POINTS:
@@ -71,6 +69,8 @@ def _entry(x: Any, text: str, label: str, entry: int, signals: Signals) -> list[
         else:
             y = np.atleast_2d(np.asarray(expression.evaluate(signals, index, **constants), dtype=np.float64))
             across = _across(x, signals, index, constants)
+            if isinstance(x, Mapping):
+                _check_swept(x, y, expression, signals, index)
             y = np.broadcast_to(y, (y.shape[0], across.shape[-1]))
             across = np.broadcast_to(across, y.shape)
         resolved = expression.resolve(names, index)
@@ -101,6 +101,23 @@ def _things(labels: Sequence[str]) -> list[tuple[int, ...]]:
     telling = [k for k, numbers in enumerate(zip(*found, strict=True)) if len(set(numbers)) > 1]
     things = [tuple(numbers[k] for k in telling) for numbers in found]
     return things if len(set(things)) == len(things) else [(k + 1,) for k in range(len(found))]
+
+
+def _constants(x: Any, more: int = 0) -> dict[str, Any]:
+    """The variable of a function and its values, so many more than are asked for."""
+    return {x["name"]: np.linspace(x["from"], x["to"], x.get("points", 400) + more)} if isinstance(x, Mapping) else {}
+
+
+def _check_swept(x: Mapping[str, Any], y: Array, expression: Expression, signals: Signals, index: int | None) -> None:
+    """A signal has its values at points in time, and may by chance have as many as a function is drawn at."""
+    points = x.get("points", 400)
+    if y.shape[-1] == signals.points == points:
+        y = np.atleast_2d(expression.evaluate(signals, index, **_constants(x, more=1)))
+        points += 1
+    if y.shape[-1] not in (1, points):
+        message = f"'{expression.text}' runs over time, but is drawn over {x['name']}"
+        remedy = "draw a function of it, of parameters and of single numbers such as max(...) of a signal"
+        raise ExpressionError(Problem("", message, remedy))
 
 
 def _across(x: Any, signals: Signals, index: int | None, constants: Mapping[str, Any]) -> Array:

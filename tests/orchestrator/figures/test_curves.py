@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from railcosim.orchestrator.errors import ExpressionError
 from railcosim.orchestrator.figures.curves import bracketed, curves_of
 
 GAP = "train[i-1].position - train[i].position"
@@ -44,6 +45,16 @@ def test_own_labels(labels):
     assert labels(y=["target.value", "train[1].speed"], label=["v_r", "first"]) == ["v_r", "first"]
     assert labels(y=["train[:].speed"], label=["v"]) == ["v 1", "v 2", "v 3"]
     assert labels(y=[GAP], label=["gap {i} (ahead)"]) == ["gap 1–2 (ahead)", "gap 2–3 (ahead)"]
+
+
+@pytest.mark.parametrize("more", [-1, 0, 1])
+def test_a_signal_is_no_function_however_many_points_it_has(recorded, more):
+    x = {"name": "d", "from": 0.0, "to": 1.0, "points": recorded.points + more}
+    for y in ("target.value", "abs(train[1].speed)"):
+        with pytest.raises(ExpressionError, match=r"runs over time, but is drawn over d; draw a function of it"):
+            curves_of({"y": y, "x": x}, recorded)
+    for y in ("d", "3", "max(train[1].speed) - d"):
+        assert curves_of({"y": y, "x": x}, recorded)[0].y.shape == (recorded.points + more,)
 
 
 def test_a_function_plot_draws_expressions_in_a_plain_variable(drawn):
