@@ -295,10 +295,16 @@ def test_plain_python_and_both_kinds_of_fmu_agree_to_the_last_bit(path, argument
     agree()
 
 
-@pytest.mark.long
+@pytest.mark.parametrize(
+    ("examples", "repeatable"),
+    [
+        pytest.param(20, True, marks=pytest.mark.long, id="more"),
+        pytest.param(60, False, marks=pytest.mark.campaign, id="many, others each time"),
+    ],
+)
 @every_component
-def test_they_agree_on_many_more_runs(path, arguments):
-    @checked(60, derandomize=False)  # others each time
+def test_they_agree_on_many_more_runs(path, arguments, examples, repeatable):
+    @checked(examples, derandomize=repeatable)
     @given(scripts(resolve(path)(**arguments)))
     def agree(script):
         compare(path, arguments, script)

@@ -6,8 +6,13 @@ import sys
 import pytest
 
 pytestmark = pytest.mark.skipif(not sys.platform.startswith("linux"), reason="forks, and signals of Linux")
-_CHOSEN = os.environ.get("FAULT_SEEDS", "")
+_FIRST, _, _END = (os.environ.get("FAULT_SEEDS") or "0:10000").partition(":")
 """``17`` or ``0:10000``: the seeds of the campaign."""
+
+
+def pieces(first, end):
+    """Seeds by the fifty: workers that share short tests end together."""
+    return [pytest.param(range(k, min(k + 50, end)), id=f"from {k}") for k in range(first, end, 50)]
 
 
 def survey(bench, seeds):
@@ -22,19 +27,19 @@ def survey(bench, seeds):
     assert not told, f"{len(told)} of {len(seeds)} cases broke a promise\n\n" + "\n\n".join(told[:20])
 
 
-@pytest.mark.parametrize("begin", range(0, 200, 50))
-def test_what_is_promised_holds_whatever_fails(bench, begin):
-    survey(bench, range(begin, begin + 50))
+@pytest.mark.parametrize("seeds", pieces(0, 200))
+def test_what_is_promised_holds_whatever_fails(bench, seeds):
+    survey(bench, seeds)
 
 
 @pytest.mark.long
-@pytest.mark.parametrize("begin", range(200, 3200, 50))  # short ones: workers end together
-def test_what_is_promised_holds_whatever_fails_three_thousand_times(bench, begin):
-    survey(bench, range(begin, begin + 50))
+@pytest.mark.parametrize("seeds", pieces(200, 600))
+def test_what_is_promised_holds_whatever_fails_more_often(bench, seeds):
+    survey(bench, seeds)
 
 
 @pytest.mark.campaign
-def test_campaign(bench):
+@pytest.mark.parametrize("seeds", pieces(int(_FIRST), int(_END or int(_FIRST) + 1)))
+def test_campaign(bench, seeds):
     """As many seeds as are asked for by ``FAULT_SEEDS``, ten thousand by default."""
-    first, _, end = (_CHOSEN or "0:10000").partition(":")
-    survey(bench, range(int(first), int(end) if end else int(first) + 1))
+    survey(bench, seeds)

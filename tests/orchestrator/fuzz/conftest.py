@@ -7,16 +7,19 @@ import sys
 import pytest
 
 
-@pytest.fixture(params=["quick", pytest.param("deep", marks=pytest.mark.long)])
+@pytest.fixture(
+    params=["quick", pytest.param("long", marks=pytest.mark.long), pytest.param("deep", marks=pytest.mark.campaign)]
+)
 def explore(request):
-    """Try a rule on examples out of strategies: on the same few each time, in the long tier on many new ones."""
+    """Try a rule on examples out of strategies: on the same few each time, in the long tier on more; in a campaign on
+    many, others each time."""
     from hypothesis import HealthCheck, given, settings
     from hypothesis import strategies as st
 
     def examine(rule, *strategies, quick, deep):
         @settings(
-            max_examples=quick if request.param == "quick" else deep,
-            derandomize=request.param == "quick",
+            max_examples={"quick": quick, "long": deep // 4, "deep": deep}[request.param],
+            derandomize=request.param != "deep",
             database=None,
             deadline=60_000,  # ms: the largest scenario takes 0.6 s, and what may not take long takes for ever
             suppress_health_check=list(HealthCheck),

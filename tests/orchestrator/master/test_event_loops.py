@@ -105,8 +105,13 @@ def test_the_same_bits(both, odd, seed):
     assert outcome.status == "completed"
 
 
-@pytest.mark.long
-@pytest.mark.parametrize("seed", range(40, 1000))
+@pytest.mark.parametrize(
+    "seed",
+    [
+        *(pytest.param(seed, marks=pytest.mark.long) for seed in range(40, 200)),
+        *(pytest.param(seed, marks=pytest.mark.campaign) for seed in range(200, 1000)),
+    ],
+)
 def test_the_same_bits_of_many_more(both, odd, seed):
     assert both(some_system(random.Random(seed), odd)).status == "completed"
 

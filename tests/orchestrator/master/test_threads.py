@@ -194,8 +194,13 @@ def test_random_systems(agree, system):
     agree(system)
 
 
-@pytest.mark.long
-@settings(max_examples=500, deadline=None)
-@given(system=systems(st.integers(2, 12)))
-def test_many_random_systems(agree, system):
-    agree(system)
+@pytest.mark.parametrize(
+    "examples", [pytest.param(60, marks=pytest.mark.long), pytest.param(500, marks=pytest.mark.campaign)]
+)
+def test_many_random_systems(agree, examples):
+    @settings(max_examples=examples, deadline=None)
+    @given(system=systems(st.integers(2, 12)))
+    def rule(system):
+        agree(system)
+
+    rule()
