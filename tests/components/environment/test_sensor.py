@@ -18,7 +18,7 @@ def test_without_faults_it_shows_the_truth():
 
 
 def test_noise_has_the_size_asked_for():
-    found = simulate(Sensor(position_noise=0.5, speed_noise=0.02), 60.0, 0.01, {"true_position": 7.0})
+    found = simulate(Sensor(position_noise=0.5, speed_noise=0.02), 20.0, 0.01, {"true_position": 7.0})
     assert found["position"].mean() == pytest.approx(7.0, abs=0.03)
     assert found["position"].std() == pytest.approx(0.5, rel=0.05)
     assert found["speed"].std() == pytest.approx(0.02, rel=0.05)

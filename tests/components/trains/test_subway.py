@@ -67,7 +67,7 @@ def test_resistance_is_that_of_its_parameters():
 def test_constant_force_without_resistance_is_a_parabola():
     """Analytic: x = F t^2 / (2 M)."""
     train = SubwayTrain(line=LEVEL, davis_a=0.0, davis_b=0.0, davis_c=0.0, swing=0.0, couplers=[{}])
-    found = driven(train, 20.0, 100e3)
+    found = driven(train, 3.0, 100e3)
     t = found["time"]
     assert found["position"] == pytest.approx(0.5 * 100e3 / MASS * t * t, rel=1e-11, abs=1e-12)
     assert found["traction_energy"][-1] == pytest.approx(100e3 * found["position"][-1], rel=1e-9)
@@ -80,7 +80,7 @@ def test_the_train_stands_while_waiting_and_starts_anew_at_each_departure():
     def inputs(t):
         return {"trip": 1 + (t >= 5.0 - 1e-9), "trip_time": t - 2.0 if t < 5.0 - 1e-9 else t - 7.0, "force": 150e3}
 
-    found = simulate(SubwayTrain(start_offset=0.5), 9.0, 0.1, inputs)
+    found = simulate(SubwayTrain(start_offset=0.5, max_step=0.05), 9.0, 0.1, inputs)
     t, x, v = found["time"], found["position"], found["speed"]
     waiting = (t < 2.01) & (t > 0.05) | (t > 5.05) & (t < 7.01)
     assert (x[waiting] == 0.5).all()
@@ -123,7 +123,7 @@ def test_limits(values, force, speed, expected):
 
 def test_a_lagging_drive_follows_an_exponential():
     """Analytic: F = u (1 - exp(-t/T))."""
-    found = driven(SubwayTrain(actuator_lag=0.4), 2.0, 100e3)
+    found = driven(SubwayTrain(actuator_lag=0.4), 0.6, 100e3)
     # A force that depends on the inputs is that of the begin of the step it is held over.
     t = found["time"][1:] - 0.01
     assert found["applied_force"][1:] == pytest.approx(100e3 * (1.0 - np.exp(-t / 0.4)), rel=1e-7, abs=1e-6)
@@ -145,15 +145,16 @@ def test_in_train_forces_carry_what_lies_ahead_of_them():
 def test_random_disturbance_is_reproducible_bounded_and_new_at_each_sample():
     def accelerations(seed):
         train = SubwayTrain(disturbance_size=0.01, seed=seed, line=LEVEL, couplers=[{}], force=50e3)
-        return driven(train, 2.0, 50e3)["acceleration"][1:]
+        return driven(train, 1.0, 50e3)["acceleration"][1:]
 
-    quiet = driven(SubwayTrain(line=LEVEL, couplers=[{}]), 2.0, 50e3)["acceleration"][1:]
-    difference = accelerations(3) - quiet
+    quiet = driven(SubwayTrain(line=LEVEL, couplers=[{}]), 1.0, 50e3)["acceleration"][1:]
+    drawn = accelerations(3)
+    difference = drawn - quiet
     assert np.abs(difference).max() < 0.0101
     assert np.ptp(difference) > 0.018
-    assert len(np.unique(difference.round(8))) > 190
-    assert (accelerations(3) == accelerations(3)).all()
-    assert (accelerations(3) != accelerations(4)).any()
+    assert len(np.unique(difference.round(8))) > 95
+    assert (accelerations(3) == drawn).all()
+    assert (accelerations(4) != drawn).any()
 
 
 def test_a_heavier_train():
