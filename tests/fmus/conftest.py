@@ -256,11 +256,15 @@ def component_class():
 HERE = Path(__file__).parent
 LARGE = ("CoupledSubwayTrain", "FaultTolerantCruise")
 """Models of which everything takes seconds."""
+FEW = {"PointMassTrain", "ComfortCruise", "RadioLink", "Chain", "Dice", "Estimator", "Everything", "Learner", "Slope"}
+"""Models that have between them what a component can have."""
 
 
 @pytest.hookimpl(tryfirst=True)
 def pytest_collection_modifyitems(items):
-    """What every model is put through, the large ones are in the long tier."""
+    """What every model is put through, the large ones are in the long tier; where that is much, all but a few are."""
     for item in items:
-        if item.path.parent == HERE and "[" in item.name and item.name.partition("[")[2].startswith(LARGE):
+        model = item.name.partition("[")[2].partition("]")[0].partition("-")[0] if item.path.parent == HERE else ""
+        many = item.get_closest_marker("few") and model not in FEW
+        if model and (many or model.startswith(LARGE)):
             item.add_marker(pytest.mark.long)

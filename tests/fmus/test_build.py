@@ -142,6 +142,7 @@ def test_start_values_given_to_the_component_are_part_of_the_identity(component_
 # ---------------------------------------------------------------- the cache
 
 
+@pytest.mark.few
 def test_two_builds_are_the_same_bytes(reference, fresh_cache):
     first = build(reference)
     second_cache = fresh_cache()
@@ -168,6 +169,7 @@ def test_another_process_with_another_hash_seed_and_clock_builds_the_same_bytes(
     assert other.read_bytes() == own.read_bytes()
 
 
+@pytest.mark.few
 def test_the_archive_tells_neither_time_nor_machine(reference):
     with zipfile.ZipFile(build(reference)) as archive:
         entries = archive.infolist()

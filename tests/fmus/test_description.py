@@ -51,6 +51,7 @@ def unknowns(root, tag):
 # ---------------------------------------------------------------- what a validator says
 
 
+@pytest.mark.few
 def test_the_validator_finds_nothing(reference):
     assert validate_fmu(str(build(reference))) == []
 
@@ -126,6 +127,7 @@ def test_initial_unknowns_are_exactly_the_calculated_outputs(described):
     assert unknowns(root, "Outputs").keys() == outputs
 
 
+@pytest.mark.few
 def test_known_dependencies_hold_at_a_few_points(described):
     """No number may move an output that does not name it: the equations are asked, at random points.
 

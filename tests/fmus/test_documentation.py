@@ -44,6 +44,7 @@ class Page(HTMLParser):
             self.rows[-1][-1] += data
 
 
+@pytest.mark.few
 def test_the_interface_table_is_the_declared_interface(reference):
     component = resolve(reference)()
     found = Page(page(component, "python"))

@@ -278,6 +278,7 @@ def test_equations_that_refuse_cost_the_signals_only(write_component):
 # ---------------------------------------------------------------- the archive
 
 
+@pytest.mark.few
 @pytest.mark.parametrize("kind", [pytest.param("native", marks=pytest.mark.long), "python"])
 def test_the_archive_is_complete_and_every_link_leads_somewhere(kind, reference):
     name = reference.rpartition(":")[2]

@@ -51,6 +51,7 @@ def compile_program(sources, target, *flags, compiler=("gcc",)):
 # ---------------------------------------------------------------- the archive
 
 
+@pytest.mark.few
 def test_the_validator_finds_nothing(reference):
     assert list(validate_fmu(str(native(reference)))) == []
 
@@ -231,6 +232,7 @@ def strictly_compiled(reference, folder, compiler, *flags):
     compile_program([source], folder / "o", *STRICT, *flags, "-c", "-I", HEADERS, compiler=COMPILERS[compiler])
 
 
+@pytest.mark.few
 def test_every_component_compiles_without_a_warning(tmp_path, reference):
     strictly_compiled(reference, tmp_path, "gcc", "-fsyntax-only")
 

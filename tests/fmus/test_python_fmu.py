@@ -100,6 +100,7 @@ def begun(component, name):
 # ---------------------------------------------------------------- the same numbers as in plain Python
 
 
+@pytest.mark.few
 @pytest.mark.parametrize(
     ("step", "sampling"),
     [(STEP, 2), *(pytest.param(*case, marks=pytest.mark.long) for case in ((STEP, 1), (0.1, 1), (0.1, 4)))],
@@ -242,6 +243,7 @@ def warm(instantiate, reference):
     return instance, component
 
 
+@pytest.mark.few
 def test_save_run_restore_run_is_bit_equal(reference, instantiate):
     """Past the change of a trip, so that a tape holds something, and once more after the restore."""
     instance, component = warm(instantiate, reference)
@@ -255,6 +257,7 @@ def test_save_run_restore_run_is_bit_equal(reference, instantiate):
     instance.call("freeFMUState", state)
 
 
+@pytest.mark.few
 def test_a_serialized_state_continues_in_another_instance(reference, instantiate):
     instance, component = warm(instantiate, reference)
     state = instance.call("getFMUState")
@@ -293,6 +296,7 @@ def test_a_corrupt_state_is_refused(instantiate):
         assert "ValueError: the serialized state is corrupt" in instance.refused("call", "setFMUState", state)
 
 
+@pytest.mark.few
 def test_reset_gives_a_new_life(reference, instantiate):
     cls, arguments, starts = prepared(reference, STEP, 2)
     component = cls(**arguments)
