@@ -2,6 +2,7 @@
 
 import os
 import sys
+from pathlib import Path
 
 import pytest
 from hypothesis import settings
@@ -11,6 +12,7 @@ from hypothesis import settings
 settings.register_profile("repeatable", derandomize=True, database=None, deadline=None)
 settings.load_profile("repeatable")
 
+_TESTS = Path(__file__).parent
 _HEAD = """from railcosim.components import Component, Data, Input, Memory, Noise, Output, Parameter, Size, State, maths
 
 
@@ -28,13 +30,21 @@ def session_cache(tmp_path_factory):
     return (root.parent if "PYTEST_XDIST_WORKER" in os.environ else root) / "cache"
 
 
+_UNMEASURED = ("docs", "interop", "scenarios")
+"""Folders whose tests reach no branch that those of the rooms do not: they are twice as fast unmeasured."""
+
+
 @pytest.fixture(autouse=True)
-def _chance_does_not_count(request):
+def _what_is_aimed_at_counts(request, monkeypatch):
     """No branch counts as covered because drawn examples happen to reach it: elsewhere, others are drawn."""
     measuring = "coverage" in sys.modules and sys.modules["coverage"].Coverage.current()
-    if not measuring or not ("explore" in request.fixturenames or hasattr(request.function, "hypothesis")):
+    chance = "explore" in request.fixturenames or hasattr(request.function, "hypothesis")
+    apart = request.path.relative_to(_TESTS).parts[0] in _UNMEASURED or request.node.get_closest_marker("unmeasured")
+    if not measuring or not (chance or apart):
         yield
         return
+    for name in ("COVERAGE_PROCESS_START", "COVERAGE_PROCESS_CONFIG"):  # nor do processes that it starts
+        monkeypatch.delenv(name, raising=False)
     measuring.stop()
     yield
     measuring.start()

@@ -60,7 +60,10 @@ def cases():
             yield pytest.param(reference, arguments, id=name + "".join(f"-{v}" for v in arguments.values()))
 
 
-pytestmark = pytest.mark.filterwarnings("ignore:.* encountered in:RuntimeWarning")  # runs that leave the domain
+pytestmark = [
+    pytest.mark.filterwarnings("ignore:.* encountered in:RuntimeWarning"),  # runs that leave the domain
+    pytest.mark.unmeasured,
+]
 
 CASES = list(cases())
 FEW = {"PointMassTrain", "ComfortCruise", "Cailc", "RadioLink", "Timetable", "Consist-1"}

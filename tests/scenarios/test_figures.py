@@ -3,10 +3,8 @@
 import re
 
 import pytest
-from matplotlib.figure import Figure
 from railcosim.components import CATALOGUE
 from railcosim.orchestrator import load
-from railcosim.orchestrator.comparison import compare, variants
 from railcosim.orchestrator.fmi import Workspace
 from railcosim.orchestrator.run import check
 from railcosim.orchestrator.scenario import shipped
@@ -56,13 +54,3 @@ def test_a_law_in_the_place_of_another_is_told_on_every_figure_and_if_it_is_reco
     remarks = {figure["remark"] for figure in swapped.system.judged.figures}
     assert remarks == {"cruise: RangePotentialCruise (reconstructed)"}
     assert not any("remark" in figure for figure in whole.system.judged.figures)
-
-
-def test_compared_figures_say_which_variant_is_reconstructed(tmp_path, monkeypatch):
-    kept = []
-    monkeypatch.setattr(Figure, "savefig", lambda self, *_, **__: kept.append(self._suptitle.get_text()))
-    laws = ("RangePotentialCruise", "ComfortCruise")
-    systems = variants(["comfort_cruise"], swaps=[f"cruise={law}" for law in laws], stop_time=1.0)
-    compare(systems, kind="plain", output=tmp_path)
-    assert kept
-    assert all(text.endswith("\nreconstructed in cruise=RangePotentialCruise") for text in kept)

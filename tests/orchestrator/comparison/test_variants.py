@@ -6,6 +6,7 @@ import json
 import numpy as np
 import pytest
 import typer
+from matplotlib.figure import Figure
 from railcosim.orchestrator.cli import analysis as cli_analysis
 from railcosim.orchestrator.cli.documents import answering
 from railcosim.orchestrator.comparison.preference import better, read_directions, winners
@@ -251,3 +252,13 @@ def test_a_variant_that_lacks_a_signal_is_drawn_without_it(small, tmp_path):
     comparison = compare({**variants([small]), "other": other}, kind="plain", output=tmp_path / "out")
     assert [variant.status for variant in comparison.variants] == ["completed", "completed"]
     assert len(comparison.figures) == 1
+
+
+def test_compared_figures_say_which_variant_is_reconstructed(tmp_path, monkeypatch):
+    kept = []
+    monkeypatch.setattr(Figure, "savefig", lambda self, *_, **__: kept.append(self._suptitle.get_text()))
+    laws = ("RangePotentialCruise", "ComfortCruise")
+    systems = variants(["comfort_cruise"], swaps=[f"cruise={law}" for law in laws], stop_time=1.0)
+    compare(systems, kind="plain", output=tmp_path)
+    assert kept
+    assert all(text.endswith("\nreconstructed in cruise=RangePotentialCruise") for text in kept)

@@ -207,7 +207,8 @@ class Bench:
         return Ended(code, said, where, counts.all(), orphans)
 
     def _become(self, place, arguments, faults):
-        """Be the command."""
+        """Be the command; what it reaches is written down nowhere."""
+        sys.settrace(None)
         try:
             gc.disable()
             faulthandler.disable()

@@ -14,6 +14,7 @@ import os
 import select
 import signal
 import struct
+import sys
 import threading
 import time
 import traceback
@@ -249,6 +250,7 @@ class Faults:
         return process
 
     def _serve(self, arguments, output):
+        sys.settrace(None)
         with contextlib.suppress(BaseException):
             self.process = None  # the guard, of which nothing fails; what it forks does the work
             master = os.getppid()

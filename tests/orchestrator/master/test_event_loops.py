@@ -98,6 +98,7 @@ def some_event(draw, system, names, fed):
     return Event(f"{name}.{variable}", action, at, value, rate, duration, every)
 
 
+@pytest.mark.unmeasured
 @pytest.mark.parametrize("seed", range(40))
 def test_the_same_bits(both, odd, seed):
     draw = random.Random(seed)

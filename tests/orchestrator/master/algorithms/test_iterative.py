@@ -335,8 +335,9 @@ def test_it_goes_on_where_it_is_told_to(mine, tmp_path):
     assert f"; {told['unsettled']} of 3 steps went on unsettled, the first from t = 0 s" in told["summary"]
 
 
-def test_it_does_not_go_on_where_values_get_away(mine):
-    it = System(stop_time=2.0, step=1.0, algorithm="iterative", acceleration="none", max_iterations=9)
+@pytest.mark.parametrize("attempts", [9, 200])  # nobody waits for all of the second
+def test_it_does_not_go_on_where_values_get_away(mine, attempts):
+    it = System(stop_time=2.0, step=1.0, algorithm="iterative", acceleration="none", max_iterations=attempts)
     it.stepping.unsettled = "go-on"
     it.add("a", mine("Lag"), gain=-5.0)
     it.add("b", mine("Lag"), gain=5.0)
@@ -344,7 +345,7 @@ def test_it_does_not_go_on_where_values_get_away(mine):
     it.connect("b.x", "a.u")
     with pytest.raises(CouplingError) as caught:
         run(it, kind="plain")
-    assert "diverges" in str(caught.value)
+    assert re.search(r"diverges: after (9|1\d) iterations", str(caught.value))
 
 
 @pytest.mark.parametrize("fails", [False, True])
