@@ -29,8 +29,22 @@ pytestmark = [
 # -------------------------------------------------------------------- failures
 
 
-@pytest.mark.parametrize("status", ["discard", "error", "fatal"])
-@pytest.mark.parametrize("where", ["step", "get", "set", "enter", "exit", "terminate"])
+CALLED = ("step", "get", "set", "enter", "exit", "terminate")
+
+
+@pytest.mark.parametrize(
+    ("where", "status"),
+    [
+        *((where, "error") for where in CALLED),
+        ("step", "discard"),
+        ("step", "fatal"),
+        *(
+            pytest.param(where, status, marks=pytest.mark.long)
+            for where in CALLED[1:]
+            for status in ("discard", "fatal")
+        ),
+    ],
+)
 def test_a_bad_status_is_the_error_it_is_without_isolation(apart, alone, hostile, live, *, where, status):
     told = []
     for one in (alone(hostile()), apart()):

@@ -32,8 +32,7 @@ def exact():
     return solve_ivp(rates, (0.0, 10.0), [20.0, 5.0], rtol=1e-11, atol=1e-11, dense_output=True).sol
 
 
-@pytest.mark.parametrize("options", [(), ("-DHELD",)])
-@pytest.mark.parametrize("on", [["u"], None, []])
+@pytest.mark.parametrize(("on", "options"), [(["u"], ()), (None, ("-DHELD",)), ([], ())])
 def test_states_are_watched_whatever_is_listed(species, exact, on, options):
     """Step by step the same for a list that is true, for one that names what there is not, and for none."""
     result = run(couple(species(on, *options), PREY, PREDATOR, tolerance=1e-5))

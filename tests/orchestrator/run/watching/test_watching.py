@@ -152,7 +152,7 @@ def test_a_controller_that_leaves_its_domain():
 
 def test_a_controller_that_refuses():
     """The sampled loop of the learning control is unstable at 0.2 s."""
-    system = load("cailc", step=0.2, stop_time=20.0, settings=["simulation.record=0.2"])
+    system = load("cailc", step=0.2, stop_time=2.0, settings=["simulation.record=0.2"])
     told = found(system)[0]
     assert (told.kind, told.instances, told.since) == ("refused", ("ato",), 0.0)
     assert str(told).startswith("refused: ato refuses to drive (ato.refused), first at t = 0 s")
