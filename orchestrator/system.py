@@ -165,6 +165,7 @@ class Provenance:
         presets: every name a preset may be asked for by. preset_descriptions: what they say of themselves, by name.
         default_preset: the one that means the file as it stands.
         modified: whether anything was changed beyond file and preset, so that known values are not judged.
+        command: the words after ``orchestrate run`` that give this system; empty where no options do: Python made it.
         rescaled_from: the step in s before `--step` changed it: every sample time equal to it follows the step.
         origins: where things were written, for messages: by ``"train[1]"``, ``"train[1].speed"`` (a start value),
             ``"instances.train[1].step"`` (an option of an instance), ``"instances.train[1].build.carriages"`` (a build
@@ -182,6 +183,7 @@ class Provenance:
     preset_descriptions: dict[str, str] = field(default_factory=dict, compare=False, repr=False)
     default_preset: str | None = field(default=None, compare=False)
     modified: bool = field(default=False, compare=False)
+    command: tuple[str, ...] = field(default=(), compare=False)
     rescaled_from: float | None = field(default=None, compare=False)
     name: str = field(default="system", compare=False)
     path: str = field(default="", compare=False)
@@ -256,8 +258,11 @@ class System:
         )
 
     def changed(self, **values: Any) -> System:
-        """A copy with other values of its fields, or of those of its parts: ``system.changed(step=0.05, seed=7)``."""
-        return System(**{one.name: getattr(self, one.name) for one in fields(self)} | values)
+        """A copy with other values of its fields, or of those of its parts: ``system.changed(step=0.05, seed=7)``.
+
+        No command is known that gives the copy, unless it is among the values.
+        """
+        return System(**{one.name: getattr(self, one.name) for one in fields(self)} | {"command": ()} | values)
 
     def add(self, name: str, model: str, build: dict[str, Any] | None = None, **start: Any) -> Instance:
         """Add one instance.
@@ -274,6 +279,7 @@ class System:
         if name in self.instances:
             raise ValueError(f"the system already has an instance {name!r}")
         self.instances[name] = Instance(name, model, dict(build or {}), dict(start))
+        self.provenance.command = ()
         return self.instances[name]
 
     def connect(
@@ -288,6 +294,7 @@ class System:
     ) -> None:
         """Let an input follow an output; both are written ``"instance.variable"``."""
         self.connections.append(Connection(source, target, delay, scale, offset, threshold=threshold))
+        self.provenance.command = ()
 
 
 _Part = TypeVar("_Part", Stepping, Judged, Provenance)

@@ -65,7 +65,9 @@ def isolate(system: System, names: Iterable[str]) -> System:
         raise ScenarioError([Problem(f"isolate {name!r}", none, suggestion(name, groups)) for name in unknown])
     chosen = {member for name in wanted for member in groups[name]}
     instances = {name: replace(x, isolate=x.isolate or name in chosen) for name, x in system.instances.items()}
-    return replace(system, instances=instances)
+    words = tuple(word for name in wanted for word in ("--isolate", name))
+    command = system.provenance.command
+    return system.changed(instances=instances, command=command and (*command, *words))
 
 
 def check_isolation(system: System) -> list[Problem]:

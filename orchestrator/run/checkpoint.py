@@ -258,6 +258,7 @@ def _system(data: dict[str, Any]) -> System:
     connections = [Connection(**entry) for entry in data.pop("connections")]
     events = [Event(**entry) for entry in data.pop("events")]
     data["provenance"]["presets"] = tuple(data["provenance"]["presets"])
+    data["provenance"]["command"] = tuple(data["provenance"].get("command", ()))
     data["provenance"]["named"] = ()  # by a file: nobody else knows
     parts = {"stepping": Stepping, "judged": Judged, "provenance": Provenance}
     made = {name: part(**data.pop(name)) for name, part in parts.items()}

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import logging
 import math
+from collections.abc import Mapping
 from contextlib import ExitStack, suppress
 from dataclasses import replace
 from pathlib import Path
@@ -253,7 +254,7 @@ def _write(outcome: Run, session: Session, place: RunDirectory) -> None:
     """Write the record down, then the text of the results; where there is no room for it the run has failed."""
     job = session.job
     try:
-        record_file.finish(place, outcome, job.kind, session.rows)
+        record_file.finish(place, outcome, job.kind, session.rows, resumed=job.begin and job.begin.time)
         if outcome.results.points and (place.path / ROWS_FILE).exists():
             finish_rows(place.path, job.writing)
         if job.checkpoint_every is None:
@@ -320,7 +321,17 @@ def _override(system: System, stop_time: float | None, step: float | None, algor
             changes["record"] = None
     if algorithm is not None and algorithm != system.stepping.algorithm:
         changes["algorithm"] = algorithm
-    return system.changed(**changes, modified=True) if changes else system
+    if not changes:
+        return system
+    options = {"--stop": stop_time, "--step": step, "--algorithm": algorithm}
+    given = {option: str(value) for option, value in options.items() if value is not None}
+    return system.changed(**changes, modified=True, command=_with_options(system.provenance.command, given))
+
+
+def _with_options(command: tuple[str, ...], given: Mapping[str, str]) -> tuple[str, ...]:
+    """A command with other values of options; none where none is known."""
+    kept = [pair for pair in zip(command[1::2], command[2::2], strict=True) if pair[0] not in given]
+    return command and (command[0], *(word for pair in (*kept, *given.items()) for word in pair))
 
 
 def _rescaled(instance: Instance, before: float, step: float) -> Instance:

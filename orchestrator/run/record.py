@@ -9,6 +9,7 @@ import importlib.metadata
 import json
 import math
 import platform
+import shlex
 from collections.abc import Collection, Sequence
 from pathlib import Path
 from typing import Any
@@ -56,7 +57,7 @@ def write(place: RunDirectory, checked: Checked, kind: str, *, anew: bool = True
 def identity_of(checked: Checked, kind: str) -> str:
     """A digest of all that rows follow from, but for their number: runs that share it have the same rows."""
     told = _describe(checked.system, checked, kind)
-    for key in ("stop_time", "modified"):
+    for key in ("stop_time", "modified", "command"):
         del told[key]
     text = json.dumps(_plain(told), sort_keys=True)
     return hashlib.sha256(text.encode(errors="surrogatepass")).hexdigest()[:32]
@@ -67,7 +68,9 @@ def abandon(directory: Path, error: BaseException) -> None:
     add(directory, status="failed", error=str(error))
 
 
-def finish(place: RunDirectory, outcome: Run, kind: str, rows: Sequence[int]) -> None:
+def finish(
+    place: RunDirectory, outcome: Run, kind: str, rows: Sequence[int], *, resumed: float | None = None
+) -> None:
     """Write the end of the run, and what was evaluated.
 
     Args:
@@ -75,12 +78,14 @@ def finish(place: RunDirectory, outcome: Run, kind: str, rows: Sequence[int]) ->
         outcome: the run.
         kind: as which kind of model.
         rows: how many results there are, and their checksum, which tells whether they are this run's own.
+        resumed: the time in s of the checkpoint from which it went on, if it did.
     """
     directory = place.path
     record = place.marks | _describe(outcome.system, outcome.checked, kind)
     record["rows"] = dict(zip(("count", "crc32"), rows, strict=True))
     record["status"] = outcome.status
     record["error"] = None if outcome.error is None else str(outcome.error)
+    record["resumed"] = resumed
     record["time_reached"] = outcome.time_reached
     record["seconds"] = outcome.seconds
     record["coupling"] = outcome.coupling
@@ -160,6 +165,7 @@ def _describe(system: System, checked: Checked, kind: str) -> dict[str, Any]:
         "title": system.provenance.title,
         "preset": system.provenance.preset,
         "modified": system.provenance.modified,
+        "command": _command(system, kind),
         "start_time": system.stepping.start_time,
         "stop_time": system.stepping.stop_time,
         "step": system.stepping.step,
@@ -196,6 +202,7 @@ def _describe(system: System, checked: Checked, kind: str) -> dict[str, Any]:
         "connections": [dataclasses.asdict(connection) for connection in system.connections],
         "units": checked.units,
         "texts": _texts(checked),
+        "stepwise": _stepwise(checked),
         "parameters": checked.wiring.left
         | {
             f"{name}.{v.name}": starts[name].get(v.name, v.start)
@@ -219,6 +226,22 @@ def _texts(checked: Checked) -> list[str]:
         for v in model.interface.variables.values()
         if v.type == "String"
     ]
+
+
+def _stepwise(checked: Checked) -> list[str]:
+    """Signals that hold between the points at which they change: all but continuous ones."""
+    return [
+        f"{name}.{v.name}"
+        for name, model in checked.models.items()
+        for v in model.interface.of("output")
+        if v.type != "Real" or v.variability == "discrete"
+    ]
+
+
+def _command(system: System, kind: str) -> str | None:
+    """What runs the same again, as a shell takes it; None of a system that Python made."""
+    words = system.provenance.command
+    return shlex.join(["orchestrate", "run", *words, *([] if kind == "auto" else ["--kind", kind])]) if words else None
 
 
 def _dump(path: Path, content: dict[str, Any]) -> None:

@@ -10,7 +10,7 @@ from __future__ import annotations
 import copy
 import os
 from collections import Counter
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -103,7 +103,10 @@ def load(
     """
     path = find(scenario)
     source = Source.read(path, path.name if is_shipped(path) else str(path))
-    return _system(source, path, _Changes(preset, settings, builds, swaps, stop_time, step, algorithm))
+    changes = _Changes(preset, settings, builds, swaps, stop_time, step, algorithm)
+    system = _system(source, path, changes)
+    system.provenance.command = (os.fspath(scenario), *changes.words())
+    return system
 
 
 def loads(text: str, path: str | os.PathLike[str] = "scenario.toml", **changes: Any) -> System:
@@ -122,6 +125,21 @@ class _Changes:
     stop_time: float | None = None
     step: float | None = None
     algorithm: str | None = None
+
+    def words(self) -> Iterator[str]:
+        """The options of the command line that say the same."""
+        for option, values in (
+            ("--preset", [self.preset]),
+            ("--swap", self.swaps),
+            ("--with", self.builds),
+            ("--set", self.settings),
+            ("--step", [self.step]),
+            ("--stop", [self.stop_time]),
+            ("--algorithm", [self.algorithm]),
+        ):
+            for value in values:
+                if value is not None:
+                    yield from (option, str(value))
 
     def apply(self, draft: Draft, problems: list[Problem]) -> float | None:
         """Change the draft; returns the old step where a new one was given."""

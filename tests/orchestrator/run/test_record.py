@@ -3,12 +3,15 @@
 import hashlib
 import json
 import math
+import shlex
 from datetime import date
 
 import pytest
 from railcosim.fmus.build import build
+from railcosim.orchestrator.isolation import isolate
 from railcosim.orchestrator.run.execution import run
 from railcosim.orchestrator.run.record import _plain
+from railcosim.orchestrator.scenario import load
 from railcosim.orchestrator.system import System
 
 
@@ -110,3 +113,35 @@ def test_jacobi_has_no_order(tmp_path):
 def test_what_json_cannot_say_becomes_text():
     given = {"a": math.inf, "b": (math.nan, -math.inf), 3: date(2020, 7, 1), "c": None, "d": {"e"}}
     assert _plain(given) == {"a": "inf", "b": ["nan", "-inf"], "3": "2020-07-01", "c": None, "d": ["e"]}
+
+
+def test_the_command_runs_the_same_again(mine, tmp_path):
+    """Quoted as a shell takes it; what goes on to another end, or at another step, says so once."""
+    path = tmp_path / "two lags.toml"
+    path.write_text(f'[simulation]\nstop_time = 1.0\n[instances.lag]\ncomponent = "{mine("Lag")}"\ncount = 2\n')
+    system = load(path, settings=["lag.u=[0.5, 0.25]"], stop_time=2.0)
+    run(isolate(system, ["lag[1]"]), stop_time=0.5, kind="plain", output=tmp_path / "run")
+    told = json.loads((tmp_path / "run" / "run.json").read_text())["command"]
+    program, command, *words = shlex.split(told)
+    assert (program, command) == ("orchestrate", "run")
+    assert words == [
+        *(str(path), "--set", "lag.u=[0.5, 0.25]", "--isolate", "lag[1]", "--stop", "0.5", "--kind", "plain")
+    ]
+    assert f"'{path}'" in told
+
+
+def test_what_python_made_has_no_command(files, mine, tmp_path):
+    assert files[1]["command"] is None
+    system = load("comfort_cruise")
+    assert system.provenance.command == ("comfort_cruise",)
+    assert system.changed(seed=3).provenance.command == ()
+    system.add("lag", mine("Lag"))
+    assert system.provenance.command == ()
+
+
+def test_which_signals_hold_between_points(mine, tmp_path):
+    system = System(stop_time=0.2, step=0.1)
+    system.add("word", mine("Word"))
+    system.add("wave", mine("Wave"))
+    run(system, kind="plain", output=tmp_path)
+    assert json.loads((tmp_path / "run.json").read_text())["stepwise"] == ["word.word", "word.n"]

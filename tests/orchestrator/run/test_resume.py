@@ -257,6 +257,9 @@ def test_a_run_and_its_resumption(orchestrate, scenario, tmp_path, monkeypatch):
     assert err.splitlines() == [f"things: {percent} % of 6 s" for percent in range(60, 101, 10)]
     for name in ("results.csv", "metrics.json"):
         assert (tmp_path / "parts" / name).read_bytes() == (tmp_path / "whole" / name).read_bytes()
+    told = [json.loads((tmp_path / name / "run.json").read_text()) for name in ("parts", "whole")]
+    assert [one["resumed"] for one in told] == [pytest.approx(3.0), None]
+    assert told[0]["command"] == told[1]["command"] == f"orchestrate run {scenario} --stop 6.0 --kind plain"
     assert orchestrate("run", "--trust", "--resume", "parts", "--stop", 7, "--quiet") == (0, "", "")
     assert (tmp_path / "parts/both.png").exists()
 
