@@ -101,12 +101,13 @@ def compare(
         directions=read_directions(directions or (), metrics),
         progress=lambda name, start: show_progress(name, quiet, start),
     )
-    ran = [variant.run.directory for variant in comparison.variants if variant.run and variant.run.directory]
+    ran = {variant.name: variant.run.directory for variant in comparison.variants if variant.run}
+    runs = {name: path for name, path in ran.items() if path is not None}
     page = None
-    if report and ran:
+    if report and runs:
         from ..report import REPORT_FILE, write_report
 
-        page = write_report(ran, directory / REPORT_FILE, comparison.names if len(ran) == len(comparison.names) else ())
+        page = write_report([*runs.values()], directory / REPORT_FILE, [*runs])
 
     def show() -> None:
         show_comparison(comparison, quiet)

@@ -1,9 +1,21 @@
 from .checking import check_figures
-from .curves import Curve, bracketed, curves_of
+from .curves import Curve, bracketed, curves_of, x_label_of
 from .drawing import draw, draw_curves, file_name, plot, remove_drawn
-from .marks import filled_title
+from .marks import filled_title, number
 from .palette import Palette, member_colour, ranks
-from .panels import FIGURE_KEYS, FORMATS, PANEL_KEYS, heading, panels_of, remarked, share_x, texts_of, written_as
+from .panels import (
+    FIGURE_KEYS,
+    FORMATS,
+    PANEL_KEYS,
+    bands_of,
+    heading,
+    marks_of,
+    panels_of,
+    remarked,
+    share_x,
+    texts_of,
+    written_as,
+)
 from .style import COLOURS, DASHES, colour, colour_and_dashes, legend, page
 
 __all__ = [
@@ -14,6 +26,7 @@ __all__ = [
     "PANEL_KEYS",
     "Curve",
     "Palette",
+    "bands_of",
     "bracketed",
     "check_figures",
     "colour",
@@ -25,7 +38,9 @@ __all__ = [
     "filled_title",
     "heading",
     "legend",
+    "marks_of",
     "member_colour",
+    "number",
     "page",
     "panels_of",
     "plot",
@@ -35,4 +50,5 @@ __all__ = [
     "share_x",
     "texts_of",
     "written_as",
+    "x_label_of",
 ]

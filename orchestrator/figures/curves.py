@@ -31,6 +31,7 @@ class Curve:
         unit: of y.
         thing: whom it is of, whatever it shows: the numbers of the train, of a gap those of the train behind it; of a
             line that is alone its label.
+        signals: what it is computed of. plain: whether it is the one of them as it stands.
     """
 
     x: Array
@@ -42,6 +43,8 @@ class Curve:
     unit: str
     family: str = ""
     thing: str | tuple[int, ...] = ""
+    signals: frozenset[str] = frozenset()
+    plain: bool = False
 
 
 def curves_of(panel: Mapping[str, Any], signals: Signals) -> list[Curve]:
@@ -62,7 +65,7 @@ def _entry(x: Any, text: str, label: str, entry: int, signals: Signals) -> list[
     expression = parse(text, FUNCTIONS)
     names = [*signals.names(), *signals.parameters]
     constants = _constants(x)
-    drawn: list[tuple[Array, Array, str, str]] = []
+    drawn: list[tuple[Array, Array, str, str, frozenset[str]]] = []
     for index in expression.instances(names):
         if x is None and signals.points > MOST_POINTS:
             across, y = outlined(expression, signals, index)
@@ -76,15 +79,25 @@ def _entry(x: Any, text: str, label: str, entry: int, signals: Signals) -> list[
         resolved = expression.resolve(names, index)
         unit = unit_of(expression, signals, index)
         drawn += [
-            (across[row], y[row], _label(expression, resolved, index, row, len(y)), unit) for row in range(len(y))
+            (across[row], y[row], _label(expression, resolved, index, row, len(y)), unit, _own(resolved, row, len(y)))
+            for row in range(len(y))
         ]
     alone, family = len(drawn) == 1, re.sub(r"\W*\{i\}", "", label) or _short(text)
-    things = _things([own for _, _, own, _ in drawn])
+    things = _things([own for _, _, own, *_ in drawn])
+    plain = isinstance(expression.tree, Reference)
     curves = []
-    for member, (abscissa, y, own, unit) in enumerate(drawn):
+    for member, (abscissa, y, own, unit, of) in enumerate(drawn):
         named = _named(label, own, alone, member)
-        curves.append(Curve(abscissa, y, named, entry, member, alone, unit, family, named if alone else things[member]))
+        thing = named if alone else things[member]
+        curves.append(Curve(abscissa, y, named, entry, member, alone, unit, family, thing, of, plain))
     return curves
+
+
+def _own(resolved: list[list[str]], row: int, rows: int) -> frozenset[str]:
+    """The signals of one of several rows: of a slice its own, of everything else all."""
+    return frozenset(
+        name for names in resolved for name in ([names[row]] if len(names) == rows and rows > 1 else names)
+    )
 
 
 def _things(labels: Sequence[str]) -> list[tuple[int, ...]]:

@@ -1,3 +1,4 @@
-from .page import REPORT_FILE, check_drawable, write_report
+from .document import check_drawable
+from .writing import REPORT_FILE, write_report
 
 __all__ = ["REPORT_FILE", "check_drawable", "write_report"]

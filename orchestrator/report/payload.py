@@ -21,7 +21,7 @@ class Packed:
     Attributes:
         text: base64 of the compressed (RFC 1951) little-endian ``float32``.
         offset: what was taken off before rounding, so that far positions keep their digits.
-        loss: the greatest difference to the full number, in its unit.
+        loss: the greatest difference to the full number, in ranges of the column.
     """
 
     text: str
@@ -43,6 +43,8 @@ def pack(values: NDArray[Any]) -> Packed:
         rounded = (full - offset).astype("<f4")
     back = rounded[np.isfinite(full)].astype(np.float64) + offset
     loss = float(np.abs(back - finite).max(initial=0.0))
+    half = 0.5 * high - 0.5 * low
+    loss = 0.5 * loss / half if half else 0.0
     squeeze = zlib.compressobj(_LEVEL, wbits=-15)
     # Bytes of like weight side by side: neighbouring points share all but the last.
     shuffled = np.ascontiguousarray(rounded.view(np.uint8).reshape(-1, 4).T)

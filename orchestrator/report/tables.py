@@ -3,14 +3,20 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
+from itertools import islice
 from typing import Any
 
 from .. import markup
 from ..markup import escaped, number
 from .content import Content
+from .happenings import bands_of
 
 _VERDICTS = {"pass": "holds", "fail": "broken", "inconclusive": "open"}
 _MARKS = {"pass": "✓", "fail": "✗", "inconclusive": "?"}
+
+
+_LISTED = 500
+"""Of what happened, so much is listed."""
 
 
 def table(heads: Sequence[str], rows: Iterable[Sequence[str]], caption: str) -> str:
@@ -85,6 +91,16 @@ def published(contents: Sequence[Content], names: Sequence[str]) -> str:
     return table(heads, rows, "Known values") if rows else ""
 
 
+def happenings(contents: Sequence[Content], names: Sequence[str]) -> str:
+    """Events, faults and outages: from when until when."""
+    rows = [
+        [*_of(names, run), number(band["from"]), number(band["until"]), escaped(band["label"])]
+        for run, content in enumerate(contents)
+        for band in islice(bands_of(content.record), _LISTED)
+    ]
+    return table([*_head_of(names), "from [s]", "until [s]", "what"], rows, "Events, faults, outages") if rows else ""
+
+
 def _of(names: Sequence[str], run: int) -> list[str]:
     """A cell that tells the run, where there are several."""
     return [escaped(names[run])] if len(names) > 1 else []
@@ -98,8 +114,13 @@ def findings(content: Content, name: str) -> str:
     """What ended a run, what no train can do, and what was said of it."""
     said = [str(finding["message"]) for finding in content.record.get("findings", ())]
     said += [str(note) for note in content.record.get("notes", ())]
-    error = content.record.get("error")
+    error, record = content.record.get("error"), content.record
     items = [f'<li class="broken">{escaped(error)}</li>'] if error else []
+    if record.get("status") != "completed":
+        reached = number(float(content.results.time[-1]) if content.results.points else None)
+        items += [f"<li>The last point that was recorded is at {reached} s of {number(record['stop_time'])} s.</li>"]
+    if record.get("status") == "running":
+        items += ["<li>It had not ended when this page was made: it went on, or had been killed.</li>"]
     items += [f"<li>{escaped(text)}</li>" for text in said]
     head = f"<h3>{escaped(name)}</h3>" if name else ""
     return f'{head}<ul class="told">{"".join(items)}</ul>' if items else ""
@@ -109,10 +130,11 @@ def provenance(content: Content) -> str:
     """What produced the numbers, and how to have them again."""
     record = content.record
     facts: list[tuple[str, str]] = [
-        ("run again", f"<code>{escaped(command_of(record))}</code>"),
+        ("run again", command_of(record)),
         ("run", f"<code>{escaped(record.get('run', ''))}</code>"),
         ("algorithm", escaped(f"{record.get('algorithm')}, step {number(record.get('step'))} s")),
-        ("time", escaped(f"{number(record.get('start_time'))} to {number(record.get('time_reached'))} s")),
+        ("time", _time_of(record)),
+        ("files", f"<code>{escaped(content.directory)}</code>"),
         ("seed", escaped(record.get("seed"))),
         ("versions", escaped(", ".join(f"{k} {v}" for k, v in record.get("versions", {}).items()))),
         ("Python", escaped(f"{record.get('python')} on {record.get('platform')}")),
@@ -140,9 +162,15 @@ def _unit(content: Content, name: str) -> str:
     return content.results.units.get(name, "")
 
 
-def folded(title: str, markup: str) -> str:
+def _time_of(record: Mapping[str, Any]) -> str:
+    said = f"{number(record.get('start_time'))} to {number(record.get('time_reached'))} s"
+    resumed = record.get("resumed")
+    return said + (f", gone on from its checkpoint at {number(resumed)} s" if resumed is not None else "")
+
+
+def folded(title: str, markup: str, *, is_open: bool = False) -> str:
     """What is shown when it is asked for; nothing of nothing."""
-    return f"<details><summary>{escaped(title)}</summary>{markup}</details>" if markup else ""
+    return f"<details{' open' * is_open}><summary>{escaped(title)}</summary>{markup}</details>" if markup else ""
 
 
 def _small(text: object) -> str:
@@ -150,8 +178,7 @@ def _small(text: object) -> str:
 
 
 def command_of(record: Mapping[str, Any]) -> str:
-    """What runs the same again, as far as options tell it."""
-    words = ["orchestrate run", str(record.get("scenario") or record.get("path"))]
-    words += ["--preset", str(record["preset"])] if record.get("preset") else []
-    words += ["(with the changes that stand among the parameters)"] if record.get("modified") else []
-    return " ".join(words)
+    """What runs the same again, as markup."""
+    if record.get("command"):
+        return f"<code>{escaped(record['command'])}</code>"
+    return "no command is known: its system was made or changed in Python; what it was stands in run.json"

@@ -7,8 +7,10 @@ from typing import Any
 
 from ..run import Results
 
-_CEILINGS = ("speed_limit", "ceiling")
-"""Outputs that no train should be faster than."""
+_LIMITS = ("speed_limit",)
+"""Outputs that tell the limit of the line where the train is."""
+_CEILINGS = (*_LIMITS, "ceiling", "permitted_speed")
+"""Outputs that no train should be faster than: limits, and the curve along which it has to brake to the next one."""
 
 
 def trains_of(results: Results) -> list[dict[str, Any]]:
@@ -26,7 +28,8 @@ def trains_of(results: Results) -> list[dict[str, Any]]:
                 "speed": head[1],
                 "tail": carriages[-1] if carriages else None,
                 "length": _length(results, instance),
-                "limits": [name for name in results if _is_ceiling(name, instance)],
+                "limits": [name for name in results if _is_of(name, instance, _CEILINGS)],
+                "strip": next((name for name in results if _is_of(name, instance, _LIMITS)), None),
             }
         )
     return found
@@ -44,17 +47,17 @@ def _length(results: Results, instance: str) -> float:
     return float(results.parameters.get(f"{instance}.length", float(pitch) * max(1, vehicles)))
 
 
-def _is_ceiling(name: str, instance: str) -> bool:
+def _is_of(name: str, instance: str, ceilings: tuple[str, ...]) -> bool:
     """Whether a signal limits this train: it is of an instance with the same number, or of one without."""
     owner, _, what = name.partition(".")
-    return what in _CEILINGS and owner.partition("[")[2] in ("", instance.partition("[")[2])
+    return what in ceilings and owner.partition("[")[2] in ("", instance.partition("[")[2])
 
 
 def gradients_of(record: Mapping[str, Any]) -> list[dict[str, float]]:
     """Where along the line which gradient begins: of the first model that was built with a line."""
-    for told in record.get("instances", {}).values():
-        line = told.get("build", {}).get("line")
-        sections = line.get("sections") if isinstance(line, Mapping) else line
-        if isinstance(sections, list) and all(isinstance(p, Mapping) and "position" in p for p in sections):
-            return [{"from": float(p["position"]), "gradient": float(p.get("gradient", 0.0))} for p in sections]
+    built = (value for told in record.get("instances", {}).values() for value in told.get("build", {}).values())
+    for value in built:
+        line = value.get("sections") if isinstance(value, Mapping) else value
+        if isinstance(line, list) and line and all(isinstance(p, Mapping) and "position" in p for p in line):
+            return [{"from": float(p["position"]), "gradient": float(p.get("gradient", 0.0))} for p in line]
     return []

@@ -11,6 +11,8 @@ from ..markup import escaped
 from ..wiring import condensed, generations, graph_of
 
 _WIDTH, _HEIGHT, _ACROSS, _DOWN, _EDGE = 150, 34, 250, 54, 20
+_BEND = 45
+"""How far a wire within a column swings out."""
 _LATE = re.compile(r"^(\S+) receives (\S+) ")
 """How a run says that a connection is late."""
 _MOST = 60
@@ -35,7 +37,7 @@ def draw_wiring(record: Mapping[str, Any]) -> str:
             delayed.add(pair)
     boxes = list(dict.fromkeys(box.values()))
     places = _places(boxes, list(wires), delayed)
-    width = _EDGE * 2 + _WIDTH + _ACROSS * max((x for x, _ in places.values()), default=0)
+    width = _EDGE * 2 + _WIDTH + _BEND + _ACROSS * max((x for x, _ in places.values()), default=0)
     height = _EDGE * 2 + _HEIGHT + _DOWN * max((y for _, y in places.values()), default=0)
     parts = [_wire(places, pair, count, pair in delayed) for pair, count in wires.items()]
     parts += [_box(places[name], name, sum(b == name for b in box.values()), record) for name in boxes]
@@ -83,7 +85,7 @@ def _wire(places: Mapping[str, tuple[int, int]], pair: tuple[str, str], count: i
     ahead = places[pair[1]][0] - places[pair[0]][0]
     # From the right side to the left one, or the other way round for what goes back; within a column by the right.
     x0, x1 = x0 + _WIDTH * (ahead >= 0), x1 + _WIDTH * (ahead <= 0)
-    bend = 0.5 * (x1 - x0) if ahead else 45.0
+    bend = 0.5 * (x1 - x0) if ahead else _BEND
     y0, y1 = (y + 8 * (ahead < 0) for y in (y0, y1))
     path = f"M{x0} {y0}C{x0 + bend} {y0} {x1 - bend * (1 if ahead else -1)} {y1} {x1} {y1}"
     told = f"{pair[0]} to {pair[1]}: {count} connection{'s' if count > 1 else ''}{', late' if is_late else ''}"

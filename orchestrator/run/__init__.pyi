@@ -7,7 +7,7 @@ from .execution import at_half_the_step, execute, go_on, resume, run
 from .outcome import Run, Status
 from .record import add_step_check, read_metrics
 from .record import read as read_record
-from .recording import CSV_FILE, ROWS_FILE, Results, Telling, recover_rows
+from .recording import CSV_FILE, ROWS_FILE, Results, Telling, read_json, recover_rows
 from .repeating import Flown, Repeater, listening
 from .revision import Revision
 from .session import Progress
@@ -43,6 +43,7 @@ __all__ = [
     "go_on",
     "listening",
     "read_checkpoint",
+    "read_json",
     "read_metrics",
     "read_record",
     "recover_rows",

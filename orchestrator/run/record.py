@@ -68,9 +68,7 @@ def abandon(directory: Path, error: BaseException) -> None:
     add(directory, status="failed", error=str(error))
 
 
-def finish(
-    place: RunDirectory, outcome: Run, kind: str, rows: Sequence[int], *, resumed: float | None = None
-) -> None:
+def finish(place: RunDirectory, outcome: Run, kind: str, rows: Sequence[int], *, resumed: float | None = None) -> None:
     """Write the end of the run, and what was evaluated.
 
     Args:

@@ -3,6 +3,7 @@
 const page = (() => {
   const data = JSON.parse(document.getElementById("data").textContent);
   const COLOURS = ["#0072B2", "#D55E00", "#009E73", "#CC79A7", "#56B4E9", "#E69F00", "#7f7f7f", "#8c564b"];
+  const VERDICTS = { pass: "--holds", fail: "--broken", inconclusive: "--open" };
   const DASHES = [[], [6, 3], [2, 2], [6, 2, 2, 2]];
   const make = (name, attributes = {}, ...children) => {
     const node = document.createElement(name);
@@ -74,7 +75,35 @@ const page = (() => {
     return { x: xs, y: ys };
   };
 
+  // Of a curve that may go any way: of so many pieces the ends of both directions, in their order.
+  const thinned = (x, y, most) => {
+    if (x.length <= most) return { x, y };
+    const xs = [], ys = [], pieces = Math.ceil(most / 4);
+    for (let piece = 0; piece < pieces; piece++) {
+      const begin = Math.floor((x.length * piece) / pieces), end = Math.floor((x.length * (piece + 1)) / pieces), kept = [begin, begin, begin, begin];
+      let gap = false;
+      for (let k = begin; k < end; k++) {
+        if (!(y[k] === y[k] && x[k] === x[k])) { gap = true; continue; }
+        if (!(x[kept[0]] <= x[k])) kept[0] = k;
+        if (!(x[kept[1]] >= x[k])) kept[1] = k;
+        if (!(y[kept[2]] <= y[k])) kept[2] = k;
+        if (!(y[kept[3]] >= y[k])) kept[3] = k;
+      }
+      for (const k of [...new Set(kept)].sort((a, b) => a - b)) { xs.push(x[k]); ys.push(y[k]); }
+      if (gap) { xs.push(x[end - 1]); ys.push(NaN); }
+    }
+    return { x: xs, y: ys };
+  };
+
   // ---------------------------------------------------------------- look
+
+  const shape = (colour, dash) => { // of a line, for a legend
+    const drawn = document.createElementNS("http://www.w3.org/2000/svg", "svg"), stroke = document.createElementNS("http://www.w3.org/2000/svg", "path");
+    for (const [key, value] of [["viewBox", "0 0 26 10"], ["aria-hidden", "true"]]) drawn.setAttribute(key, value);
+    for (const [key, value] of [["d", "M0 5H26"], ["stroke", colour], ["stroke-width", "3"], ["stroke-dasharray", dash.join(" ")]]) stroke.setAttribute(key, value);
+    drawn.append(stroke);
+    return drawn;
+  };
 
   const style = (name) => getComputedStyle(document.documentElement).getPropertyValue(name).trim();
   const dark = matchMedia("(prefers-color-scheme: dark)");
@@ -82,12 +111,12 @@ const page = (() => {
   const shades = (plot) => {
     plot.background_fill_color = plot.border_fill_color = style("--page");
     plot.outline_line_color = style("--line");
-    for (const axis of [...plot.xaxes ?? plot.below, ...plot.yaxes ?? plot.left]) {
+    for (const axis of [...plot.below, ...plot.left, ...plot.right]) {
       axis.axis_line_color = axis.major_tick_line_color = axis.minor_tick_line_color = style("--soft");
       axis.major_label_text_color = axis.axis_label_text_color = style("--ink");
     }
     for (const grid of plot.center) if ("grid_line_color" in grid) grid.grid_line_color = style("--line");
   };
 
-  return { data, COLOURS, DASHES, make, digits, column, timeOf, placeIn, outline, style, dark, still, shades };
+  return { data, COLOURS, DASHES, VERDICTS, make, digits, column, timeOf, placeIn, outline, thinned, shape, style, dark, still, shades };
 })();

@@ -4,6 +4,8 @@ from functools import partial
 
 import pytest
 from railcosim.orchestrator import System, run
+from railcosim.orchestrator.report.content import Columns, read_content, signals_of, told_of
+from railcosim.orchestrator.report.panels import panels
 
 TITLE = 'A </script><img src=x onerror="document.title=1"> & $$x$$'
 
@@ -45,3 +47,23 @@ def directory(wavy, tmp_path):
     """Of a run that has ended."""
     run(wavy(), kind="native", output=tmp_path / "run", figures=False)
     return tmp_path / "run"
+
+
+def tell(*directories):
+    """What the script of a page is given of runs, and the runs."""
+    columns = Columns()
+    contents = [read_content(directory, columns) for directory in directories]
+    names = [str(k) for k in range(len(contents))]
+    data = {
+        "runs": [told_of(content, name, columns) for content, name in zip(contents, names, strict=True)],
+        "signals": signals_of(contents),
+        "panels": panels(contents, names, columns),
+        "columns": columns.told,
+    }
+    return data, contents
+
+
+@pytest.fixture
+def told():
+    """Tells what a page is given of runs."""
+    return tell

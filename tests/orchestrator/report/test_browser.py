@@ -8,6 +8,7 @@ from pathlib import Path
 
 import pytest
 from railcosim.orchestrator import load, run
+from railcosim.orchestrator.errors import FmuError
 from railcosim.orchestrator.report import write_report
 
 CHROMIUM = shutil.which("chromium")
@@ -57,27 +58,38 @@ def comfort(tmp_path_factory):
     return write_report([directory])
 
 
+def photographed(page, name):
+    """Keep a picture of the whole page to be looked at."""
+    PICTURES.mkdir(parents=True, exist_ok=True)
+    page.wait_for_selector("html[data-whole]", timeout=30_000)
+    page.wait_for_timeout(300)
+    page.screenshot(path=PICTURES / f"{name}.png", full_page=True)
+
+
+def has_no_barrier(page):
+    """What axe-core finds of WCAG, but for what is not serious."""
+    found = axe.Axe().run(page).response["violations"]
+    assert not [each["id"] for each in found if each["impact"] in ("serious", "critical")], found
+
+
 def clock(page):
     return float(page.locator("#signals output").first.text_content().split()[0])
 
 
 def seen(page):
-    """How many points the lines of the first panel have on the screen, and between which times."""
-    return page.evaluate(
-        "() => { const d = Bokeh.documents[0].roots()[0]; const r = d.x_range; return [r.start, r.end]; }"
-    )
+    """Between which times the first panel over time is drawn, once it is looked at."""
+    page.locator(".panel", has_text="(a) speed").scroll_into_view_if_needed()
+    page.wait_for_timeout(200)
+    return page.evaluate("() => { const r = Bokeh.documents[2].roots()[0].x_range; return [r.start, r.end]; }")
 
 
 @pytest.mark.parametrize(("scheme", "width"), [("light", 1280), ("dark", 400)])
 def test_a_run(opened, comfort, scheme, width):
     page = opened(comfort, scheme, width)
-    PICTURES.mkdir(parents=True, exist_ok=True)
-    page.wait_for_timeout(300)
-    page.screenshot(path=PICTURES / f"comfort_cruise_{scheme}_{width}.png", full_page=True)
-    assert page.locator(".panel").count() == 6
+    photographed(page, f"comfort_cruise_{scheme}_{width}")
+    assert page.locator(".panel").count() == 9  # one of them is of the trains
     assert page.evaluate("() => document.documentElement.scrollWidth <= innerWidth"), "it is wider than the screen"
-    found = axe.Axe().run(page).response["violations"]
-    assert not [each["id"] for each in found if each["impact"] in ("serious", "critical")], found
+    has_no_barrier(page)
 
 
 def test_zoom_and_hover(opened, comfort):
@@ -85,8 +97,8 @@ def test_zoom_and_hover(opened, comfort):
     assert seen(page) == [0.0, 350.0]
     page.locator("#signals button", has_text="+").first.click()
     assert seen(page)[1] - seen(page)[0] == pytest.approx(175.0)
-    page.locator("#signals button", has_text="all").click()
-    plot = page.locator(".plot").first
+    page.get_by_role("button", name="the whole time").click()
+    plot = page.locator("#signals .plot").nth(2)
     plot.scroll_into_view_if_needed()
     box = plot.bounding_box()
     page.mouse.move(box["x"] + 0.5 * box["width"], box["y"] + 0.5 * box["height"])
@@ -104,9 +116,13 @@ def test_the_instant_that_decided(opened, comfort):
     page = opened(comfort)
     page.locator("tr", has_text="spacing").get_by_role("button").click()
     page.wait_for_timeout(500)
-    assert page.locator(".panel").count() == 7
+    assert page.locator(".panel").count() == 10
     assert clock(page) == pytest.approx(2.2)
-    assert page.locator(".panel h3").first.text_content() == "train[3].position"
+    panel = page.locator("#signals .panel").first
+    assert panel.locator("h3").text_content() == "train[2].position, train[3].position"
+    assert panel.locator(".decided").text_content() == "◆ spacing: pass, margin 995.572, decided at 2.2 s"
+    gaps = page.locator(".panel", has_text="(c) distance")
+    assert "spacing: pass" in gaps.locator(".decided").text_content()
 
 
 def test_trains_move(opened, comfort):
@@ -115,7 +131,10 @@ def test_trains_move(opened, comfort):
     play.click()
     page.wait_for_timeout(700)
     page.get_by_role("button", name="pause").click()
-    assert 2.0 < clock(page) < 30.0
+    stopped = clock(page)
+    assert stopped > 2.0
+    page.wait_for_timeout(100)
+    assert clock(page) == stopped
     said = page.locator("#trains canvas").first.get_attribute("aria-label")
     assert said.startswith("trains at ")
     assert "train[4]" in said
@@ -129,7 +148,7 @@ def test_by_keyboard_alone(opened, comfort):
         reached.add(page.evaluate("() => document.activeElement.outerHTML.slice(0, 60)"))
     for wanted in ('class="skip"', "data-requirement", "play", 'type="range"', 'class="panel"', "<summary"):
         assert any(wanted in each for each in reached), wanted
-    page.locator(".panel").first.focus()
+    page.locator(".panel", has_text="(a) speed").focus()
     before = clock(page)
     page.keyboard.press("ArrowRight")
     assert clock(page) > before
@@ -139,7 +158,7 @@ def test_by_keyboard_alone(opened, comfort):
 
 def test_tables_sort(opened, comfort):
     page = opened(comfort)
-    page.get_by_role("button", name="margin").click()
+    page.locator("th").get_by_role("button", name="margin").click()
     margins = [
         float(cell) for cell in page.locator("#verdicts table").first.locator("td:nth-child(3)").all_text_contents()
     ]
@@ -155,5 +174,53 @@ def test_names_that_want_to_be_markup(opened, directory):
 def test_two_runs(opened, wavy, directory, tmp_path):
     run(wavy(stop_time=10.0), kind="native", output=tmp_path / "other", figures=False)
     page = opened(write_report([directory, tmp_path / "other"]))
-    assert page.locator(".legend li").count() == 2 * 4 + 2
-    page.screenshot(path=PICTURES / "two_runs.png", full_page=True)
+    assert page.locator(".legend [aria-pressed]").count() == 2 * (4 + 1 + 1)
+    photographed(page, "two_runs")
+    page.locator("th").get_by_role("button", name="metric").click()
+    has_no_barrier(page)
+
+
+def test_a_failed_run(opened, wavy, mine, tmp_path):
+    """What failed, when and who stands on top; what was recorded until then is drawn."""
+    system = wavy()
+    system.add("fails", mine("Fails"), until=5.0)
+    with pytest.raises(FmuError):
+        run(system, kind="native", output=tmp_path, figures=False)
+    page = opened(write_report([tmp_path]))
+    assert page.locator("header .broken").text_content() == "failed"
+    assert page.locator("#verdicts li.broken").text_content().startswith("fails, t = 5")
+    photographed(page, "failed_run")
+    has_no_barrier(page)
+
+
+def test_a_curve_over_another_signal(opened, directory):
+    """It has an axis of its own, to zoom by buttons and keys; the pointer of time is a dot on it."""
+    page = opened(write_report([directory]))
+    panel = page.locator("#signals .panel", has_text="Over another")
+    span = "() => { const r = Bokeh.documents.at(-1).roots()[0].x_range; return r.end - r.start; }"
+    whole = page.evaluate(span)
+    panel.get_by_role("button", name="zoom in").click()
+    page.wait_for_timeout(200)
+    assert page.evaluate(span) == pytest.approx(0.5 * whole)
+    panel.focus()
+    page.keyboard.press("0")
+    page.wait_for_timeout(200)
+    assert page.evaluate(span) == pytest.approx(whole)
+    before = panel.locator("output").text_content()
+    page.keyboard.press("End")
+    assert panel.locator("output").text_content() != before
+    assert clock(page) == 20.0
+
+
+def test_signals_of_two_units_have_two_axes(opened, comfort):
+    page = opened(comfort)
+    page.get_by_text("Choose signals").click()
+    for name in ("train[1].speed", "cruise[1].force"):
+        page.get_by_label("find a signal").fill(name)
+        page.get_by_role("checkbox").first.check()
+    page.get_by_role("button", name="new panel of the chosen").click()
+    page.wait_for_timeout(300)
+    assert page.evaluate("() => Bokeh.documents.at(-1).roots()[0].right.map((axis) => axis.axis_label)") == ["[N]"]
+    shown = page.locator("#signals .panel").first.locator("output").all_text_contents()
+    assert [text.split()[-1] for text in shown] == ["m/s", "N"]
+    page.locator("#signals .panel").first.screenshot(path=PICTURES / "two_units.png")

@@ -7,8 +7,9 @@ import re
 import pytest
 from railcosim.orchestrator import run, world
 from railcosim.orchestrator.cli import app as cli
-from railcosim.orchestrator.errors import RailcosimError
-from railcosim.orchestrator.report import page, write_report
+from railcosim.orchestrator.comparison.variants import compare
+from railcosim.orchestrator.errors import RailcosimError, ScenarioError
+from railcosim.orchestrator.report import document, write_report
 
 
 class Read(html.parser.HTMLParser):
@@ -86,7 +87,7 @@ def test_a_page_of_a_failed_run_says_so(wavy, mine, tmp_path):
 
 
 def test_without_the_library(directory, monkeypatch):
-    monkeypatch.setattr(page.importlib.util, "find_spec", lambda name: None)
+    monkeypatch.setattr(document.importlib.util, "find_spec", lambda name: None)
     with pytest.raises(RailcosimError, match=r"pip install 'railcosim\[report\]'"):
         write_report([directory])
 
@@ -127,3 +128,38 @@ def test_runs_and_comparisons_make_pages(mine, tmp_path, capsys):
     assert cli.call(["compare", str(scenario), "--preset", "far", "--report", "-o", str(out), "--no-figures"]) == 0
     texts = Read((out / "report.html").read_text(encoding="utf-8")).texts
     assert {"lag", "lag far"} & set(texts)
+
+
+def test_a_comparison_that_was_made_before(wavy, mine, tmp_path, capsys):
+    """Its directory alone: each variant has its own name; one that has left nothing is not shown."""
+    fails = wavy()
+    fails.add("fails", mine("Fails"), until=5.0)
+    compare({"slow": wavy(), "quick": wavy(stop_time=10.0), "fails": fails}, output=tmp_path, figures=False)
+    assert cli.call(["report", str(tmp_path)]) == 0
+    seen = Read((tmp_path / "report.html").read_text(encoding="utf-8"))
+    assert [run["name"] for run in json.loads(seen.scripts["data"])["runs"]] == ["slow", "quick", "fails"]
+    path = tmp_path / "compare.json"
+    told = json.loads(path.read_text())
+    for variant, results in zip(told["variants"], ("../elsewhere", None, "missing"), strict=True):
+        variant["results"] = results
+    path.write_text(json.dumps(told))
+    with pytest.raises(ScenarioError, match="no variant that was compared has left results"):
+        write_report([tmp_path])
+    path.write_text("[]")
+    with pytest.raises(ScenarioError, match="holds no comparison that can be read"):
+        write_report([tmp_path])
+
+
+def test_how_a_run_came_about(directory):
+    """Of one that went on from a checkpoint, of one that has not ended, and of one without a command."""
+    path = directory / "run.json"
+    record = json.loads(path.read_text())
+    for changes, said in (
+        ({"resumed": 12.5}, "gone on from its checkpoint at 12.5 s"),
+        ({"status": "running"}, "It had not ended when this page was made"),
+        ({"command": None}, "no command is known"),
+        ({"command": "orchestrate run 'a <b>.toml' --set 'x.y=[1, 2]'"}, "run 'a <b>.toml' --set 'x.y=[1, 2]'"),
+        ({"events": [{"signal": "<i>", "action": "set", "at": 3.0, "duration": None, "every": None}]}, "set <i>"),
+    ):
+        path.write_text(json.dumps(record | changes))
+        assert said in " ".join(Read(write_report([directory]).read_text(encoding="utf-8")).texts)

@@ -29,9 +29,9 @@ def unpack(packed, points):
 def test_a_column_and_its_loss(values):
     packed = pack(values)
     back = unpack(packed, len(values))
-    assert np.abs(back - values).max(initial=0.0) <= packed.loss
     reach = float(values.max()) - float(values.min()) if len(values) else 0.0
-    assert packed.loss <= 2.0**-24 * reach
+    assert np.abs(back - values).max(initial=0.0) <= packed.loss * reach * (1.0 + 1e-15)
+    assert packed.loss <= 2.0**-24
 
 
 def test_what_is_not_finite_stays_so():
@@ -42,7 +42,7 @@ def test_what_is_not_finite_stays_so():
 
 def test_far_positions_keep_millimetres():
     """At 1200 km a number in single precision alone is 6 cm off."""
-    assert pack(np.linspace(1.2e6, 1.21e6, 5000)).loss < 1e-3
+    assert pack(np.linspace(1.2e6, 1.21e6, 5000)).loss * 1e4 < 1e-3
 
 
 @pytest.mark.parametrize(

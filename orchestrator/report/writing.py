@@ -1,0 +1,53 @@
+"""Which page belongs to directories: of a run, or of the variants of a comparison."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from pathlib import Path
+
+from ..errors import ScenarioError
+from ..run import read_json
+from .page import write_runs
+
+REPORT_FILE = "report.html"
+_COMPARISON = "compare.json"
+
+
+def write_report(directories: Sequence[Path], output: Path | None = None, names: Sequence[str] = ()) -> Path:
+    """Write the page of what directories hold.
+
+    Args:
+        directories: of runs or comparisons, which are seen together.
+        output: the file; in the first of the directories by default.
+        names: what each run is called; scenario and preset, or else the directory, by default.
+
+    Returns:
+        The file.
+
+    Raises:
+        ScenarioError: a directory holds nothing that can be read.
+        RailcosimError: the library that draws is not installed, or the file cannot be written.
+    """
+    path = output if output is not None else directories[0] / REPORT_FILE
+    found = [pair for directory in directories for pair in _runs_in(directory)]
+    known = list(names) or ([name for name, _ in found] if all(name for name, _ in found) else [])
+    return write_runs([each for _, each in found], path, known)
+
+
+def _runs_in(directory: Path) -> Iterator[tuple[str, Path]]:
+    """The run that a directory holds, or those of the variants that were compared there, with their names."""
+    if (directory / "run.json").is_file() or not (directory / _COMPARISON).is_file():
+        yield "", directory
+        return
+    try:
+        told = [(str(each["name"]), each["results"]) for each in read_json(directory / _COMPARISON)["variants"]]
+    except (OSError, ValueError, LookupError, TypeError, RecursionError) as error:
+        raise ScenarioError(f"{directory} holds no comparison that can be read: {error}") from error
+    runs = [
+        (name, directory / folder)
+        for name, folder in told
+        if isinstance(folder, str) and Path(folder).name == folder and (directory / folder / "run.json").is_file()
+    ]
+    if not runs:
+        raise ScenarioError(f"{directory}: no variant that was compared has left results")
+    yield from runs
