@@ -254,7 +254,8 @@ def _write(outcome: Run, session: Session, place: RunDirectory) -> None:
     """Write the record down, then the text of the results; where there is no room for it the run has failed."""
     job = session.job
     try:
-        record_file.finish(place, outcome, job.kind, session.rows, resumed=job.begin and job.begin.time)
+        resumed = None if job.begin is None else job.begin.time
+        record_file.finish(place, outcome, job.kind, session.rows, resumed=resumed)
         if outcome.results.points and (place.path / ROWS_FILE).exists():
             finish_rows(place.path, job.writing)
         if job.checkpoint_every is None:
