@@ -23,7 +23,7 @@ from .formulas import says_when, tokens_of
 from .metrics import EVERY_STEP, FUNCTIONS
 from .reducers import Span, ends_of, scalar
 from .signals import Rehearsal, Signals
-from .slack import can_be_true, conditions
+from .slack import can_be_true, conditions, decoded
 from .syntax import Call, Node, Reference, Temporal, walk
 from .temporal import (
     Culprit,
@@ -31,7 +31,6 @@ from .temporal import (
     Formula,
     Points,
     Word,
-    decoded,
     horizon,
     rehearsed_interval,
     scales_of,
@@ -160,13 +159,15 @@ class Requirement:
         indices = self.condition.instances(names_of(signals))
         if not indices:
             return Verdict(self.name, self.text, "inconclusive", reason="no signal has such an index")
+        points = Points(signals, reach(self.condition.tree))
+        span = Span(times.start, times.end, times.outside, forgiven=points.forgiven)
         try:
-            seen = [(index, self._decision(signals, times, index, scaled=scaled)) for index in indices]
-            if not seen[0][1].points:
+            seen = {index: self._decision(points, span, index, scaled=scaled) for index in indices}
+            if not seen[indices[0]].points:
                 return Verdict(self.name, self.text, "inconclusive", reason="no recorded point lies in its window")
-            index, worst = min(seen, key=lambda found: found[1].badness)
+            index, worst = min(seen.items(), key=lambda found: found[1].badness)
             verdict, reason = self._verdict(worst, signals, times.end)
-            robustness = _finite(worst.decisive.value) if scaled else self._scaled(signals, times, dict(seen))
+            robustness = _finite(worst.decisive.value) if scaled else self._scaled(points, span, seen)
         except WindowError as error:
             return Verdict(self.name, self.text, "inconclusive", reason=str(error))
         extreme, culprit = worst.decisive, worst.culprit()
@@ -178,25 +179,23 @@ class Requirement:
             self.name, self.text, verdict, _finite(extreme.value), time, index, worst.points, reason, robustness, names
         )
 
-    def _decision(self, signals: Signals, times: _Times, index: int | None, *, scaled: bool = False) -> Decision:
+    def _decision(self, points: Points, span: Span, index: int | None, *, scaled: bool = False) -> Decision:
         """What decides for one index; with `scaled`, every comparison is divided by the size of its unit."""
 
         def decide(node: Node, scope: Scope) -> Decision:
-            points = Points(signals, reach(node))
-            span = Span(times.start, times.end, times.outside, forgiven=points.forgiven)
             formula = Formula(scope, points, scales_of(self.condition, scope, index) if scaled else None)
             return Decision(formula, node, self.quantifier, span)
 
-        return self.condition.apply(decide, signals, index)
+        return self.condition.apply(decide, points.signals, index)
 
-    def _scaled(self, signals: Signals, times: _Times, seen: Mapping[int | None, Decision]) -> float | None:
+    def _scaled(self, points: Points, span: Span, seen: Mapping[int | None, Decision]) -> float | None:
         """The worst value where every comparison is divided by the size of its unit."""
         found = []
         for index, decision in seen.items():
             scales = scales_of(self.condition, decision.formula.scope, index)
             value = decision.decisive.value
             if len(set(scales.values())) > 1:
-                value = self._decision(signals, times, index, scaled=True).decisive.value
+                value = self._decision(points, span, index, scaled=True).decisive.value
             else:
                 value = value / next(iter(scales.values()), 1.0)
             found.append((not decision.is_missing, value))

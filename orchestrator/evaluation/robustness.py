@@ -12,8 +12,9 @@ from .metrics import FUNCTIONS
 from .reducers import Span
 from .requirements import Requirement, parse_requirement
 from .signals import Signals
+from .slack import decoded
 from .syntax import Node
-from .temporal import Formula, Points, decoded, scales_of
+from .temporal import Formula, Points, scales_of
 
 Array = NDArray[np.float64]
 

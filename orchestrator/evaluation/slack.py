@@ -1,11 +1,10 @@
-"""The slack of a condition: whether it holds, and by how much.
+"""The slack of a condition at every point: by how much it holds, or is missed.
 
-Numbers that differ by rounding are equal: their slack is 0.
+Numbers that differ by rounding are equal: their slack is 0. What stands for that says whether the condition holds.
 """
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from functools import reduce
-from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,22 +13,25 @@ from .calculation import Scope, evaluate
 from .functions import CONSTANTS
 from .syntax import Call, Name, Node, Number, Operation, Reference, Temporal
 
+Array = NDArray[np.float64]
 COMPARISONS = ("<", "<=", ">", ">=", "==", "!=")
 ROUNDING = 4 * float(np.finfo(np.float64).eps)
 """Numbers that differ by less than this share of what they are made of are equal: a start on a bound is on it."""
+_ZERO = float(np.finfo(np.float64).tiny)
+"""What stands for 0 where a condition holds; where it does not, its negative does: so a value says both."""
 
 
-class Slack(NamedTuple):
-    """Whether a condition holds, and by how much (negative: missed by; infinite: no measure), of one shape."""
-
-    holds: NDArray[np.bool_]
-    slack: NDArray[np.float64]
+def decoded(values: Array) -> Array:
+    """Values with a plain 0 where they are 0."""
+    return np.where(np.abs(values) <= _ZERO, 0.0, values)
 
 
-def slack_of(node: Node, scope: Scope, scales: Mapping[int, float] | None = None) -> Slack:
+def slack_of(node: Node, scope: Scope, scales: Mapping[int, float] | None = None) -> Array:
     """The slack of a condition: b - a for a < b, the least for `and`, the most for `or`, negated for `not`.
 
-    A bare signal is a boolean: it holds where it is not zero and has no measure. NaN never holds.
+    It is positive where the condition holds and negative where it does not (missed by), never 0, as `decoded` has it;
+    infinite where there is no measure. A bare signal is a boolean: it holds where it is not zero and has no measure.
+    NaN never holds.
 
     Args:
         node: the condition.
@@ -38,51 +40,59 @@ def slack_of(node: Node, scope: Scope, scales: Mapping[int, float] | None = None
     """
     match node:
         case Operation(operator="not", operands=(operand,)):
-            holds, slack = slack_of(operand, scope, scales)
-            return Slack(~holds & ~np.isnan(slack), -slack)
+            return -slack_of(operand, scope, scales)
         case Operation(operator="and" | "or" as operator, operands=operands):
             parts = [slack_of(operand, scope, scales) for operand in operands]
-            smaller = operator == "and"
-            slack = (np.minimum if smaller else np.maximum).reduce(np.broadcast_arrays(*(part.slack for part in parts)))
-            every = np.broadcast_arrays(*(part.holds for part in parts))
-            holds = (np.logical_and if smaller else np.logical_or).reduce(every)
-            return Slack(np.asarray(holds & ~np.isnan(slack)), np.asarray(slack))
+            return np.asarray(reduce(np.minimum if operator == "and" else np.maximum, parts))
         case Operation(operator="if", operands=(condition, then, otherwise)):
-            choice = np.asarray(evaluate(condition, scope), dtype=np.float64)
+            choice = _number(condition, scope)
             yes, no = slack_of(then, scope, scales), slack_of(otherwise, scope, scales)
-            slack = np.where(np.isnan(choice), np.nan, np.where(choice, yes.slack, no.slack))
-            return Slack(np.where(choice, yes.holds, no.holds) & ~np.isnan(slack), slack)
+            return np.where(np.isnan(choice), np.nan, np.where(choice, yes, no))
         case Operation(operator=operator, operands=(left, right)) if operator in COMPARISONS:
-            rounding = ROUNDING * np.maximum(_size(left, scope), _size(right, scope))
-            holds, slack = _compare(operator, evaluate(left, scope), evaluate(right, scope), rounding)
-            return Slack(holds, slack if scales is None else slack / scales[id(node)])
-    value = np.asarray(evaluate(node, scope), dtype=np.float64)
-    slack = np.where(np.isnan(value), np.nan, np.where(value, np.inf, -np.inf))
-    return Slack(slack > 0, slack)
+            return _compared(operator, left, right, scope, 1.0 if scales is None else scales[id(node)])
+    value = _number(node, scope)
+    return np.where(np.isnan(value), np.nan, np.where(value, np.inf, -np.inf))
 
 
-def _size(node: Node, scope: Scope) -> NDArray[np.float64]:
+def _number(node: Node, scope: Scope) -> Array:
+    return np.asarray(evaluate(node, scope), dtype=np.float64)
+
+
+def _largest(values: Array) -> Array:
+    """The largest magnitude."""
+    return np.maximum(values.max(initial=0.0), -values.min(initial=0.0))
+
+
+def _size(node: Node, scope: Scope, measure: Callable[[Array], Array]) -> Array:
     """How large the numbers are that a value is made of: the rounding of a gap is that of the two positions."""
     match node:
         case Operation(operator="+" | "-" | "negative" | "positive", operands=operands):
-            parts = [_size(operand, scope) for operand in operands]
+            parts = [_size(operand, scope, measure) for operand in operands]
         case Call(name="abs" | "minimum" | "maximum", arguments=arguments):
-            parts = [_size(argument, scope) for argument in arguments]
+            parts = [_size(argument, scope, measure) for argument in arguments]
         case _:
-            return np.abs(np.asarray(evaluate(node, scope), dtype=np.float64))
+            return measure(_number(node, scope))
     return np.asarray(reduce(np.maximum, parts))
 
 
-def _compare(operator: str, left: NDArray[Any], right: NDArray[Any], rounding: NDArray[np.float64]) -> Slack:
-    a, b = np.asarray(left, dtype=np.float64), np.asarray(right, dtype=np.float64)
-    gap = b - a
-    equal = (a == b) | (np.abs(gap) <= np.where(np.isfinite(rounding), rounding, 0.0))
-    difference = np.where(equal, 0.0, gap)  # inf - inf would be NaN
-    if operator in ("==", "!="):
-        size = np.abs(difference)
-        return Slack(equal, -size) if operator == "==" else Slack(~equal & ~np.isnan(size), size)
-    slack = difference if operator in ("<", "<=") else -difference
-    return Slack(slack > 0.0 if operator in ("<", ">") else slack >= 0.0, slack)
+def _compared(operator: str, left: Node, right: Node, scope: Scope, scale: float) -> Array:
+    a, b = _number(left, scope), _number(right, scope)
+
+    def rounding(measure: Callable[[Array], Array]) -> Array:
+        return ROUNDING * np.maximum(_size(left, scope, measure), _size(right, scope, measure))
+
+    gap = np.asarray(b - a)
+    is_near = not np.abs(gap).min(initial=np.inf) > rounding(_largest)
+    if is_near:  # somewhere, perhaps
+        close = rounding(np.abs)
+        equal = (a == b) | (np.abs(gap) <= np.where(np.isfinite(close), close, 0.0))
+        gap = np.where(equal, 0.0, gap)  # inf - inf would be NaN
+    slack = np.abs(gap) if operator in ("==", "!=") else gap
+    slack = slack if operator in ("<", "<=", "!=") else -slack
+    slack = slack if scale == 1.0 else slack / scale
+    if is_near:
+        slack = np.where(slack == 0.0, _ZERO if operator in ("<=", ">=", "==") else -_ZERO, slack)
+    return np.asarray(slack)
 
 
 def conditions(node: Node) -> Iterator[Node]:

@@ -2,7 +2,7 @@ from .blame import Culprit
 from .judging import Decision, Word
 from .points import Points
 from .scales import scales_of
-from .values import Formula, Scales, decoded, horizon, rehearsed_interval
+from .values import Formula, Scales, horizon, rehearsed_interval
 
 __all__ = [
     "Culprit",
@@ -11,7 +11,6 @@ __all__ = [
     "Points",
     "Scales",
     "Word",
-    "decoded",
     "horizon",
     "rehearsed_interval",
     "scales_of",

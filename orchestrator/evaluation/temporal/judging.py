@@ -42,35 +42,40 @@ class Decision:
         self.high: Extreme | None = None
         self._missing: Extreme | None = None
         self._block = (0, 0)
+        final = np.empty(0, np.int64)
         for first, last in self._blocks():
-            places = first + np.flatnonzero(span.points(formula.points.times(first, last)))
+            places = formula.points.within(span, first, last)
             self.points += len(places)
-            if len(places):
+            if word == "finally":
+                final = places[-1:] if len(places) else final
+            elif len(places):
                 self._see(first, last, places)
+        if len(final):
+            self._see(int(final[0]), int(final[0]) + 1, final)
         if word in ("finally", "") and self.points:
             self.points = 1
 
     def _blocks(self) -> list[tuple[int, int]]:
         count, size = self.formula.points.count, runs.BLOCK
-        ahead = horizon(self._node, self.formula.interval) / self.formula.points.signals.step
-        if runs.BLOCK < ahead < count:  # or most would be looked at again and again
-            size *= int(ahead // size) + 1
-        blocks = [(first, min(first + size, count)) for first in range(0, count, size)]
-        return [(0, 1)][:count] if self._word == "" else blocks
+        if self._word == "":
+            return [(0, 1)][:count]
+        if count > size:
+            ahead = horizon(self._node, self.formula.interval) / self.formula.points.signals.step
+            if size < ahead < count:  # or most would be looked at again and again
+                size *= int(ahead // size) + 1
+        return [(first, min(first + size, count)) for first in range(0, count, size)]
 
     def _see(self, first: int, last: int, places: NDArray[np.int64]) -> None:
         values, block = self.formula.values(self._node, first, last), (first, last)
-        if self._word == "finally":
-            self.low = self.high = self._missing = None
-            places = places[-1:]
         if len(places) < last - first:
             values = values.of(lambda x: x[..., places - first])
         new = _least(values.high, places)
         if np.isnan(new.value):
             self._missing = self._missing or new
-        find = _best if self._word == "eventually" else _least
-        high = find(values.high, places)
-        low = high if values.low is values.high else find(values.low, places)
+        high = _best(values.high, places) if self._word == "eventually" else new
+        low = high
+        if values.low is not values.high:
+            low = (_best if self._word == "eventually" else _least)(values.low, places)
         if self._counts(low, self.low):
             self.low = low
         if self._counts(high, self.high):

@@ -25,8 +25,6 @@ from .points import Places, Points, Windows
 Array = NDArray[np.float64]
 Scales = Mapping[int, float]
 """What the slack of each comparison is divided by, by the identity of its node."""
-_ZERO = float(np.finfo(np.float64).tiny)
-"""What stands for 0 where a condition holds; where it does not, its negative does: so a value says both."""
 
 
 class Bounds(NamedTuple):
@@ -64,11 +62,6 @@ def joined(*parts: Bounds) -> Bounds:
     low = np.concatenate([part.low for part in parts], axis=-1)
     same = all(part.high is part.low for part in parts)
     return Bounds(low, low if same else np.concatenate([part.high for part in parts], axis=-1))
-
-
-def decoded(values: Array) -> Array:
-    """Values with a plain 0 where they are 0."""
-    return np.where(np.abs(values) <= _ZERO, 0.0, values)
 
 
 def is_temporal(node: Node) -> bool:
@@ -185,9 +178,7 @@ class Formula:
 
     def _plain(self, node: Node, first: int, last: int) -> Bounds:
         part = self.points.part(first, last)
-        holds, slack = slack_of(node, self.scope.of(part), self._scales)
-        values = np.where(slack == 0.0, np.where(holds, _ZERO, -_ZERO), slack)
-        return Bounds.exact(_own(values, part))
+        return Bounds.exact(_own(slack_of(node, self.scope.of(part), self._scales), part))
 
     def interval(self, node: Temporal) -> tuple[float, float]:
         """The interval of a word in s."""
@@ -357,7 +348,9 @@ class Look(NamedTuple):
 
 def _own(values: Array, part: Part) -> Array:
     """Values at the points of a part itself, without those beyond; of what does not vary, as many."""
-    return np.broadcast_to(values, (*values.shape[:-1], part.points))[..., : part.points - part.beyond]
+    if values.shape[-1:] != (part.points,):
+        values = np.broadcast_to(values, (*values.shape[:-1], part.points))
+    return values[..., : part.points - part.beyond]
 
 
 def _opened(found: Bounds, where: NDArray[np.bool_], most: Array) -> Bounds:

@@ -8,7 +8,8 @@ from railcosim.orchestrator.errors import ExpressionError
 from railcosim.orchestrator.evaluation import robustness, signals
 from railcosim.orchestrator.evaluation.expressions import parse
 from railcosim.orchestrator.evaluation.metrics import FUNCTIONS
-from railcosim.orchestrator.evaluation.temporal import Formula, Points, decoded
+from railcosim.orchestrator.evaluation.slack import decoded
+from railcosim.orchestrator.evaluation.temporal import Formula, Points
 from railcosim.orchestrator.evaluation.temporal.values import joined
 
 
