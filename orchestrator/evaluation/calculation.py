@@ -30,6 +30,8 @@ class Binding:
     def __init__(self, text: str, functions: Mapping[str, Function], constants: Mapping[str, Any], plan: Plan) -> None:
         self.text, self.functions, self.constants, self.plan = text, functions, constants, plan
         self._terms: dict[int, tuple[Node, Term]] = {}  # by the identity of the node, which is kept for that
+        self.known: dict[int, tuple[Node, bool]] = {}
+        """Whether logic over time stands in a node, as far as it was asked, alike."""
 
     def term(self, node: Node) -> Term:
         """What gives the value of a node.

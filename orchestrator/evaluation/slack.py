@@ -58,33 +58,34 @@ def _number(node: Node, scope: Scope) -> Array:
     return np.asarray(evaluate(node, scope), dtype=np.float64)
 
 
-def _largest(values: Array) -> Array:
-    """The largest magnitude."""
-    return np.maximum(values.max(initial=0.0), -values.min(initial=0.0))
+def _size(node: Node, measure: Callable[[Node], Array]) -> Array:
+    """How large the numbers are that a value is made of: the rounding of a gap is that of the two positions.
 
-
-def _size(node: Node, scope: Scope, measure: Callable[[Array], Array]) -> Array:
-    """How large the numbers are that a value is made of: the rounding of a gap is that of the two positions."""
+    Args:
+        node: the value.
+        measure: of a part of it.
+    """
     match node:
         case Operation(operator="+" | "-" | "negative" | "positive", operands=operands):
-            parts = [_size(operand, scope, measure) for operand in operands]
+            parts = [_size(operand, measure) for operand in operands]
         case Call(name="abs" | "minimum" | "maximum", arguments=arguments):
-            parts = [_size(argument, scope, measure) for argument in arguments]
+            parts = [_size(argument, measure) for argument in arguments]
         case _:
-            return measure(_number(node, scope))
+            return measure(node)
     return np.asarray(reduce(np.maximum, parts))
 
 
 def _compared(operator: str, left: Node, right: Node, scope: Scope, scale: float) -> Array:
     a, b = _number(left, scope), _number(right, scope)
 
-    def rounding(measure: Callable[[Array], Array]) -> Array:
-        return ROUNDING * np.maximum(_size(left, scope, measure), _size(right, scope, measure))
+    def rounding(measure: Callable[[Node], Array]) -> Array:
+        return ROUNDING * np.maximum(_size(left, measure), _size(right, measure))
 
     gap = np.asarray(b - a)
-    is_near = not np.abs(gap).min(initial=np.inf) > rounding(_largest)
+    most = rounding(lambda part: scope.frame.largest(scope.binding.term(part)))
+    is_near = not np.abs(gap).min(initial=np.inf) > most
     if is_near:  # somewhere, perhaps
-        close = rounding(np.abs)
+        close = rounding(lambda part: np.abs(_number(part, scope)))
         equal = (a == b) | (np.abs(gap) <= np.where(np.isfinite(close), close, 0.0))
         gap = np.where(equal, 0.0, gap)  # inf - inf would be NaN
     slack = np.abs(gap) if operator in ("==", "!=") else gap

@@ -126,6 +126,7 @@ class Frame:
         self.run, self.signals = run, signals
         self._values: dict[Term, Value] = {}
         self._selections: dict[Hashable, Selection] = {}
+        self._largest: dict[Term, Value] = {}
 
     def __getitem__(self, term: Term) -> Value:
         value = self._values.get(term)
@@ -154,6 +155,13 @@ class Frame:
         if isinstance(argument, Term):
             return np.asarray(self[argument], dtype=np.float64)
         return None if argument is None else [self.argument(item) for item in argument]
+
+    def largest(self, term: Term) -> Value:
+        """The largest magnitude among the values of a term; NaN where one is."""
+        if term not in self._largest:
+            values = self.argument(term)
+            self._largest[term] = np.maximum(values.max(initial=0.0), -values.min(initial=0.0))
+        return self._largest[term]
 
     def selection(self, span: Span) -> Selection:
         """Which points count, in a part of the run."""

@@ -135,7 +135,6 @@ class Formula:
         self._last: dict[int, tuple[int, int, Bounds]] = {}
         self._ends: dict[int, dict[int, Bounds]] = {}
         self._intervals: dict[int, tuple[float, float]] = {}
-        self._is_temporal: dict[int, bool] = {}
 
     def values(self, node: Node, first: int, last: int) -> Bounds:
         """Of a part of the formula at the points from `first` up to `last`, which is not among them."""
@@ -167,9 +166,10 @@ class Formula:
 
     def is_temporal(self, node: Node) -> bool:
         """Whether a word of logic over time stands in a part."""
-        if id(node) not in self._is_temporal:
-            self._is_temporal[id(node)] = is_temporal(node)
-        return self._is_temporal[id(node)]
+        known = self.scope.binding.known
+        if id(node) not in known:
+            known[id(node)] = node, is_temporal(node)
+        return known[id(node)][1]
 
     def choice(self, condition: Node, first: int, last: int) -> Array:
         """The truth of the condition of an `if`."""
