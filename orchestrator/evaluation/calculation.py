@@ -4,7 +4,7 @@ Slices include both ends, and take the indices that there are: instances are num
 arrays from anywhere.
 """
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -20,15 +20,23 @@ from .vocabulary import Names, unknown_signal
 
 
 class Binding:
-    """What the parts of one expression stand for, for one value of its index.
+    """What the parts of one expression stand for, for one value of its index, or for several, a row each.
 
     Args:
         text: the expression. functions: those it may call.
         constants: what bare names stand for. plan: where its terms are.
+        rows: what they stand for in each row.
     """
 
-    def __init__(self, text: str, functions: Mapping[str, Function], constants: Mapping[str, Any], plan: Plan) -> None:
-        self.text, self.functions, self.constants, self.plan = text, functions, constants, plan
+    def __init__(
+        self,
+        text: str,
+        functions: Mapping[str, Function],
+        constants: Mapping[str, Any],
+        plan: Plan,
+        rows: "Sequence[Binding]" = (),
+    ) -> None:
+        self.text, self.functions, self.constants, self.plan, self._rows = text, functions, constants, plan, rows
         self._terms: dict[int, tuple[Node, Term]] = {}  # by the identity of the node, which is kept for that
         self.known: dict[int, tuple[Node, bool]] = {}
         """Whether logic over time stands in a node, as far as it was asked, alike."""
@@ -53,6 +61,8 @@ class Binding:
 
     def found(self, reference: Reference) -> list[str]:
         """The full names a reference stands for, in the order of their indices; empty when there are none."""
+        if self._rows and reference.uses_index:
+            return [name for row in self._rows for name in row.found(reference)]
         return self.plan.names.find([(name, [self._index(x) for x in indices]) for name, indices in reference.parts])
 
     def _index(self, index: Node | Span) -> int | tuple[float, float]:
@@ -120,7 +130,7 @@ class Binding:
         if not names:
             raise self.error(unknown_signal(reference, self.plan.names))
         columns = [self._column(name) for name in names]
-        if not reference.stacked:
+        if not (reference.stacked or (self._rows and reference.uses_index)):
             return columns[0]
         return self.plan.term(("rows", *columns), lambda frame: _stacked([frame[x] for x in columns]), *columns)
 

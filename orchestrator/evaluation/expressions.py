@@ -3,10 +3,10 @@
 The syntax stands in `syntax`, what the parts mean in `functions` and `calculation`.
 """
 
-from collections.abc import Callable, Collection, Mapping
+from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property, lru_cache
-from typing import Any, TypeVar
+from typing import Any, TypeAlias, TypeVar
 
 import numpy as np
 
@@ -17,13 +17,15 @@ from .calculation import Binding, Scope, evaluate, names_of, reach
 from .formulas import read
 from .functions import CONSTANTS, ELEMENTWISE, Function, Value, call_problem
 from .signals import Rehearsal, Signals
-from .syntax import Call, Name, Node, Reference, walk
+from .syntax import Call, Name, Node, Reference, Temporal, walk
 from .terms import Plan, Prepared
 from .vocabulary import Names, numbers_of, unknown_signal
 
 _MAX_INDEX = 20_000
 """How far `i` is counted, beyond the number of names: a lone `x[999999999]` of somebody's FMU is not worth the time."""
 R = TypeVar("R")
+Index: TypeAlias = int | tuple[int, ...] | None
+"""A value of the free index, several that have a row each, or none."""
 
 
 def parse(text: str, functions: Mapping[str, Function] = ELEMENTWISE) -> "Expression":
@@ -62,6 +64,16 @@ class Expression:
     def reaches(self) -> int:
         """How many points ahead it looks at most."""
         return reach(self.tree)
+
+    @cached_property
+    def stands_in_rows(self) -> bool:
+        """Whether its values for several i can be rows of one: no part makes one number of rows, or has rows itself."""
+        return self.uses_index and not any(
+            isinstance(node, Temporal)
+            or (isinstance(node, Reference) and node.stacked)
+            or (isinstance(node, Call) and self.functions[node.name].reduces)
+            for node in walk(self.tree)
+        )
 
     def calls(self, name: str) -> bool:
         """Whether the function of this name is called somewhere."""
@@ -165,23 +177,24 @@ class Expression:
         alone = Expression(reference.text, reference)
         return bool(alone.indices(names)) if reference.uses_index else any(alone.resolve(names))
 
-    def _bound(self, plan: Plan, constants: Mapping[str, Any]) -> Binding:
+    def _bound(self, plan: Plan, constants: Mapping[str, Any], rows: Sequence[Binding] = ()) -> Binding:
         every = {**CONSTANTS, **constants}
         if "count" in self.text and "count" not in every:
             every["count"] = self.count(plan.names)
-        return Binding(self.text, self.functions, every, plan)
+        return Binding(self.text, self.functions, every, plan, rows)
 
-    def bound(self, plan: Plan, index: int | None = None) -> Binding:
+    def bound(self, plan: Plan, index: Index = None) -> Binding:
         """What it stands for among the names of a plan, which keeps it."""
         bindings, key = plan.bindings, (self.text, id(self.functions), index)
-        if key not in bindings:
+        if key not in bindings and isinstance(index, tuple):
+            rows = [self.bound(plan, one) for one in index]
+            bindings[key] = self._bound(plan, {"i": np.array(index)[:, np.newaxis]}, rows)
+        elif key not in bindings:
             bindings[key] = self._bound(plan, {} if index is None else {"i": index})
         binding: Binding = bindings[key]
         return binding
 
-    def apply(
-        self, rule: Callable[[Node, Scope], R], signals: Signals, index: int | None = None, **constants: Any
-    ) -> R:
+    def apply(self, rule: Callable[[Node, Scope], R], signals: Signals, index: Index = None, **constants: Any) -> R:
         """Evaluate under another rule than the usual one (a requirement asks for slack instead of truth)."""
         run = signals if isinstance(signals, Prepared) else Prepared(Plan(names_of(signals)), signals)
         constants = constants if index is None or not constants else {**constants, "i": index}

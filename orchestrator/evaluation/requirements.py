@@ -7,7 +7,7 @@ Numbers that differ by rounding are equal: their margin is 0. The grammar and it
 """
 
 import re
-from collections.abc import Collection, Iterator, Mapping
+from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Literal, NamedTuple
 
@@ -17,8 +17,9 @@ from ..errors import ExpressionError, WindowError
 from ..names import SignalName
 from ..problems import Problem, suggestion
 from ..times import digits, slack
+from . import signals as runs
 from .calculation import Scope, names_of, reach
-from .expressions import Expression, evaluate_constant, parse
+from .expressions import Expression, Index, evaluate_constant, parse
 from .formulas import says_when, tokens_of
 from .metrics import EVERY_STEP, FUNCTIONS
 from .reducers import Span, ends_of, scalar
@@ -31,12 +32,15 @@ from .temporal import (
     Formula,
     Points,
     Word,
+    common,
     horizon,
     rehearsed_interval,
     scales_of,
 )
 
 QUANTIFIERS: tuple[Word, ...] = ("always", "eventually", "finally")
+_MOST_VALUES = 1 << 15
+"""So many numbers are calculated at once for several indices."""
 CLAUSES = ("from", "until", "outside")
 _MISSING = "write always, eventually or finally, then a condition: always abs(train[i].acceleration) <= 1.0"
 
@@ -162,15 +166,17 @@ class Requirement:
         points = Points(signals, reach(self.condition.tree))
         span = Span(times.start, times.end, times.outside, forgiven=points.forgiven)
         try:
-            seen = {index: self._decision(points, span, index, scaled=scaled) for index in indices}
-            if not seen[indices[0]].points:
+            rows = self._together(indices, points.count)
+            seen = {each: self._decision(points, span, each, scaled=scaled) for each in rows}
+            if not next(iter(seen.values())).points:
                 return Verdict(self.name, self.text, "inconclusive", reason="no recorded point lies in its window")
-            index, worst = min(seen.items(), key=lambda found: found[1].badness)
+            which, worst = min(seen.items(), key=lambda found: found[1].badness)
             verdict, reason = self._verdict(worst, signals, times.end)
             robustness = _finite(worst.decisive.value) if scaled else self._scaled(points, span, seen)
         except WindowError as error:
             return Verdict(self.name, self.text, "inconclusive", reason=str(error))
         extreme, culprit = worst.decisive, worst.culprit()
+        index = which[extreme.row] if isinstance(which, tuple) else which
         names, row = self._blamed(culprit, worst.formula.scope, index)
         if index is None:
             index = self._row_number(worst.formula.scope, extreme.row, extreme.rows) or row
@@ -179,8 +185,16 @@ class Requirement:
             self.name, self.text, verdict, _finite(extreme.value), time, index, worst.points, reason, robustness, names
         )
 
-    def _decision(self, points: Points, span: Span, index: int | None, *, scaled: bool = False) -> Decision:
-        """What decides for one index; with `scaled`, every comparison is divided by the size of its unit."""
+    def _together(self, indices: Sequence[int | None], points: int) -> list[Index]:
+        """The indices, several at once where they can be rows of one calculation, as far as that fits into a cache."""
+        if self.quantifier not in ("always", "finally") or not self.condition.stands_in_rows:
+            return list(indices)
+        known = [index for index in indices if index is not None]
+        size = max(1, _MOST_VALUES // max(1, min(points, runs.BLOCK)))
+        return [tuple(known[k : k + size]) for k in range(0, len(known), size)]
+
+    def _decision(self, points: Points, span: Span, index: Index, *, scaled: bool = False) -> Decision:
+        """What decides for an index, or for several; `scaled`: every comparison is divided by the size of its unit."""
 
         def decide(node: Node, scope: Scope) -> Decision:
             formula = Formula(scope, points, scales_of(self.condition, scope, index) if scaled else None)
@@ -188,16 +202,16 @@ class Requirement:
 
         return self.condition.apply(decide, points.signals, index)
 
-    def _scaled(self, points: Points, span: Span, seen: Mapping[int | None, Decision]) -> float | None:
+    def _scaled(self, points: Points, span: Span, seen: Mapping[Index, Decision]) -> float | None:
         """The worst value where every comparison is divided by the size of its unit."""
         found = []
         for index, decision in seen.items():
             scales = scales_of(self.condition, decision.formula.scope, index)
-            value = decision.decisive.value
-            if len(set(scales.values())) > 1:
+            scale = common(scales)
+            if scale is None:
                 value = self._decision(points, span, index, scaled=True).decisive.value
             else:
-                value = value / next(iter(scales.values()), 1.0)
+                value = decision.decisive.value / scale
             found.append((not decision.is_missing, value))
         return _finite(min(found, key=lambda pair: (pair[0], 0.0 if not pair[0] else pair[1]))[1])
 

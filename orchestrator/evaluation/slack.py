@@ -15,6 +15,8 @@ from .syntax import Call, Name, Node, Number, Operation, Reference, Temporal
 
 Array = NDArray[np.float64]
 COMPARISONS = ("<", "<=", ">", ">=", "==", "!=")
+Scales = Mapping[int, float | Array]
+"""What the slack of each comparison is divided by, in all rows or in each (n, 1), by the identity of its node."""
 ROUNDING = 4 * float(np.finfo(np.float64).eps)
 """Numbers that differ by less than this share of what they are made of are equal: a start on a bound is on it."""
 _ZERO = float(np.finfo(np.float64).tiny)
@@ -26,7 +28,7 @@ def decoded(values: Array) -> Array:
     return np.where(np.abs(values) <= _ZERO, 0.0, values)
 
 
-def slack_of(node: Node, scope: Scope, scales: Mapping[int, float] | None = None) -> Array:
+def slack_of(node: Node, scope: Scope, scales: Scales | None = None) -> Array:
     """The slack of a condition: b - a for a < b, the least for `and`, the most for `or`, negated for `not`.
 
     It is positive where the condition holds and negative where it does not (missed by), never 0, as `decoded` has it;
@@ -36,7 +38,7 @@ def slack_of(node: Node, scope: Scope, scales: Mapping[int, float] | None = None
     Args:
         node: the condition.
         scope: what its names stand for.
-        scales: what the slack of a comparison is divided by, by the identity of its node.
+        scales: what the slack of a comparison is divided by; 1 by default.
     """
     match node:
         case Operation(operator="not", operands=(operand,)):
@@ -49,7 +51,7 @@ def slack_of(node: Node, scope: Scope, scales: Mapping[int, float] | None = None
             yes, no = slack_of(then, scope, scales), slack_of(otherwise, scope, scales)
             return np.where(np.isnan(choice), np.nan, np.where(choice, yes, no))
         case Operation(operator=operator, operands=(left, right)) if operator in COMPARISONS:
-            return _compared(operator, left, right, scope, 1.0 if scales is None else scales[id(node)])
+            return _compared(operator, left, right, scope, None if scales is None else scales[id(node)])
     value = _number(node, scope)
     return np.where(np.isnan(value), np.nan, np.where(value, np.inf, -np.inf))
 
@@ -75,7 +77,7 @@ def _size(node: Node, measure: Callable[[Node], Array]) -> Array:
     return np.asarray(reduce(np.maximum, parts))
 
 
-def _compared(operator: str, left: Node, right: Node, scope: Scope, scale: float) -> Array:
+def _compared(operator: str, left: Node, right: Node, scope: Scope, scale: float | Array | None) -> Array:
     a, b = _number(left, scope), _number(right, scope)
 
     def rounding(measure: Callable[[Node], Array]) -> Array:
@@ -90,7 +92,7 @@ def _compared(operator: str, left: Node, right: Node, scope: Scope, scale: float
         gap = np.where(equal, 0.0, gap)  # inf - inf would be NaN
     slack = np.abs(gap) if operator in ("==", "!=") else gap
     slack = slack if operator in ("<", "<=", "!=") else -slack
-    slack = slack if scale == 1.0 else slack / scale
+    slack = slack if scale is None else slack / scale
     if is_near:
         slack = np.where(slack == 0.0, _ZERO if operator in ("<=", ">=", "==") else -_ZERO, slack)
     return np.asarray(slack)

@@ -67,23 +67,29 @@ class Selection:
 
     Attributes:
         time: all points, shape (T,), in s. points: whether each counts. span: why.
-        kept: where those that count are, as a slice if they follow one another. between: the same of the intervals.
+        ends: the same of the ends of intervals, among which is the last point of the part before.
+        kept: where the points that count are, as a slice if they follow one another.
     """
 
     time: Array
     points: NDArray[np.bool_]
     span: Span
+    ends: NDArray[np.bool_]
     kept: slice | NDArray[np.intp]
-    between: slice | NDArray[np.intp]
 
     @classmethod
     def of(cls, part: Part, span: Span) -> "Selection":
         """That of a span in a part of a run."""
         time = part.time[: part.points - part.beyond]
-        points = span.points(time)
-        intervals = span.intervals(time, points)
+        ends = span.points(time)
+        points = ends.copy()
         points[: part.overlap] = False
-        return cls(time, points, span, _places(points), _places(intervals))
+        return cls(time, points, span, ends, _places(points))
+
+    @cached_property
+    def between(self) -> slice | NDArray[np.intp]:
+        """Where the intervals that count are."""
+        return _places(self.span.intervals(self.time, self.ends))
 
     @cached_property
     def times(self) -> Array:

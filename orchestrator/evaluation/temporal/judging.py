@@ -28,7 +28,7 @@ class Extreme:
 
 
 class Decision:
-    """What decides whether a condition holds, for one value of its index.
+    """What decides whether a condition holds, for one value of its index, or for several that are its rows.
 
     Attributes:
         formula: with its values. points: how many were judged.
@@ -70,8 +70,8 @@ class Decision:
         if len(places) < last - first:
             values = values.of(lambda x: x[..., places - first])
         new = _least(values.high, places)
-        if np.isnan(new.value):
-            self._missing = self._missing or new
+        if np.isnan(new.value) and (self._missing is None or new.row < self._missing.row):
+            self._missing = new
         high = _best(values.high, places) if self._word == "eventually" else new
         low = high
         if values.low is not values.high:

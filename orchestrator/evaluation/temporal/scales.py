@@ -1,11 +1,13 @@
 """What a margin is compared with, so that those of unlike signals compare: a size that counts in its unit."""
 
+import numpy as np
+from numpy.typing import NDArray
+
 from ..calculation import Scope
-from ..expressions import Expression
+from ..expressions import Expression, Index
 from ..metrics import unit_of
-from ..slack import COMPARISONS
+from ..slack import COMPARISONS, Scales
 from ..syntax import Node, Operation, walk
-from .values import Scales
 
 SCALES = {
     "m": 10.0, "km": 0.01, "m/s": 1.0, "km/h": 3.6, "m/s2": 0.1, "m/s3": 0.1, "N/kg": 0.1,
@@ -21,20 +23,31 @@ def comparisons(node: Node) -> list[Node]:
     return [part for part in walk(node) if isinstance(part, Operation) and part.operator in COMPARISONS]
 
 
-def scales_of(condition: Expression, scope: Scope, index: int | None) -> Scales:
-    """What the slack of each comparison of a condition is divided by, for one value of its index."""
+def scales_of(condition: Expression, scope: Scope, index: Index) -> Scales:
+    """What the slack of each comparison of a condition is divided by, for one value of its index or several."""
     units, kept, key = scope.signals.units, scope.binding.plan.bindings, ("scales", id(condition.tree), index)
     if key not in kept or kept[key][0] is not units:
-        kept[key] = (
-            units,
-            _scales_of(condition, scope, index),
-            condition.tree,
-        )  # which stays, so that no other tree has its identity
+        if isinstance(index, tuple):
+            rows = [_scales_of(condition, scope, one) for one in index]
+            found: Scales = {node: _together([row[node] for row in rows]) for node in rows[0]}
+        else:
+            found = _scales_of(condition, scope, index)
+        kept[key] = units, found, condition.tree  # which stays, so that no other tree has its identity
     scales: Scales = kept[key][1]
     return scales
 
 
-def _scales_of(condition: Expression, scope: Scope, index: int | None) -> Scales:
+def common(scales: Scales) -> float | None:
+    """What all comparisons are divided by, in all rows; None where they differ."""
+    same = {scale if isinstance(scale, float) else None for scale in scales.values()} or {1.0}
+    return same.pop() if len(same) == 1 else None
+
+
+def _together(scales: list[float]) -> float | NDArray[np.float64]:
+    return scales[0] if len(set(scales)) == 1 else np.array(scales)[:, np.newaxis]
+
+
+def _scales_of(condition: Expression, scope: Scope, index: int | None) -> dict[int, float]:
     """Anew."""
     found: dict[int, float] = {}
     for node in comparisons(condition.tree):

@@ -4,7 +4,7 @@ A formula may look beyond the end of the run. What is there is not known, so tha
 and the most that it can be, whatever comes. Mostly they are one.
 """
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -17,14 +17,12 @@ from .. import signals as runs
 from ..calculation import Scope, evaluate
 from ..reducers import scalar
 from ..signals import Part
-from ..slack import slack_of
+from ..slack import Scales, slack_of
 from ..syntax import CHANGES, Node, Operation, Reference, Temporal, walk
 from .extrema import clamped, least
 from .points import Places, Points, Windows
 
 Array = NDArray[np.float64]
-Scales = Mapping[int, float]
-"""What the slack of each comparison is divided by, by the identity of its node."""
 
 
 class Bounds(NamedTuple):

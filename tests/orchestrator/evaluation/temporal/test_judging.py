@@ -1,8 +1,10 @@
 """Verdicts of formulas: what decides them and where, whatever the blocks are in which a run is looked at."""
 
+import re
+
 import numpy as np
 import pytest
-from railcosim.orchestrator.evaluation import parse_requirement, robustness, signals
+from railcosim.orchestrator.evaluation import parse_requirement, requirements, robustness, signals
 
 
 def judge(text, run, **how):
@@ -134,3 +136,46 @@ def test_robustness_at_every_instant(cars):
     ):
         assert robustness(text, cars)[0] == judge(text, cars).robustness
     assert robustness("always car[i].v < 7", cars, index=2)[0] == 6.0
+
+
+def value(verdict):
+    """What decided, where a boolean did an infinite one."""
+    if verdict.margin is None:
+        return np.inf if verdict.verdict == "pass" else -np.inf
+    return verdict.margin
+
+
+@pytest.mark.parametrize("most", [1, 1 << 15], ids=["one by one", "in rows"])
+@pytest.mark.parametrize(
+    "condition",
+    [
+        "abs(car[i].v) <= 2 - 0.25 * i",
+        "car[i].low < car[1].v - car[i].v < 1.5",
+        "car[i].on or not car[i].v > 1.5",
+        "(car[i].v <= 1.75 if car[i].on else car[i].v >= car[1].v) and i != 7",
+        "at_sample(car[i].v) != 1.25",
+    ],
+)
+def test_what_is_judged_in_rows_is_judged_index_by_index(logic, monkeypatch, condition, most):
+    """The first index, and the first time of it, whose value is the least; a value that is no number before all."""
+    monkeypatch.setattr(requirements, "_MOST_VALUES", most)
+    source, clauses = np.random.default_rng(7), "from 2 until 7.5 outside [4, 5]"
+    units, time = {"car[1].v": "km/h", "car[2].v": "m/s", "car[3].v": "m/s"}, np.arange(17) * 0.5
+    for trial in range(6):
+        monkeypatch.setattr(signals, "BLOCK", [3, 8192][trial % 2])
+        columns = {f"car[{i}].v": source.integers(-8, 9, 17) / 4 for i in (1, 2, 3)}
+        columns |= {f"car[{i}].on": source.integers(0, 2, 17) for i in (1, 2, 3)}
+        for name in source.choice([*units], trial % 3, replace=False):
+            columns[name][source.integers(17)] = np.nan
+        run = logic.made(time, columns, units=units, parameters={f"car[{i}].low": -i / 2 for i in (1, 2, 3)})
+        for word in ("always", "finally"):
+            found = judge(f"{word} {condition} {clauses}", run)
+            texts = [re.sub(r"\bi\b", str(i), condition) for i in (1, 2, 3)]
+            alone = [judge(f"{word} {text} {clauses}", run) for text in texts]
+            worst = min(alone, key=lambda one: (not np.isnan(value(one)), value(one)))
+            for part in ("verdict", "margin", "time", "points", "reason", "blame"):
+                assert str(getattr(found, part)) == str(getattr(worst, part)), (word, part)
+            assert found.index == 1 + alone.index(worst)
+            known = [one.robustness for one in alone if one.robustness is not None]
+            least = np.nan if np.isnan(known).any() else min(known, default=None)
+            assert str(found.robustness) == str(None if value(worst) == -np.inf else least)
