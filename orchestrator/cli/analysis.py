@@ -8,6 +8,7 @@ from typing import Annotated, Any
 import typer
 
 from .. import world
+from . import completing
 from .documents import Answer
 from .options import (
     FAILED,
@@ -32,7 +33,12 @@ from .options import (
 )
 
 Scenarios = Annotated[
-    list[str], typer.Argument(metavar="SCENARIO...", help="Shipped scenarios (see 'orchestrate list'), or .toml files.")
+    list[str],
+    typer.Argument(
+        metavar="SCENARIO...",
+        help="Shipped scenarios (see 'orchestrate list'), or .toml files.",
+        autocompletion=completing.scenarios,
+    ),
 ]
 
 
@@ -40,11 +46,20 @@ def compare(
     scenarios: Scenarios,
     *,
     presets: Annotated[
-        list[str] | None, typer.Option("--preset", help="Add a variant: the scenario under this preset; repeatable.")
+        list[str] | None,
+        typer.Option(
+            "--preset",
+            help="Add a variant: the scenario under this preset; repeatable.",
+            autocompletion=completing.presets,
+        ),
     ] = None,
     swaps: Annotated[
         list[str] | None,
-        typer.Option("--swap", help="Add a variant with another model: cruise=OtherComponent; repeatable."),
+        typer.Option(
+            "--swap",
+            help="Add a variant with another model: cruise=OtherComponent; repeatable.",
+            autocompletion=completing.swaps,
+        ),
     ] = None,
     settings: Set = None,
     builds: With = None,
@@ -52,7 +67,11 @@ def compare(
     step: Step = None,
     directions: Annotated[
         list[str] | None,
-        typer.Option("--better", help="What is better, where the metric does not say: gap_at_end=larger; repeatable."),
+        typer.Option(
+            "--better",
+            help="What is better, where the metric does not say: gap_at_end=larger; repeatable.",
+            autocompletion=completing.metrics,
+        ),
     ] = None,
     kind: Kind = KindName.auto,
     output: Annotated[
@@ -125,11 +144,15 @@ def linearize(
     inputs: Annotated[
         list[str] | None,
         typer.Option(
-            help="Inputs of the model: train[1].disturbance,target.value; disturbances and sources by default."
+            help="Inputs of the model: train[1].disturbance,target.value; disturbances and sources by default.",
+            autocompletion=completing.varied,
         ),
     ] = None,
     outputs: Annotated[
-        list[str] | None, typer.Option(help="Outputs of the model: train[:].speed; all shown states by default.")
+        list[str] | None,
+        typer.Option(
+            help="Outputs of the model: train[:].speed; all shown states by default.", autocompletion=completing.signals
+        ),
     ] = None,
     sampled: Annotated[
         bool, typer.Option("--sampled", help="The model of one communication step, also of a continuous system.")

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import logging
+import os
 import sys
 from collections.abc import Sequence
 from typing import Annotated, Any
@@ -13,6 +14,7 @@ from ...components.errors import ComponentError
 from .. import world
 from ..errors import RailcosimError
 from . import analysis, models, reports, runs, scenarios, searches, studies
+from .completing import completing_bash
 from .documents import answering, fail, failed, wants_json
 from .lines import Log
 from .options import OK
@@ -21,7 +23,6 @@ from .supervision import supervised
 
 app = typer.Typer(
     no_args_is_help=True,
-    add_completion=False,
     context_settings={"help_option_names": ["-h", "--help"]},
     rich_markup_mode=None,
     pretty_exceptions_enable=False,
@@ -30,13 +31,17 @@ app = typer.Typer(
 _USAGE: Any = typer.BadParameter.__mro__[2]
 """`ClickException`: where it is imported from differs between versions of typer."""
 
+_ASKED = "_ORCHESTRATE_COMPLETE"
+"""The variable of the environment by which a shell asks what could be typed."""
+
 
 def main() -> None:
     """Entry point: every expected error becomes one message and an exit code."""
     secure_streams()
     logging.getLogger().addHandler(Log(logging.WARNING))
     # pythonfmu 0.7 frees its interpreter state twice when C++ is torn down, and some exits crash: leave before that.
-    world.exit_at_once(supervised(_command))
+    asked = _ASKED in os.environ  # by a shell, which is not to wait: no FMU is loaded
+    world.exit_at_once(_command() if asked else supervised(_command))
 
 
 def _command() -> int:
@@ -49,7 +54,8 @@ def call(arguments: Sequence[str] | None = None) -> int:
     """Run a command, with the arguments of the process by default, and return its exit code."""
     words = sys.argv[1:] if arguments is None else arguments
     try:
-        code = app(list(words), standalone_mode=False)
+        with completing_bash(_ASKED):
+            code = app(list(words), standalone_mode=False, complete_var=_ASKED)
     except _USAGE as error:
         if wants_json(words):
             return fail([error.format_message()], error.exit_code, words)
@@ -57,6 +63,8 @@ def call(arguments: Sequence[str] | None = None) -> int:
         return int(error.exit_code)
     except (RailcosimError, ComponentError, OSError) as error:
         return fail(failed(error), arguments=words)
+    except SystemExit as end:  # of a completion
+        code = end.code
     return code if isinstance(code, int) else OK
 
 

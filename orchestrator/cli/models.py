@@ -9,6 +9,7 @@ from typing import Annotated
 import typer
 
 from ..errors import ScenarioError
+from . import completing
 from .documents import Answer, written
 from .options import (
     FAILED,
@@ -34,7 +35,9 @@ def describe(
     name: Annotated[
         str,
         typer.Argument(
-            metavar="NAME", help="A component, my_file.py:Class, the path of any FMU, or a scenario as 'run' takes it."
+            metavar="NAME",
+            help="A component, my_file.py:Class, the path of any FMU, or a scenario as 'run' takes it.",
+            autocompletion=completing.things,
         ),
     ],
     builds: Annotated[list[str] | None, typer.Option("--with", help="Give a build argument: carriages=8.")] = None,
@@ -92,7 +95,10 @@ def describe(
 
 
 def build(
-    names: Annotated[list[str] | None, typer.Argument(help="Component names or my_file.py:Class.")] = None,
+    names: Annotated[
+        list[str] | None,
+        typer.Argument(help="Component names or my_file.py:Class.", autocompletion=completing.components),
+    ] = None,
     *,
     every: Annotated[bool, typer.Option("--all", help="Build the whole catalogue, with SHA256SUMS.")] = False,
     builds: Annotated[list[str] | None, typer.Option("--with", help="Give a build argument: carriages=8.")] = None,
@@ -102,7 +108,8 @@ def build(
     platforms: Annotated[
         str | None,
         typer.Option(
-            help="Of native FMUs: all, or some of linux64,win64,darwin64,aarch64-linux; this machine's by default."
+            help="Of native FMUs: all, or some of linux64,win64,darwin64,aarch64-linux; this machine's by default.",
+            autocompletion=completing.platforms,
         ),
     ] = None,
     output: Annotated[Path | None, typer.Option("--output", "-o", help="Directory for the FMUs.")] = None,
@@ -136,7 +143,10 @@ def pack(
     *,
     expose: Annotated[
         list[str] | None,
-        typer.Option(help="What to show: train[:].speed,gust.size; all outputs of the trains by default."),
+        typer.Option(
+            help="What to show: train[:].speed,gust.size; all outputs of the trains by default.",
+            autocompletion=completing.signals,
+        ),
     ] = None,
     preset: Preset = None,
     settings: Set = None,
@@ -146,7 +156,11 @@ def pack(
     step: Step = None,
     algorithm: Algorithm = None,
     platforms: Annotated[
-        str | None, typer.Option(help="all, or some of linux64,win64,darwin64; this machine's by default.")
+        str | None,
+        typer.Option(
+            help="all, or some of linux64,win64,darwin64; this machine's by default.",
+            autocompletion=completing.platforms,
+        ),
     ] = None,
     trust: Trust = False,
     quiet: Quiet = False,

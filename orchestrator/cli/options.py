@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from ..errors import ScenarioError
+from . import completing
 
 if TYPE_CHECKING:
     from ..system import System
@@ -38,22 +39,38 @@ class PackagingName(StrEnum):
 
 
 Scenario = Annotated[
-    str, typer.Argument(metavar="SCENARIO", help="A shipped scenario (see 'orchestrate list'), or a .toml file.")
+    str,
+    typer.Argument(
+        metavar="SCENARIO",
+        help="A shipped scenario (see 'orchestrate list'), or a .toml file.",
+        autocompletion=completing.scenarios,
+    ),
 ]
-Preset = Annotated[str | None, typer.Option(help="Apply a preset of the scenario.")]
+Preset = Annotated[str | None, typer.Option(help="Apply a preset of the scenario.", autocompletion=completing.presets)]
 Set = Annotated[
     list[str] | None,
-    typer.Option("--set", help="Set a parameter or start value: train[4].speed=10."),
+    typer.Option(
+        "--set", help="Set a parameter or start value: train[4].speed=10.", autocompletion=completing.assignments
+    ),
 ]
 With = Annotated[list[str] | None, typer.Option("--with", help="Give a build argument: train.carriages=8.")]
 Swap = Annotated[
     list[str] | None,
-    typer.Option("--swap", help="Put in another model: cruise=other.fmu, or OtherComponent, or my_file.py:Class."),
+    typer.Option(
+        "--swap",
+        help="Put in another model: cruise=other.fmu, or OtherComponent, or my_file.py:Class.",
+        autocompletion=completing.swaps,
+    ),
 ]
 Stop = Annotated[float | None, typer.Option(help="Stop time in s.")]
 Step = Annotated[float | None, typer.Option(help="Communication step in s; sample times equal to it follow.")]
 Algorithm = Annotated[
-    str | None, typer.Option(metavar="NAME", help="How the instances exchange values (see 'orchestrate list').")
+    str | None,
+    typer.Option(
+        metavar="NAME",
+        help="How the instances exchange values (see 'orchestrate list').",
+        autocompletion=completing.algorithms,
+    ),
 ]
 Kind = Annotated[
     KindName,
@@ -66,6 +83,7 @@ Isolate = Annotated[
     typer.Option(
         "--isolate",
         metavar="NAME",
+        autocompletion=completing.instances,
         help="Run an instance, a group such as 'train', or 'all' in processes of their own: a crash there ends no more "
         "than the run.",
     ),

@@ -9,6 +9,7 @@ import typer
 
 from .. import world
 from ..errors import ScenarioError
+from . import completing
 from .documents import Answer, written
 from .options import (
     FAILED,
@@ -40,7 +41,11 @@ if TYPE_CHECKING:
 def run(
     scenario: Annotated[
         str | None,
-        typer.Argument(metavar="SCENARIO", help="A shipped scenario (see 'orchestrate list'), or a .toml file."),
+        typer.Argument(
+            metavar="SCENARIO",
+            help="A shipped scenario (see 'orchestrate list'), or a .toml file.",
+            autocompletion=completing.scenarios,
+        ),
     ] = None,
     *,
     preset: Preset = None,
@@ -179,7 +184,11 @@ def _exit_code(outcome: Run, second: Run | None, verdict: StepCheck | None) -> i
 
 def reproduce(
     paper: Annotated[
-        str | None, typer.Argument(help="A scenario's name or a word of its source, such as Wang; all by default.")
+        str | None,
+        typer.Argument(
+            help="A scenario's name or a word of its source, such as Wang; all by default.",
+            autocompletion=completing.scenarios,
+        ),
     ] = None,
     kind: Kind = KindName.auto,
     quiet: Quiet = False,
@@ -218,7 +227,10 @@ def plot(
     results: Annotated[Path, typer.Argument(help="The directory of a run.")],
     signals: Annotated[
         list[str] | None,
-        typer.Argument(help="Expressions such as 'train[:].speed'; without, the run's figures."),
+        typer.Argument(
+            help="Expressions such as 'train[:].speed'; without, the run's figures.",
+            autocompletion=completing.run_signals,
+        ),
     ] = None,
     *,
     output: Annotated[Path | None, typer.Option("--output", "-o", help="Where to draw; RESULTS by default.")] = None,

@@ -13,6 +13,7 @@ import typer
 from ..errors import ScenarioError
 from ..problems import Problem
 from ..system import System
+from . import completing
 from .documents import Answer
 from .options import (
     FAILED,
@@ -49,7 +50,8 @@ Vary = Annotated[
     list[str] | None,
     typer.Option(
         help="What is varied: gust.size=0:2, a distribution, a list, or a signal over time such as "
-        "target.value=signal(60, 85, 10, linear, rate=0.5); repeatable."
+        "target.value=signal(60, 85, 10, linear, rate=0.5); repeatable.",
+        autocompletion=completing.varied,
     ),
 ]
 Budget = Annotated[int, typer.Option(min=1, help="How many runs may be spent.")]
@@ -63,7 +65,11 @@ def falsify(
     *,
     vary: Vary = None,
     requirement: Annotated[
-        str | None, typer.Option(help="The requirement to be broken; the scenario's own where it has one alone.")
+        str | None,
+        typer.Option(
+            help="The requirement to be broken; the scenario's own where it has one alone.",
+            autocompletion=completing.requirements,
+        ),
     ] = None,
     budget: Budget = 500,
     method: Annotated[
@@ -131,11 +137,16 @@ def optimize(
     objectives: Annotated[
         list[str] | None,
         typer.Option(
-            "--minimize", help="What is to be least: a metric, or an expression; several give a Pareto front."
+            "--minimize",
+            help="What is to be least: a metric, or an expression; several give a Pareto front.",
+            autocompletion=completing.metrics,
         ),
     ] = None,
     requirements: Annotated[
-        list[str] | None, typer.Option("--subject-to", help="A requirement that has to hold; repeatable.")
+        list[str] | None,
+        typer.Option(
+            "--subject-to", help="A requirement that has to hold; repeatable.", autocompletion=completing.requirements
+        ),
     ] = None,
     budget: Budget = 500,
     seed: Seed = 0,

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from ..names import SignalName
+from . import completing
 from .documents import Answer
 from .options import (
     FAILED,
@@ -45,6 +46,7 @@ def study(
         typer.Option(
             "--vary",
             metavar="NAME=VALUES",
+            autocompletion=completing.varied,
             help="What is varied, repeatable: cruise.alpha=0.005:0.05:10 (a grid), 0.005:0.05, 1,2,3, "
             "'normal(400e3,20e3)'; the scenario's [study] by default.",
         ),
@@ -52,7 +54,10 @@ def study(
     runs: Annotated[int | None, typer.Option(help="How many runs; a grid has as many as it has points.")] = None,
     seed: Annotated[int | None, typer.Option(help="Seed of what is drawn, and of each run's noise.")] = None,
     design: Annotated[
-        str | None, typer.Option(metavar="NAME", help="grid, random, latin-hypercube, sobol or saltelli.")
+        str | None,
+        typer.Option(
+            metavar="NAME", help="grid, random, latin-hypercube, sobol or saltelli.", autocompletion=completing.designs
+        ),
     ] = None,
     preset: Preset = None,
     settings: Set = None,
@@ -65,7 +70,12 @@ def study(
     isolated: Isolate = None,
     record: Annotated[
         list[str] | None,
-        typer.Option("--record", metavar="SIGNAL", help="Keep a signal over time: 'train[1].speed'; repeatable."),
+        typer.Option(
+            "--record",
+            metavar="SIGNAL",
+            help="Keep a signal over time: 'train[1].speed'; repeatable.",
+            autocompletion=completing.signals,
+        ),
     ] = None,
     workers: Workers = None,
     scheduler: Scheduler = None,
@@ -140,7 +150,11 @@ def replay(
     directory: Annotated[Path, typer.Argument(metavar="DIR", help="The directory of a study.")],
     scenario: Annotated[
         str | None,
-        typer.Argument(metavar="SCENARIO", help="The scenario of the study, where it names Python code of your own."),
+        typer.Argument(
+            metavar="SCENARIO",
+            help="The scenario of the study, where it names Python code of your own.",
+            autocompletion=completing.scenarios,
+        ),
     ] = None,
     *,
     number: Annotated[int, typer.Option("--run", metavar="N", help="Which run, by the column 'run'.")],

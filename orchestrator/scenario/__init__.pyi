@@ -1,7 +1,7 @@
 from .changes import split_assignment
 from .loading import dump, load
 from .patterns import NAME
-from .shipped import Listed, listed, shipped
+from .shipped import Listed, listed, presets_of, raw, shipped
 from .toml_source import parse_value
 from .trust import import_notes, untrusted_code
 from .values import SEED, assignment, changed, is_structural
@@ -18,6 +18,8 @@ __all__ = [
     "listed",
     "load",
     "parse_value",
+    "presets_of",
+    "raw",
     "shipped",
     "split_assignment",
     "untrusted_code",

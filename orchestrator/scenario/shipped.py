@@ -29,7 +29,7 @@ def listed() -> list[Listed]:
     """Every scenario that comes with the package, by name."""
     read = {path.stem: _read(path) for path in sorted(world.glob(MODELS, "*.toml"))}
     found = [(name, data) for name, data in read.items() if data is not None]
-    return [Listed(name, str(data.get("title", "")), _presets(data)) for name, data in found]
+    return [Listed(name, str(data.get("title", "")), presets_of(data)) for name, data in found]
 
 
 def shipped() -> list[tuple[str, str]]:
@@ -41,6 +41,13 @@ def shipped_file(name: str) -> Path | None:
     """The file of a shipped scenario; None where there is no such scenario."""
     path = MODELS / f"{name}.toml"
     return None if _read(path) is None else path
+
+
+def raw(name: str) -> tuple[Path, dict[str, Any]] | None:
+    """The file of a scenario as it is named on a command line, and what it holds; None where it cannot be read."""
+    path = Path(name) if name.endswith(".toml") else MODELS / f"{name}.toml"
+    data = _read(path)
+    return None if data is None else (path, data)
 
 
 def is_shipped(path: Path) -> bool:
@@ -56,6 +63,7 @@ def _read(path: Path) -> dict[str, Any] | None:
     return data if "instances" in data else None
 
 
-def _presets(data: dict[str, Any]) -> dict[str, str]:
+def presets_of(data: dict[str, Any]) -> dict[str, str]:
+    """The presets of a scenario as it is written, with what they say of themselves, the default one first."""
     default = {str(name): "as it stands"} if (name := data.get("default_preset")) else {}
     return default | {name: str(table.get("description", "")) for name, table in data.get("presets", {}).items()}
