@@ -58,10 +58,7 @@ def _home(name: str) -> tuple[Path, str]:
 
 def _of_class(path: Path, name: str) -> dict[str, str]:
     """What a class in a file declares with its bases, and what the runtime adds to that."""
-    try:
-        found = _declared(path, name)
-    except RecursionError:  # classes that are each other's bases
-        return {}
+    found = _declared(path, name)
     kinds = set(found.values())
     found |= {each: "Parameter" if kinds & {*of.split()} else "" for each, of in _RUNTIME.items()}
     return {each: _SORTS[kind] for each, kind in found.items() if kind in _SORTS}
@@ -71,7 +68,7 @@ def _declared(path: Path, name: str) -> dict[str, str]:
     """The kind of each declaration of a class, its bases' first."""
     try:
         body = ast.parse(world.read_text(path, encoding="utf-8")).body
-    except (OSError, ValueError, SyntaxError, RecursionError):
+    except (OSError, ValueError, SyntaxError, RecursionError):  # the latter: classes that are each other's bases
         return {}
     elsewhere = {
         alias.asname or alias.name: (_module(path, "." * node.level + (node.module or "")), alias.name)

@@ -131,11 +131,7 @@ def _component_names() -> list[str]:
 def _files(incomplete: str, *endings: str) -> Iterator[str]:
     """Files below what is typed, with folders to go on with."""
     folder = Path(incomplete).parent if not incomplete.endswith("/") else Path(incomplete)
-    try:
-        found = sorted(world.glob(folder, "*"))
-    except OSError:
-        return
-    for path in found:
+    for path in sorted(world.glob(folder, "*")):
         if path.suffix in endings:
             yield str(path)
         elif path.is_dir() and not path.name.startswith("."):

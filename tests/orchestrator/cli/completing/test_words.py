@@ -10,7 +10,7 @@ import pytest
 from railcosim.components import CATALOGUE
 from railcosim.fmus.build import package
 from railcosim.orchestrator.cli.app import call
-from railcosim.orchestrator.cli.completing import algorithms, components, designs
+from railcosim.orchestrator.cli.completing import algorithms, components, designs, metrics
 from railcosim.orchestrator.cli.completing.models import variables_of
 from railcosim.orchestrator.master import ALGORITHMS
 from railcosim.orchestrator.study.design.sampling import DESIGNS
@@ -120,6 +120,11 @@ def test_scenarios_presets_components_and_what_else_has_a_name(offered, folder):
     assert offered("orchestrate run own.toml --quie") == ["--quiet"]
     assert offered("orchestrate run 'own.toml --preset ") == []
     assert offered("orchestrate run nothing.toml --preset ") == []
+
+
+def test_an_open_quote_hides_no_scenario(folder, monkeypatch):
+    monkeypatch.setenv("_TYPER_COMPLETE_ARGS", "orchestrate optimize own.toml --minimize 'gap")
+    assert metrics() == ["gap_min"]
 
 
 def test_names_of_a_scenario(offered, folder):

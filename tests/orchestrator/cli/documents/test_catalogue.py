@@ -14,7 +14,10 @@ from railcosim.orchestrator import load, run
 from railcosim.orchestrator.cli import documents
 from railcosim.orchestrator.cli.app import call
 from railcosim.orchestrator.cli.documents import Document, text_of
-from railcosim.orchestrator.fmi import Workspace, load_fmu
+from railcosim.orchestrator.fmi import Variable, Workspace, load_fmu
+from railcosim.orchestrator.fmi.interface import Sort
+from railcosim.orchestrator.packing import Packed
+from railcosim.orchestrator.packing.exposure import Exposed
 from railcosim.orchestrator.study.search import Optimized
 from railcosim.orchestrator.study.search.evaluations import Evaluation
 from railcosim.orchestrator.study.search.optimization import Optimization
@@ -156,6 +159,14 @@ def test_the_best(tmp_path):
     document = Document("optimize", 0, None, documents.optimize_document(result))
     validator().validate(json.loads(text_of(document)))
     assert document.result.best[0].values == [0.25]
+
+
+def test_one_fmu_of_a_scenario():
+    speed = Variable("speed", 1, Sort("Real", "output", "continuous", None))
+    packed = Packed(Path("a.fmu"), (Exposed("train[1]", speed, "output"),), ("linux64",), ("a note",))
+    document = Document("pack", 0, None, documents.pack_document(packed, 10))
+    validator().validate(json.loads(text_of(document)))
+    assert document.result.instances == 10
 
 
 def test_what_is_not_as_declared_is_refused(scenario):
