@@ -28,6 +28,9 @@ from .environment.sensor import Sensor
 from .environment.sinusoid import Sinusoid
 from .errors import ComponentError
 from .simulate import Simulation, simulate
+from .supervision.etcs import EtcsSupervision
+from .supervision.etcs_driver import EtcsDriver
+from .supervision.moving_block import MovingBlock
 from .supervision.protection import Protection
 from .supervision.timetable import Timetable
 from .supervision.trip_monitor import TripMonitor
@@ -54,6 +57,8 @@ __all__ = [
     "CruiseController",
     "Data",
     "DavisResistance",
+    "EtcsDriver",
+    "EtcsSupervision",
     "FaultTolerantCruise",
     "FaultTolerantCruiseIntermediate",
     "FixedDistanceCruise",
@@ -66,6 +71,7 @@ __all__ = [
     "LearningEnergy",
     "Line",
     "Memory",
+    "MovingBlock",
     "Noise",
     "Output",
     "Parameter",

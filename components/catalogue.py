@@ -25,6 +25,9 @@ from .environment.reference_profile import ReferenceProfile
 from .environment.schedule import Schedule
 from .environment.sensor import Sensor
 from .environment.sinusoid import Sinusoid
+from .supervision.etcs import EtcsSupervision
+from .supervision.etcs_driver import EtcsDriver
+from .supervision.moving_block import MovingBlock
 from .supervision.protection import Protection
 from .supervision.timetable import Timetable
 from .supervision.trip_monitor import TripMonitor
@@ -66,6 +69,9 @@ CATALOGUE: dict[str, type[Component]] = {
         LearningEnergy,
         Timetable,
         Protection,
+        EtcsSupervision,
+        EtcsDriver,
+        MovingBlock,
         TripMonitor,
         Sensor,
     )
