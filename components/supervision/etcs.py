@@ -239,8 +239,8 @@ class EtcsSupervision(Component):
         """All targets together, the most relevant one, and the monitoring that follows."""
         limit, speed = self._limit(), self._speed()
         service = limit + service_margin(limit)
-        too_fast = [speed > limit, speed > limit + warning_margin(limit), speed > service]
-        seen = _Watch(False, *too_fast, speed > limit + emergency_margin(limit), limit, service)
+        warned, stopped = speed > limit + warning_margin(limit), speed > limit + emergency_margin(limit)
+        seen = _Watch(False, speed > limit, warned, speed > service, stopped, limit, service)
         relevant = _Relevant(self.relevant_speed, self.relevant_location, _FAR)
         lowest, present = relevant, False
         reaction = self._reaction(speed, self.acceleration, stops=False)

@@ -71,7 +71,8 @@ def supervised(line: Track, train: RollingStock) -> Supervised:
     share = train.rotating_mass
     uphill, downhill = (1.0 + (share or fallback) for fallback in (_ROTATING_MAX, _ROTATING_MIN))
     gradients = gradient_accelerations(line.positions, line.gradients, train.length, uphill, downhill)
-    adhesion = (line.national or {}).get("M_NVAVADH", 0.0)
+    national = line.national or {}
+    adhesion = national.get("M_NVAVADH", 0.0)
     emergency = braking(brakes.safe(adhesion), *gradients)
     told = lower_envelope(*gradients, _GRADIENTS)
     targets, steps = [], [(location, min(limit, train.max_speed)) for location, limit in line.limits.steps]
@@ -80,7 +81,7 @@ def supervised(line: Track, train: RollingStock) -> Supervised:
             curve = emergency.curve(location, speed + emergency_margin(speed), speed)
             targets.append(Target(location, speed, fixed(curve, gradients[0], train.max_speed + _ABOVE)))
     moving = braking(brakes.safe(adhesion), *told), braking(brakes.service, *told)
-    return Supervised(*moving, tuple(targets), *brakes.times(train.length, train.max_speed))
+    return Supervised(*moving, tuple(targets), *brakes.times(train.length, train.max_speed, national.get("Kt_int")))
 
 
 def at_speed(steps: Steps, speed: Any) -> Any:

@@ -62,12 +62,15 @@ class EtcsBrakes:
         safe = product(self.dry, ((0.0, wet),), self.emergency)
         return tuple((begin, min(a, self.slippery)) for begin, a in safe) if self.slippery else safe
 
-    def times(self, length: float, max_speed: float) -> tuple[tuple[float, float], tuple[float, float]]:
+    def times(
+        self, length: float, max_speed: float, kt: float | None = None
+    ) -> tuple[tuple[float, float], tuple[float, float]]:
         """T_be and T_bs in s, each for a target speed of zero and for others: 3.13.6.2.2.3 and 3.13.6.3.2.4.
 
         Args:
             length: of the train, m.
             max_speed: m/s.
+            kt: Kt_int where the line tells it, instead of the train's data.
 
         Raises:
             ValueError: the conversion model does not hold for this train.
@@ -82,7 +85,8 @@ class EtcsBrakes:
                 f" {length:g} m"
             )
         emergency, service, kto = build_up_times(length, self.freight, self.g)
-        return (self.kt * emergency, self.kt * kto * emergency), (service, kto * service)
+        kt = self.kt if kt is None else kt
+        return (kt * emergency, kt * kto * emergency), (service, kto * service)
 
 
 def basic_deceleration(percentage: float) -> Steps:
@@ -154,7 +158,8 @@ def _brakes(*values: Any) -> EtcsBrakes:
     percentage = given["brake_percentage"]
     if bool(percentage) != (emergency is None) or (emergency is None) != (service is None):
         raise ValueError("give 'A_brake_emergency' and 'A_brake_service', or 'brake_percentage' alone")
-    dry, wet = ((0.0, given["K_dry_rst"]),), given["K_wet_rst"]
+    dry: Steps = ((0.0, given["K_dry_rst"]),)
+    wet = given["K_wet_rst"]
     if percentage:
         emergency, service = (basic_deceleration(x) for x in (percentage, min(percentage, _SERVICE_MOST)))
         dry, wet = product(given["Kv_int"], ((0.0, given["Kr_int"]),)), 1.0
@@ -210,4 +215,6 @@ FLIRT = {
         "T_bs": 3.0,
     },
 }
-"""Stadler FLIRT of the Transports publics fribourgeois: Kouzoupis et al. 2023, TTOBench v1.5 (BSD-2)."""
+"""Stadler FLIRT of the Transports publics fribourgeois: Kouzoupis et al. 2023, TTOBench v1.5 (BSD-2).
+
+The file of the project's own, `rolling_stock/flirt.json`, has its speed uncertainty, too."""

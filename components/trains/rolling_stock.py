@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 from ..environment.track import ABOUT
 from ..tables import FASTEST, Column, Table
+from .etcs_brakes import BRAKES, EtcsBrakes
 
 _MOST = 1e7
 """N: more than any train pulls or brakes with."""
@@ -63,30 +64,6 @@ TUNNELS = Table(
     by_place=True,
     may_be_empty=True,
 )
-DECELERATIONS = Table(
-    "deceleration",
-    [
-        Column("speed", "m/s", after="speed", within=(0.0, FASTEST)),
-        Column("deceleration", "m/s2", sign="positive", within=(0.0, _HARDEST)),
-    ],
-    by_place=True,
-)
-_ETCS = (
-    Column("A_brake_emergency", type=DECELERATIONS, note="from each speed on"),
-    Column("A_brake_service", type=DECELERATIONS, note="from each speed on"),
-    Column("K_dry_rst", within=(0.0, 1.0)),
-    Column("K_wet_rst", within=(0.0, 1.0)),
-    Column("T_traction_cut_off", "s", within=(0.0, 30.0)),
-    Column("T_be", "s", within=(0.0, 60.0)),
-    Column("T_bs", "s", within=(0.0, 60.0)),
-    Column("speed_uncertainty", within=(0.0, 0.3), note="share of the speed"),
-)
-ETCS = Table(
-    "ETCS braking data",
-    _ETCS,
-    make=lambda *values: dict(zip((column.name for column in _ETCS), values, strict=True)),
-    single=True,
-)
 
 
 @dataclass(frozen=True, eq=False)
@@ -99,7 +76,7 @@ class RollingStock:
         resistance: running resistance in the open. tunnels: its further c by cross-section of a tunnel, rising.
         traction, regeneration: electric drive and brake. friction_brake: its largest force in N.
         max_acceleration, max_deceleration: for comfort, in m/s2; 0 where none is set.
-        etcs: braking data by the names of SUBSET-026, if they are known.
+        etcs: its brakes for ETCS, if they are known.
     """
 
     mass: float
@@ -113,7 +90,7 @@ class RollingStock:
     friction_brake: float = _MOST
     max_acceleration: float = 0.0
     max_deceleration: float = 0.0
-    etcs: Mapping[str, Any] | None = None
+    etcs: EtcsBrakes | None = None
 
     def tunnel_drag(self, area: float) -> float:
         """Further c in N.s2/m2 in a tunnel of a cross-section in m2: linear between those known, 0 without any."""
@@ -146,7 +123,7 @@ TRAIN = Table(
         Column("friction_brake", "N", default=_MOST, within=(0.0, _MOST)),
         Column("max_acceleration", "m/s2", default=0.0, within=(0.0, _HARDEST)),
         Column("max_deceleration", "m/s2", default=0.0, within=(0.0, _HARDEST)),
-        Column("etcs", type=ETCS, default=None),
+        Column("etcs", type=BRAKES, default=None),
         *ABOUT,
     ],
     make=lambda *values: RollingStock(*values[: -len(ABOUT)]),

@@ -56,6 +56,7 @@ def test_times_of_the_conversion_model():
     brakes = BRAKES.record({"brake_percentage": 80.0, "brake_position": "freight G"})
     (stop, other), (service_stop, service_other) = brakes.times(500.0, 27.0)
     assert (stop, other) == pytest.approx((1.1 * 13.25, 1.1 * 1.16 * 13.25))
+    assert brakes.times(500.0, 27.0, 1.0)[0] == pytest.approx((13.25, 1.16 * 13.25))
     assert (service_stop, service_other) == pytest.approx((16.85, 1.16 * 16.85))
 
 

@@ -17,7 +17,7 @@ def test_a_shipped_train_by_hand():
     train = TRAIN.record(FLIRT)
     assert train.resistance == pytest.approx((2378.88, 16.98165 * 3.6, 0.46632 * 3.6**2), rel=1e-11)
     assert train.traction == (200e3, 2600e3, 0.9)
-    assert train.etcs["A_brake_emergency"][1] == (20.0, 0.85)
+    assert train.etcs.emergency[1] == (20.0, 0.85)
     assert (train.mass, train.rotating_mass, train.max_speed) == pytest.approx((122e3, 0.1, 160 / 3.6), rel=1e-11)
 
 

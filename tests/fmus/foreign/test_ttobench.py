@@ -90,8 +90,8 @@ def test_a_train_comes_in_si_units(read):
     assert (train.traction, train.regeneration) == ((200e3, 2e6, 0.9), (150e3, 1.5e6, 1.0))
     assert [value for row in train.tunnels for value in row] == pytest.approx([24.0, 12.96, 40.0, 6.48])
     assert train.friction_brake == 0.0
-    assert train.etcs["A_brake_service"] == ((0.0, 0.9), (20.0, 0.8))
-    assert train.etcs["speed_uncertainty"] == pytest.approx(0.0298)
+    assert train.etcs.service == ((0.0, 0.9), (20.0, 0.8))
+    assert train.etcs.speed_uncertainty == pytest.approx(0.0298)
 
 
 def test_what_is_optional_may_be_missing(read):
