@@ -36,6 +36,8 @@ from .supervision.timetable import Timetable
 from .supervision.trip_monitor import TripMonitor
 from .trains.consist import Carriages, Consist
 from .trains.coupled_subway import CoupledSubwayTrain
+from .trains.drive import Drive
+from .trains.line_train import LineTrain
 from .trains.point_mass import PointMassTrain
 from .trains.port import DavisResistance, Train
 from .trains.subway import SubwayTrain
@@ -57,6 +59,7 @@ __all__ = [
     "CruiseController",
     "Data",
     "DavisResistance",
+    "Drive",
     "EtcsDriver",
     "EtcsSupervision",
     "FaultTolerantCruise",
@@ -70,6 +73,7 @@ __all__ = [
     "IntermediateEstimator",
     "LearningEnergy",
     "Line",
+    "LineTrain",
     "Memory",
     "MovingBlock",
     "Noise",

@@ -33,6 +33,8 @@ from .supervision.timetable import Timetable
 from .supervision.trip_monitor import TripMonitor
 from .trains.consist import Consist
 from .trains.coupled_subway import CoupledSubwayTrain
+from .trains.drive import Drive
+from .trains.line_train import LineTrain
 from .trains.point_mass import PointMassTrain
 from .trains.subway import SubwayTrain
 
@@ -74,5 +76,7 @@ CATALOGUE: dict[str, type[Component]] = {
         MovingBlock,
         TripMonitor,
         Sensor,
+        LineTrain,
+        Drive,
     )
 }
