@@ -6,7 +6,7 @@ reads that, and `replay` runs a row of it again.
 """
 
 from .columns import Entry
-from .dataset import Dataset, parts_of
+from .dataset import Dataset, parts_of, rewrite
 from .flight import Point
 from .parcel import Parcel, digest_of, named_in, packed
 from .pool import Pool, pool_for
@@ -29,5 +29,6 @@ __all__ = [
     "parts_of",
     "pool_for",
     "replay",
+    "rewrite",
     "run_study",
 ]

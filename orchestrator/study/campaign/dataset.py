@@ -185,6 +185,18 @@ def write_whole(new: Path, target: Path, write: Callable[[Any], None]) -> None:
             raise
 
 
+def rewrite(path: Path, content: bytes) -> None:
+    """Write a file that is, whatever happens, as it was or whole.
+
+    Raises:
+        RecordError: no room, or the like.
+    """
+    new = path.with_name(f"{path.name}.part")
+    write_whole(new, path, lambda stream: stream.write(content))
+    with told_of_disk(path):
+        world.replace(new, path)
+
+
 @contextmanager
 def told_of_disk(path: Path) -> Iterator[None]:
     """Let an error of the system's be told with the remedy."""

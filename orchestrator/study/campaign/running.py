@@ -15,7 +15,6 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ... import world
 from ...errors import RailcosimError, ScenarioError
 from ...fmi import Workspace
 from ...run import Interruption, RunDirectory, check
@@ -24,7 +23,7 @@ from ...system import System
 from ..design import Plan
 from ..structure import Runner
 from .columns import Entry
-from .dataset import Dataset, write_whole
+from .dataset import Dataset, rewrite
 from .flight import Point
 from .parcel import Parcel, packed
 from .pool import Pool, pool_for
@@ -224,10 +223,8 @@ def _opened(place: RunDirectory, dataset: Dataset, told: dict[str, Any], resume:
 
 
 def _note(directory: Path, told: Mapping[str, Any]) -> None:
-    text = json.dumps(told, indent=2, default=str).encode(errors="backslashreplace")
-    new = directory / f"{STUDY_FILE}.part"
-    write_whole(new, directory / STUDY_FILE, lambda stream: stream.write(text))
-    world.replace(new, directory / STUDY_FILE)
+    text = json.dumps(told, indent=2, default=str)
+    rewrite(directory / STUDY_FILE, text.encode(errors="backslashreplace"))
 
 
 def _run(

@@ -7,7 +7,6 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-from ... import world
 from ...comparison import draw_compared
 from ...errors import ExpressionError, RailcosimError
 from ...evaluation import FUNCTIONS, Signals, Verdict, parse
@@ -15,6 +14,7 @@ from ...fmi import Kind
 from ...run import Run, execute
 from ...scenario import assignment, dump, load
 from ...system import System
+from ..campaign import rewrite
 from .keeping import copy, kept
 from .space import Changes, Space
 
@@ -61,7 +61,7 @@ def write_scenario(path: Path, system: System, comments: Sequence[str]) -> None:
     """Write a scenario below comments, and what it names beside it."""
     system, copies = kept(system, path.parent)
     copy(copies, path.parent)
-    world.write_text(path, scenario_text(system, comments), encoding="utf-8")
+    rewrite(path, scenario_text(system, comments).encode())
 
 
 def write_counterexample(

@@ -114,6 +114,14 @@ class Evaluations:
             known = self._done.setdefault(text, self._known[text])
             yield known
 
+    def flush(self) -> None:
+        """Write down those that were run, before what can fail.
+
+        Raises:
+            RecordError: there is no room.
+        """
+        self._dataset.flush()
+
     def _keep(self, point: Point, row: Row) -> None:
         number, changes = point
         self._known[_text(changes)] = Evaluation(

@@ -20,7 +20,7 @@ from ...problems import Problem, suggestion
 from ...run import Interruption, RunDirectory, check, execute
 from ...scenario import is_structural
 from ...system import System
-from ..campaign import Dataset, Parcel, Point, Pool, digest_of, named_in, need_packages, packed, pool_for
+from ..campaign import Dataset, Parcel, Point, Pool, digest_of, named_in, need_packages, packed, pool_for, rewrite
 from ..design import Dimension
 from ..rows import Row
 from ..structure import Runner
@@ -204,8 +204,8 @@ def _begin(place: RunDirectory, system: System, told: Mapping[str, Any], resume:
         if resume:
             raise ScenarioError(f"{place.given} holds no search to go on with; leave --resume out to begin one")
         copy(copies, place.path)
-        world.write_text(nominal, text, encoding="utf-8")
-        world.write_text(record, json.dumps(told), encoding="utf-8")
+        rewrite(record, json.dumps(told).encode())
+        rewrite(nominal, text.encode())  # with which there is a search
         return
     if not resume:
         raise ScenarioError(

@@ -9,11 +9,10 @@ from functools import partial
 from pathlib import Path
 from typing import Any
 
-from ... import world
 from ...evaluation import Verdict
 from ...fmi import Kind
 from ...system import System
-from ..campaign import Pool
+from ..campaign import Pool, rewrite
 from .counterexample import as_json, changed_scenario, describe, write_counterexample, write_scenario
 from .falsification import Falsification, search
 from .figures import draw_optimization
@@ -114,6 +113,7 @@ def falsify(
             slope=partial(ready.slopes.at, requirement),
             told=lambda done, of, least: progress(done, of, f"least margin {least:.4g}"),
         )
+        ready.evaluations.flush()
         result = Falsified(found, Path(output))
         if found.found:
             scenario, verdict, drawn = write_counterexample(
@@ -180,6 +180,7 @@ def optimize(
             seed=seed,
             told=lambda done, of: progress(done, of, ""),
         )
+        ready.evaluations.flush()
         paths = _write_best(ready, found)
         drawn = (draw_optimization(found, ready.directory, system.provenance.name),) if figures else ()
         changes = tuple(tuple(describe(ready.space, best.changes)) for best in found.best)
@@ -238,4 +239,4 @@ def _of_optimization(result: Optimized) -> dict[str, Any]:
 
 def _note(ready: Prepared, told: Mapping[str, Any]) -> None:
     text = json.dumps(told, indent=1, ensure_ascii=False) + "\n"
-    world.write_text(ready.directory / SEARCH_FILE, text, encoding="utf-8", errors="backslashreplace")
+    rewrite(ready.directory / SEARCH_FILE, text.encode(errors="backslashreplace"))

@@ -1,12 +1,15 @@
 """Where a search runs: in one process or on workers it is the same, and a signal leaves what can be gone on with."""
 
+import errno
+import json
 import signal
 from contextlib import nullcontext
 from dataclasses import replace
 from pathlib import Path
 
 import pytest
-from railcosim.orchestrator.errors import RailcosimError, ScenarioError
+from railcosim.orchestrator import world
+from railcosim.orchestrator.errors import RailcosimError, RecordError, ScenarioError
 from railcosim.orchestrator.scenario import load
 from railcosim.orchestrator.study.campaign import parts_of, worker
 from railcosim.orchestrator.study.search import InterruptedSearch, falsify, optimize, preparation
@@ -164,3 +167,32 @@ def test_a_run_that_ends_its_worker_is_a_failed_one_of_the_search(hostile, tmp_p
     assert all("it ended the process of its worker" in one.error for one in lost)
     assert [one.run for one in found.evaluations] == list(range(8))
     assert found.best
+
+
+@pytest.mark.parametrize(
+    ("writes", "what"), [(0, "search.json"), (1, "nominal.toml"), (2, "000001.parquet"), (3, "search.json")]
+)
+def test_a_full_disk_ends_a_search_and_it_goes_on_when_there_is_room(lagging, tmp_path, monkeypatch, writes, what):
+    """Whatever cannot be written: the search before its first run, its runs, or what came out of them."""
+    fsync, kept = world.fsync, 2 * (writes == 3)
+
+    def full(file):
+        nonlocal writes
+        writes -= 1
+        if writes < 0:
+            raise OSError(errno.ENOSPC, "No space left on device")
+        fsync(file)
+
+    def search(**how):
+        return falsify(lagging(), ["lag.gain=1:1.2"], "low", tmp_path, budget=2, kind="plain", workers=0, **how)
+
+    with monkeypatch.context() as patch:
+        patch.setattr(world, "fsync", full)
+        with pytest.raises(RecordError, match=f"{what} cannot be written: No space left on device; make room, and go"):
+            search()
+    before = runs(tmp_path) if kept else []
+    assert not list(tmp_path.glob("*.part"))
+    again = search(resume=(tmp_path / "nominal.toml").exists())
+    assert (len(before), again.found.runs, again.found.failed, len(runs(tmp_path))) == (kept, 2, 0, 2)
+    assert runs(tmp_path)[:kept] == before
+    assert json.loads((tmp_path / "search.json").read_text())["runs"] == 2
