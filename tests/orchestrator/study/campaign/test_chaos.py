@@ -85,6 +85,28 @@ def test_runs_that_end_their_worker_are_rows(hostile, tmp_path):
     assert frame["error"][lost].str.startswith("it ended the process of its worker 3 times").all()
 
 
+def test_fmus_that_crash_at_random_steps_while_workers_are_killed(hostile, tmp_path):
+    """What each says of its end is the same, too, whichever ran before in its process."""
+    draw, me, scenario = random.Random(1), psutil.Process(), tmp_path / "hostile.toml"
+    scenario.write_text(
+        '[simulation]\nstop_time = 1.0\nstep = 0.1\n[instances.bad]\nfmu = "' + str(hostile()) + '"\n'
+        '[metrics]\nend = "final(bad.x)"'
+    )
+    ways = [("step", "abort"), ("step", "exit"), ("get", "abort"), ("step", "error"), ("step", "nan"), ("set", "exit")]
+    deeds = {" ".join((*draw.choice(ways), f"{draw.uniform(0.1, 0.9):.2f}")) for _ in range(12)} | {""}
+    how = {"scenario": str(scenario), "kind": "native"}
+    plan = plan_of(load(scenario), "bad.u=1:4:16", "bad.deed=" + ",".join(f'"{deed}"' for deed in sorted(deeds)))
+    undisturbed = run_study(plan, how, tmp_path / "undisturbed", workers=0)
+    moments = set(draw.sample(range(plan.count // 2), 4))
+
+    def kill(done, count, failed):
+        if done in moments and (found := workers_of(me)):
+            draw.choice(found).kill()
+
+    assert same(run_study(plan, how, tmp_path / "out", workers=2, progress=kill), undisturbed)
+    assert set(undisturbed.frame()["status"]) == {"completed", "failed"}
+
+
 @pytest.fixture
 def by_hand(tmp_path):
     """A scheduler and workers, each a process in a folder of its own, without the files of the scenario."""

@@ -1,6 +1,8 @@
 """Chunks under way: each run comes back once, whatever becomes of its worker."""
 
 import itertools
+import random
+from collections import Counter
 from concurrent.futures import CancelledError
 
 import pytest
@@ -112,6 +114,32 @@ def test_a_result_that_was_lost_with_its_worker_is_waited_for():
     workers = Workers(first=[TimeoutError()])
     assert len(fly(workers)) == 60
     assert sum(map(len, workers.sent)) == 60
+
+
+@pytest.mark.parametrize("seed", range(20))
+def test_every_run_comes_once_whatever_is_lost_and_when(seed):
+    """At random: workers die, the scheduler begins anew, results and files are lost; and two runs end any worker."""
+    draw, kills = random.Random(seed), Counter()
+
+    class Disturbed(Workers):
+        def submit(self, changes, *, with_files):
+            numbers = [change["n"] for change in changes]
+            fate = draw.choice(["die", "lose", "wait", "forget", "", "", ""])
+            self.first = []
+            if fate == "die" and all(kills[number] < 2 for number in numbers):  # a third time would be its own doing
+                kills.update(numbers)
+                self.first = [KilledWorker("own", None, 0)]
+            elif fate in ("lose", "wait"):
+                self.first = [draw.choice([CancelledError(), OSError()]) if fate == "lose" else TimeoutError()]
+            elif fate == "forget" and not with_files:
+                self.first = [None]
+            return super().submit(changes, with_files=with_files)
+
+    deadly = set(draw.sample(range(60), 2))
+    rows = fly(Disturbed(draw.randint(1, 4), deadly=deadly))
+    assert sorted(rows) == list(range(60))
+    assert {number for number, row in rows.items() if row.status == "failed"} == deadly
+    assert all(row.steps == number for number, row in rows.items() if number not in deadly)
 
 
 def test_it_ends_when_it_is_told_to():
