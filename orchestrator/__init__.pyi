@@ -1,3 +1,4 @@
+from .bars import progress_bar
 from .errors import CouplingError, FmuError, FmuFileError, RailcosimError, RunError, ScenarioError
 from .evaluation import robustness
 from .run import Results, Run, resume, run
@@ -21,6 +22,7 @@ __all__ = [
     "Study",
     "System",
     "load",
+    "progress_bar",
     "resume",
     "robustness",
     "run",

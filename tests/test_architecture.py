@@ -27,7 +27,7 @@ ORDER = (
     ("fmi",),
     ("leftovers", "system"),
     ("errors",),
-    ("markup", "problems"),
+    ("bars", "markup", "problems"),
     ("names", "times"),
     ("world",),
 )

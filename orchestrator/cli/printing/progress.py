@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import logging
 import sys
 import threading
@@ -10,6 +11,7 @@ from contextlib import contextmanager
 from typing import TYPE_CHECKING
 
 from ....fmus import toolchain
+from ...bars import progress_bar
 from ...run import CSV_FILE, Telling
 from ...run import Progress as OnProgress
 from ...times import digits
@@ -53,22 +55,8 @@ def show_progress(title: str, quiet: bool, start: float = 0.0, reached: float | 
     if quiet:
         yield None
     elif sys.stderr.isatty():
-        from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn, TimeRemainingColumn
-
-        columns = (TextColumn("{task.description}"), BarColumn(), TextColumn("{task.fields[reached]}"))
-        out = open_console(stderr=True)
-        with Progress(*columns, TimeElapsedColumn(), TimeRemainingColumn(), console=out, transient=True) as bar:
-            task = bar.add_task(title, total=None, reached="")
-
-            def show(time: float, stop: float) -> None:
-                at = f"{digits(time)} of {digits(stop)} s"
-                bar.update(task, description=title, completed=time - start, total=stop - start, reached=at)
-
-            def write(done: int, rows: int) -> None:
-                bar.update(task, description=CSV_FILE, completed=done, total=rows, reached=f"{done} of {rows} rows")
-
-            with _compilations(lambda what: bar.update(task, description=what)):
-                yield Shown(show, write)
+        with progress_bar(title, start, console=open_console(stderr=True)) as bar, _compilations(bar.tell):
+            yield Shown(bar, lambda done, rows: bar.count(done, rows, f"{done} of {rows} rows", CSV_FILE))
     else:
         with _compilations(tell):
             yield Shown(_lines(title, start, start if reached is None else reached), lambda *_: None)
@@ -139,13 +127,9 @@ def show_cases(count: int, quiet: bool) -> Iterator[Callable[[str], None]]:
     if quiet:
         yield lambda _: None
     elif sys.stderr.isatty():
-        from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
-
-        columns = (BarColumn(), TextColumn("{task.completed} of {task.total}"), TextColumn("{task.description}"))
-        with Progress(*columns, TimeElapsedColumn(), console=open_console(stderr=True), transient=True) as bar:
-            task = bar.add_task("", total=count, completed=-1)
-            with _compilations(lambda what: bar.update(task, description=what)):
-                yield lambda title: bar.update(task, advance=1, description=title)
+        done = itertools.count()
+        with progress_bar(console=open_console(stderr=True)) as bar, _compilations(bar.tell):
+            yield lambda title: bar.count(at := next(done), count, f"{at} of {count}", title)
     else:
         with _compilations(tell):
             yield lambda _: None

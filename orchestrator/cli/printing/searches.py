@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING
 
 from rich.console import Console
 
+from ...bars import progress_bar
 from ..lines import and_figures, counted, tell
 from .console import open_console, say
 from .progress import tell_pool
@@ -43,15 +44,10 @@ def show_search(title: str, quiet: bool) -> Iterator[ShownSearch]:
     if quiet:
         yield ShownSearch(lambda *_: None, lambda _: None)
     elif sys.stderr.isatty():
-        from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn, TimeRemainingColumn
-
-        columns = (TextColumn("{task.description}", markup=False), BarColumn(), TextColumn("{task.fields[told]}"))
-        out = open_console(stderr=True)
-        with Progress(*columns, TimeElapsedColumn(), TimeRemainingColumn(), console=out, transient=True) as bar:
-            task = bar.add_task(title, total=None, told="")
+        with progress_bar(title, console=open_console(stderr=True)) as bar:
 
             def show(done: int, of: int, best: str) -> None:
-                bar.update(task, completed=done, total=of, told=", ".join(filter(None, (f"{done} of {of} runs", best))))
+                bar.count(done, of, ", ".join(filter(None, (f"{done} of {of} runs", best))))
 
             yield ShownSearch(show, tell_pool)
     else:

@@ -14,6 +14,7 @@ from rich.console import Console
 from rich.table import Table
 from rich.text import Text
 
+from ...bars import progress_bar
 from ...study.analysis import SHARES, Estimate, Influence, Kept, Sensitivity, Spread, Summary
 from ..lines import and_figures, counted, tell
 from .console import open_console, say
@@ -168,16 +169,11 @@ def show_runs(title: str, quiet: bool) -> Iterator[ShownRuns]:
     if quiet:
         yield ShownRuns(lambda *_: None, lambda _: None)
     elif sys.stderr.isatty():
-        from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn, TimeRemainingColumn
-
-        columns = (TextColumn("{task.description}"), BarColumn(), TextColumn("{task.fields[runs]}"))
-        out = open_console(stderr=True)
-        with Progress(*columns, TimeElapsedColumn(), TimeRemainingColumn(), console=out, transient=True) as bar:
-            task = bar.add_task(title, total=None, runs="")
+        with progress_bar(title, console=open_console(stderr=True)) as bar:
 
             def show(done: int, count: int, failed: int) -> None:
                 runs = f"{done} of {counted(count, 'run')}{f', {failed} failed' if failed else ''}"
-                bar.update(task, completed=done, total=count, runs=runs)
+                bar.count(done, count, runs)
 
             yield ShownRuns(show, tell_pool)
     else:

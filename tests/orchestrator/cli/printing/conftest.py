@@ -4,6 +4,7 @@ import io
 import re
 
 import pytest
+from railcosim.orchestrator import bars
 from rich.console import Console
 
 
@@ -19,3 +20,14 @@ def _shown(show, *arguments, width=120):
 @pytest.fixture
 def shown():
     return _shown
+
+
+@pytest.fixture
+def at_once(monkeypatch):
+    """What is shown after a second is shown at once."""
+
+    class Timer:
+        def __init__(self, _, start):
+            self.start, self.cancel, self.join = start, lambda: None, lambda: None
+
+    monkeypatch.setattr(bars.threading, "Timer", Timer)

@@ -34,7 +34,7 @@ def test_progress_starts_at_the_start_time(capsys):
         assert progress is None
 
 
-def test_on_a_terminal_the_writing_of_results_is_shown(monkeypatch):
+def test_on_a_terminal_the_writing_of_results_is_shown(monkeypatch, at_once):
     terminal = Terminal()
     monkeypatch.setattr(sys, "stderr", terminal)
     with show_progress("run", False) as progress:
@@ -94,7 +94,7 @@ def test_the_bar_over_many_cases_is_for_a_terminal(capsys):
     assert capsys.readouterr() == ("", "Gust\\x1b[2J: compiling for win64\n")
 
 
-def test_on_a_terminal_the_bar_names_what_runs(monkeypatch):
+def test_on_a_terminal_the_bar_names_what_runs(monkeypatch, at_once):
     terminal = Terminal()
     monkeypatch.setattr(sys, "stderr", terminal)
     with show_cases(2, False) as tell:

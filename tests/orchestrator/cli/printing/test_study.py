@@ -79,7 +79,7 @@ def test_many_rows_without_a_value_are_counted(shown):
     assert rows(shown(show_summary, Summary(0, {}, 0.95, (), (), (), ""))) == ["no runs"]
 
 
-def test_on_a_terminal_there_is_a_bar(monkeypatch):
+def test_on_a_terminal_there_is_a_bar(monkeypatch, at_once):
     terminal = Terminal()
     monkeypatch.setattr(sys, "stderr", terminal)
     with show_runs("small", False) as shown:
