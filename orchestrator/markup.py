@@ -16,7 +16,13 @@ def number(value: object) -> str:
     return "–" if value is None else f"{value:.6g}" if isinstance(value, float) else escaped(value)
 
 
-def table(heads: Sequence[str], rows: Iterable[Sequence[str]], caption: str, kind: str = "") -> str:
+MOST_ROWS = 30
+"""Of a table in a notebook, which is to be small."""
+
+
+def table(
+    heads: Sequence[str], rows: Iterable[Sequence[str]], caption: str, kind: str = "", most: int | None = None
+) -> str:
     """A table.
 
     Args:
@@ -24,9 +30,13 @@ def table(heads: Sequence[str], rows: Iterable[Sequence[str]], caption: str, kin
         rows: of cells, which are markup.
         caption: above it, as text.
         kind: its class, for scripts and style.
+        most: how many rows are shown; of more, the caption tells how many there are. All by default.
     """
+    every = list(rows)
+    if most is not None and len(every) > most:
+        every, caption = every[:most], f"{caption}, the first {most} of {len(every)}"
     head = "".join(f'<th scope="col">{escaped(name)}</th>' for name in heads)
-    body = "".join(f"<tr>{''.join(f'<td>{cell}</td>' for cell in row)}</tr>" for row in rows)
+    body = "".join(f"<tr>{''.join(f'<td>{cell}</td>' for cell in row)}</tr>" for row in every)
     return (
         f'<table class="{kind}"><caption>{escaped(caption)}</caption><thead><tr>{head}</tr></thead>'
         f"<tbody>{body}</tbody></table>"

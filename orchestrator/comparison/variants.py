@@ -16,7 +16,7 @@ from .. import world
 from ..errors import FmuError, RailcosimError, ScenarioError
 from ..figures import remarked, remove_drawn
 from ..fmi import Kind
-from ..markup import escaped, number, table
+from ..markup import MOST_ROWS, escaped, number, table
 from ..problems import Problem
 from ..run import Progress, Run, execute, swaps
 from ..scenario import load
@@ -121,7 +121,7 @@ class Comparison:
             for row in self.rows
         ]
         verdicts = [[escaped(name), *map(escaped, found), ""] for name, found in self.verdicts().items()]
-        return table(["", *self.names, "unit"], [*rows, *verdicts], "Metrics and requirements")
+        return table(["", *self.names, "unit"], [*verdicts, *rows], "Requirements and metrics", most=MOST_ROWS)
 
     @property
     def names(self) -> list[str]:

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from ..errors import RunError
 from ..evaluation import BAD, ComparedValue, Metric, Verdict
-from ..markup import escaped, number, table
+from ..markup import MOST_ROWS, escaped, number, table
 from ..system import System
 from .checking import Checked
 from .recording import Results
@@ -107,7 +107,7 @@ class Run(Mapping[str, NDArray[Any]]):
     def _repr_html_(self) -> str:
         """What a notebook shows: how it ended, what was found, requirements, metrics."""
         name = " ".join(filter(None, (self.system.provenance.name, self.system.provenance.preset)))
-        said = [escaped(text) for text in (*([self.error] if self.error else []), *self.findings)]
+        said = [escaped(text) for text in (*([self.error] if self.error else []), *self.findings[:MOST_ROWS])]
         verdicts = [
             [escaped(v.verdict), escaped(v.name), number(v.margin), number(v.time), f"<code>{escaped(v.text)}</code>"]
             for v in self.requirements
@@ -120,8 +120,8 @@ class Run(Mapping[str, NDArray[Any]]):
         parts = [f"<p><b>{escaped(name)}</b>: {escaped(self.status)}</p>"]
         parts += [f"<ul>{''.join(f'<li>{text}</li>' for text in said)}</ul>"] if said else []
         heads = ["verdict", "name", "margin", "at t [s]", "requirement"]
-        parts += [table(heads, verdicts, "Requirements")] if verdicts else []
-        parts += [table(["metric", "value", "unit"], values, "Metrics")] if values else []
+        parts += [table(heads, verdicts, "Requirements", most=MOST_ROWS)] if verdicts else []
+        parts += [table(["metric", "value", "unit"], values, "Metrics", most=MOST_ROWS)] if values else []
         return "".join(parts)
 
     def frame(self) -> pandas.DataFrame:

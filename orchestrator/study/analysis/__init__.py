@@ -3,6 +3,7 @@
 from .influence import Influence, Sensitivity, outputs_of, sensitivity
 from .intervals import Estimate
 from .pictures import draw_study
+from .shown import summary_html
 from .summary import SHARES, Kept, Spread, Summary, summarize
 
 __all__ = [
@@ -17,4 +18,5 @@ __all__ = [
     "outputs_of",
     "sensitivity",
     "summarize",
+    "summary_html",
 ]

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 from ... import world
 from ...errors import ScenarioError
-from ..analysis import Sensitivity, Summary, draw_study, outputs_of, sensitivity, summarize
+from ..analysis import Sensitivity, Summary, draw_study, outputs_of, sensitivity, summarize, summary_html
 from ..design import Plan
 from .columns import unified
 from .dataset import METADATA, SERIES, parts_of, sorted_tables
@@ -183,6 +183,10 @@ class Study:
         facts += [f"{self.broken} failed"] if self.broken else []
         facts += [failing] if failing else []
         return f"<Study of {name}: {'; '.join(facts)}; files in {self.directory}>"
+
+    def _repr_html_(self) -> str:
+        """What a notebook shows: how often requirements hold, how metrics are spread, and what failed."""
+        return summary_html(self.summary(), str(self.told["title"] or self.told["scenario"]))
 
     @cached_property
     def _columns(self) -> list[str]:

@@ -11,6 +11,7 @@ from typing import Any
 
 from ...evaluation import Verdict
 from ...fmi import Kind
+from ...markup import MOST_ROWS, escaped, number, table
 from ...system import System
 from ..campaign import Pool, rewrite
 from .counterexample import as_json, changed_scenario, describe, write_counterexample, write_scenario
@@ -41,6 +42,17 @@ class Falsified:
     changes: tuple[str, ...] = ()
     figures: tuple[Path, ...] = ()
 
+    def _repr_html_(self) -> str:
+        """What a notebook shows: whether the requirement is broken, where, and by the smallest of changes."""
+        found, verdict = self.found, self.verdict
+        end = f"not broken in {found.runs} runs" if verdict is None else f"broken after {found.runs} runs"
+        rows = [[f"<code>{escaped(line)}</code>"] for line in self.changes]
+        facts = [] if verdict is None else [["margin", number(verdict.margin)], ["at t [s]", number(verdict.time)]]
+        told = table(["", "value"], facts, "Counterexample") if facts else ""
+        return f"<p><b>{escaped(found.requirement)}</b>: {end}</p>{told}" + (
+            table(["change"], rows, "") if rows else ""
+        )
+
 
 @dataclass(frozen=True)
 class Optimized:
@@ -56,6 +68,15 @@ class Optimized:
     scenarios: tuple[Path, ...] = ()
     changes: tuple[tuple[str, ...], ...] = ()
     figures: tuple[Path, ...] = field(default=())
+
+    def _repr_html_(self) -> str:
+        """What a notebook shows: the best of all runs, each with its values and what it changes."""
+        names = list(self.found.objectives.values())
+        rows = [
+            [escaped(path.name), *map(number, self.found.values(best)), "<br>".join(map(escaped, changes))]
+            for best, path, changes in zip(self.found.best, self.scenarios, self.changes, strict=True)
+        ]
+        return table(["scenario", *names, "changes"], rows, f"Best of {self.found.runs} runs", most=MOST_ROWS)
 
 
 def falsify(

@@ -15,6 +15,7 @@ def test_a_study_is_what_it_was(undisturbed):
     assert (len(study), study.counts, study.broken) == (6, {"completed": 6}, 0)
     assert (study.failed, study.verdicts) == (False, {"low": {"pass": 6}})
     assert repr(study) == f"<Study of small: 6 of 6 runs; completed; files in {undisturbed.directory}>"
+    assert "<td>6 of 6</td>" in study._repr_html_()
     assert study.summary().runs == 6
     assert study.row(3)["lag.rate"] == study.frame()["lag.rate"][3] == study.plan.changes(3)["lag.rate"]
     assert study.table(["seed"]).column_names == ["run", "seed"]
