@@ -256,11 +256,11 @@ def test_two_simulations_joined_by_a_tape_file_equal_one(tmp_path):
 @pytest.mark.long
 @fast
 @pytest.mark.parametrize("kind", ["python", "plain"])
-def test_python_and_native_agree_over_ten_trips(kind):
+def test_python_and_native_agree_over_three_trips(kind):
     """Bit for bit, at 0.1 s without delay, where the loop is stable."""
     law, plant = FILTERED, {"max_step": 0.1}
-    native = Trips(10, step=0.1, law=law, plant=plant, kind="native")
-    other = Trips(10, step=0.1, law=law, plant=plant, kind=kind)
+    native = Trips(3, step=0.1, law=law, plant=plant, kind="native")
+    other = Trips(3, step=0.1, law=law, plant=plant, kind=kind)
     assert (native.result.time == other.result.time).all()
     differing = [name for name in native.result.names() if not np.array_equal(native[name], other[name])]
     assert differing == []

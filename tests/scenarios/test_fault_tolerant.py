@@ -134,12 +134,13 @@ def test_eight_trains_of_eight_carriages():
 
 
 # A step of Python FMUs costs 4 ms, so that 1000 s at 0.01 s would take 400 s. The closed loop runs its whole length,
-# with every fault, at 0.1 s instead; and at 0.01 s the same faults come and go, overlap and heal twenty times as fast.
+# with every fault, at 0.1 s instead, in a campaign; and at 0.01 s the same faults come and go, overlap and heal twenty
+# times as fast.
 @pytest.mark.parametrize(
     ("step", "seconds", "haste"),
     [
         (0.01, 1.0, 1.0),
-        pytest.param(0.1, 1000.0, 1.0, marks=[pytest.mark.long, fast]),
+        pytest.param(0.1, 1000.0, 1.0, marks=[pytest.mark.campaign, fast]),
         pytest.param(0.01, 45.0, 20.0, marks=[pytest.mark.long, fast]),
     ],
 )
