@@ -35,6 +35,14 @@ def python(*arguments: object, folder: Path, path: Path) -> str:
     return done.stdout
 
 
+def pip(*arguments: object) -> None:
+    """What pip reaches is not measured."""
+    environment = {k: v for k, v in os.environ.items() if not k.startswith("COVERAGE")}
+    command = [sys.executable, "-m", "pip", *map(str, arguments)]
+    done = subprocess.run(command, env=environment, capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stderr
+
+
 @pytest.fixture(scope="session")
 def wheel(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """The wheel, built from a copy of the checkout, which stays as it is."""
@@ -52,9 +60,7 @@ def wheel(tmp_path_factory: pytest.TempPathFactory) -> Path:
     isolation = (
         ["--no-build-isolation"] if own else []
     )  # otherwise pip fetches the setuptools that pyproject.toml asks for
-    command = [sys.executable, "-m", "pip", "wheel", "--quiet", "--no-deps", *isolation, "-w", str(target), str(source)]
-    done = subprocess.run(command, capture_output=True, text=True, check=False)
-    assert done.returncode == 0, done.stderr
+    pip("wheel", "--quiet", "--no-deps", *isolation, "-w", target, source)
     (built,) = target.glob("railcosim-*.whl")
     return built
 
@@ -63,9 +69,7 @@ def wheel(tmp_path_factory: pytest.TempPathFactory) -> Path:
 def installed(wheel: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
     """A folder the wheel is installed into."""
     target = tmp_path_factory.mktemp("site")
-    command = [sys.executable, "-m", "pip", "install", "--quiet", "--no-deps", "--target", str(target), str(wheel)]
-    done = subprocess.run(command, capture_output=True, text=True, check=False)
-    assert done.returncode == 0, done.stderr
+    pip("install", "--quiet", "--no-deps", "--target", target, wheel)
     return target
 
 

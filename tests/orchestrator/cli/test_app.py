@@ -9,6 +9,7 @@ import re
 import signal
 import subprocess
 import sys
+import time
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -257,6 +258,7 @@ def test_ctrl_c_ends_with_130_and_leaves_what_was_computed(tmp_path: Path) -> No
         assert process.stderr is not None
         while not (tmp_path / "out/results.bin").is_file() or (tmp_path / "out/results.bin").stat().st_size < 2000:
             assert process.poll() is None, process.stderr.read()
+            time.sleep(0.02)
         process.send_signal(signal.SIGINT)
         stdout, stderr = process.communicate(timeout=120)
     assert process.returncode == INTERRUPTED, stderr

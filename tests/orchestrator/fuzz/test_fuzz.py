@@ -317,7 +317,7 @@ def try_text(watched, tmp_path):
 def test_a_changed_scenario_is_fit_or_refused(explore, try_text):
     with Workspace() as place:
         check(loads(SMALL), place, "plain")
-    explore(lambda text: try_text(text, True), changed(), quick=80, deep=1200)
+    explore(lambda text: try_text(text, True), changed(), quick=40, deep=1200)
 
 
 def test_a_torn_text_is_a_scenario_or_refused(explore, try_text):

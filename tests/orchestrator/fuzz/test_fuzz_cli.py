@@ -138,7 +138,7 @@ def desk(tmp_path, monkeypatch, xml):
 
 
 def test_any_command_line_ends_with_a_message_and_a_code(explore, desk):
-    explore(said_by, commands(), quick=60, deep=500)
+    explore(said_by, commands(), quick=30, deep=500)
     assert {path.name for path in desk.iterdir()} <= {*DESK, "out", "é", "results"}
 
 
@@ -178,4 +178,4 @@ def test_results_that_somebody_has_edited_are_drawn_or_refused(explore, desk):
     tables, blocks = st.sampled_from([None, *TABLES]), st.sampled_from([None, *BLOCKS])
     wanted = st.fixed_dictionaries({"figures_wanted": st.lists(FIGURES, min_size=1, max_size=2)})
     changes = st.dictionaries(KEYS, RECORDED, max_size=2) | wanted
-    explore(rule, changes, missing, tables, blocks, quick=30, deep=250)
+    explore(rule, changes, missing, tables, blocks, quick=20, deep=250)

@@ -239,6 +239,7 @@ BOMBS = {
 }
 
 
+@pytest.mark.unmeasured
 @pytest.mark.usefixtures("in_time")
 @pytest.mark.parametrize("name", BOMBS)
 def test_a_bomb_takes_neither_time_nor_memory(use, name):
