@@ -1,4 +1,4 @@
-"""The protection campaign of benchmarks/protection_campaign.py: five of its 500 runs, and fifty in the long tier."""
+"""The protection campaign of benchmarks/protection_campaign.py: some of its 500 runs."""
 
 import importlib
 import subprocess
@@ -9,6 +9,7 @@ import pytest
 from railcosim.orchestrator.run.execution import evaluate
 
 BENCHMARKS = Path(__file__).parents[2] / "benchmarks"
+SMOKE = (0, 1, 13, 4, 5)
 
 
 @pytest.fixture(scope="module")
@@ -31,7 +32,7 @@ def keeps_its_promises(campaign, number):
 
 
 # A force that is late and a limit over position; a limit that falls; a slow sampling; a noisy sensor; full traction.
-@pytest.mark.parametrize("number", [0, 1, 13, 4, 5])
+@pytest.mark.parametrize("number", SMOKE)
 @pytest.mark.long
 def test_a_smoke(campaign, number):
     case, with_it, without = keeps_its_promises(campaign, number)
@@ -52,8 +53,13 @@ def test_the_protection_does_not_weaken_a_controller_that_brakes_harder(campaign
     assert with_it.peak == pytest.approx(0.478, abs=1e-3)
 
 
-@pytest.mark.long
-@pytest.mark.parametrize("number", range(50))
+@pytest.mark.parametrize(
+    "number",
+    [
+        *(pytest.param(number, marks=pytest.mark.long) for number in range(20) if number not in SMOKE),
+        *(pytest.param(number, marks=pytest.mark.campaign) for number in range(20, 50)),
+    ],
+)
 def test_fifty_runs(campaign, number):
     keeps_its_promises(campaign, number)
 

@@ -133,7 +133,7 @@ def test_close_following_keeps_the_braking_distance_with_the_fallback_and_not_wi
     assert max(margins(range(2), fallback=False)) < 0.0
 
 
-@pytest.mark.long
+@pytest.mark.campaign
 def test_close_following_in_many_cases():
     assert min(margins(range(50))) > 0.0
     assert max(margins(range(50), fallback=False)) < 0.0

@@ -73,7 +73,7 @@ def test_the_radio_is_what_was_drawn(script):
     assert script.simulate(drawn, "fallback").age == script.simulate(drawn, "no fallback").age > drawn.outage
 
 
-@pytest.mark.long
+@pytest.mark.campaign
 def test_fifty_runs(script):
     found = margins(script, range(50))
     assert sum(margin < 0.0 for margin in found["no fallback"]) == 7
