@@ -35,7 +35,7 @@ _UNMEASURED = ("docs", "interop", "scenarios")
 
 
 @pytest.fixture(autouse=True)
-def _what_is_aimed_at_counts(request, monkeypatch):
+def _what_is_aimed_at_counts(request):
     """No branch counts as covered because drawn examples happen to reach it: elsewhere, others are drawn."""
     measuring = "coverage" in sys.modules and sys.modules["coverage"].Coverage.current()
     chance = "explore" in request.fixturenames or hasattr(request.function, "hypothesis")
@@ -43,11 +43,12 @@ def _what_is_aimed_at_counts(request, monkeypatch):
     if not measuring or not (chance or apart):
         yield
         return
-    for name in ("COVERAGE_PROCESS_START", "COVERAGE_PROCESS_CONFIG"):  # nor do processes that it starts
-        monkeypatch.delenv(name, raising=False)
-    measuring.stop()
-    yield
-    measuring.start()
+    with pytest.MonkeyPatch.context() as patch:
+        for name in ("COVERAGE_PROCESS_START", "COVERAGE_PROCESS_CONFIG"):  # nor do processes that it starts
+            patch.delenv(name, raising=False)
+        measuring.stop()
+        yield
+        measuring.start()
 
 
 @pytest.fixture
