@@ -1,5 +1,6 @@
 """What a model description says, read tolerantly: what can be used is, with a warning; what cannot is refused."""
 
+import gc
 import io
 import time
 
@@ -222,6 +223,16 @@ def test_what_is_beyond_repair_is_refused_by_name(reading, xml, fault):
     text = xml["description"]([xml["variable"]("y", "output")]).replace(PLAIN, fault)
     assert fault in text
     assert refusal(reading, text).startswith("their.fmu: its modelDescription.xml cannot be used: ")
+
+
+@pytest.mark.parametrize("on", [True, False])
+def test_the_collector_of_circles_is_left_as_it_was(reading, xml, on):
+    (gc.enable if on else gc.disable)()
+    try:
+        reading(xml["description"]([xml["variable"]("y", "output")]))
+        assert gc.isenabled() == on
+    finally:
+        gc.enable()
 
 
 @pytest.mark.long
