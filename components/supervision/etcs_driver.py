@@ -29,7 +29,9 @@ class EtcsDriver(Component):
 
     mass = Parameter("kg", 134.2e3, minimum=1.0, description="mass of the train, rotating parts included")
     gain = Parameter("1/s", 0.5, tunable=True, minimum=0.0, description="acceleration for each m/s that is missing")
-    margin = Parameter("m/s", 0.6, tunable=True, minimum=0.0, description="how far below the permitted speed to stay")
+    margin = Parameter(
+        "m/s", 0.6, tunable=True, description="how far below the permitted speed to stay; negative: a reckless one"
+    )
     allowed_acceleration = Parameter("m/s2", 0.8, tunable=True, minimum=0.0, description="largest acceleration")
     allowed_deceleration = Parameter("m/s2", 0.9, tunable=True, minimum=0.0, description="largest deceleration")
 

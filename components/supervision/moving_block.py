@@ -55,7 +55,6 @@ class MovingBlock(Component):
     end_of_line = Parameter("m", 1e7, tunable=True, description="end of authority without a train ahead")
     age_limit = Parameter("s", 2.0, tunable=True, minimum=0.0, description="age from which a message is stale")
 
-    has_authority = Output("1", bool, description="always: there is an end of authority")
     end_of_authority = Output("m", description="end of authority")
     supervised_location = Output("m", description="supervised location")
     stale = Output("1", bool, description="whether the last message is old")
@@ -66,7 +65,6 @@ class MovingBlock(Component):
         bound: Any = self.ahead_position - self.ahead_length - self.position_error + run_out
         location = where(self.has_ahead, bound, self.end_of_line + self.margin)
         return {
-            "has_authority": True,
             "end_of_authority": location - self.margin,
             "supervised_location": location,
             "stale": where(self.has_ahead, self.ahead_age > self.age_limit, False),

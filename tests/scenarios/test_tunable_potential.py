@@ -123,6 +123,7 @@ def test_the_table_shows_what_is_reconstructed(capfd, tmp_path, monkeypatch):
         "hilly_line",
         "braking_wave",
         "sinusoidal_leader",
+        "virtual_coupling",
     ],
 )
 def test_the_label_stands_in_title_source_and_description(name):
