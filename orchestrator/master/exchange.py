@@ -136,6 +136,11 @@ class Exchange:
         self.output_changes: dict[int, Change] = {}
         """What events do to outputs, by place."""
 
+    def clear(self) -> None:
+        """Forget all values, for another run."""
+        self.values[:] = [0.0] * len(self.values)
+        self.history.clear()
+
     # ---------------------------------------------------------------- plan
 
     def _plan_outputs(self, slave: Slave, wanted: Collection[str], parted: bool) -> list[Yield]:

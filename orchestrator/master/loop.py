@@ -70,6 +70,26 @@ class Master:
         self._compiled: CompiledLoop | None = None
         self._watch = Watch(slaves.values())
 
+    def begin_again(
+        self, slaves: Mapping[str, Slave], starts: Mapping[str, Mapping[str, Any]], settings: Settings
+    ) -> bool:
+        """Be as new, for another run of the same instances and connections; False where a new one has to be made.
+
+        What the compiled kernel steps leaves nothing behind but values; what was made for it is kept.
+
+        Args:
+            slaves: the instances, reset.
+            starts: start values.
+            settings: how the run couples.
+        """
+        is_plain = not settings.events and settings.stepping.algebraic_loops != "solve"
+        if self._compiled is None or not is_plain or slaves != self.slaves or settings != self.coupling.settings:
+            return False
+        self._starts, self.coupling.steps = starts, 0
+        self.exchange.clear()
+        self._watch = Watch(slaves.values())
+        return True
+
     @property
     def steps(self) -> int:
         """Communication steps taken."""
@@ -126,7 +146,7 @@ class Master:
         if coupling.extrapolator is not None:
             coupling.extrapolator.begin(start_time)
         self.exchange.remember()
-        if isinstance(self.algorithm, Explicit):
+        if isinstance(self.algorithm, Explicit) and self._compiled is None:
             self._compiled = CompiledLoop.of(coupling, self.algorithm)
 
     def _set_starts(self, slave: Slave) -> None:

@@ -42,6 +42,7 @@ class Crew:
         self.notes: dict[str, None] = {}
         self.untried: set[str] = set()
         self._slaves: dict[str, Slave] = {}
+        self._master: Master | None = None
         self._given: dict[str, set[str]] = {}
         self._tried: set[str] = set()
         self._renewed: set[str] = set()
@@ -84,14 +85,13 @@ class Crew:
             slave = self._slaves[name]
             assert isinstance(slave, LoadedSlave | IsolatedSlave)  # no other discards a step
             slave.roll_back()
-        yield Master(
-            {name: self._slaves[name] for name in checked.models},
-            checked.order.sequence,
-            checked.wiring.links,
-            checked.wiring.starts,
-            checked.system.stepping.algorithm,
-            settings=Settings.of(checked.system),
-        )
+        slaves, starts = {name: self._slaves[name] for name in checked.models}, checked.wiring.starts
+        settings, master = Settings.of(checked.system), self._master
+        if master is None or restoring or not master.begin_again(slaves, starts, settings):
+            algorithm = checked.system.stepping.algorithm
+            master = Master(slaves, checked.order.sequence, checked.wiring.links, starts, algorithm, settings=settings)
+        self._master = None if restoring else master
+        yield master
 
     def settle(self, *, fit: bool) -> None:
         """Say how a run ended: the instances are ``fit`` for another one where it came to its end."""
@@ -110,7 +110,7 @@ class Crew:
 
     def dismiss(self) -> None:
         """Give all instances back."""
-        slaves, self._slaves = self._slaves, {}
+        slaves, self._slaves, self._master = self._slaves, {}, None
         self.untried.clear()
         for slave in slaves.values():
             slave.free()

@@ -1,6 +1,7 @@
 """Runs of a batch are single runs: the same numbers, to the bit, and the same messages."""
 
 import signal
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -164,3 +165,18 @@ def test_rows_of_every_shipped_scenario_are_single_runs(name):
     with Batch(system, record=list(singles[0].names())) as batch:
         for k in (0, 1, 2, 3, 2, 1, 0):
             agree(batch.run(runs[k]), singles[k])
+
+
+@pytest.mark.parametrize("delay", [0, 2])
+def test_what_is_made_for_a_run_is_kept_for_the_next(system, delay):
+    """Where nothing happens on the way, and until instances have failed."""
+    links = [replace(each, delay=delay) for each in system.connections]
+    calm, runs = system.changed(events=[], connections=links), ({"lag.rate": 2.0}, {"lag.u": 3.0})
+    singles = [single(calm, changes, kind="native") for changes in runs]
+    with Batch(calm, kind="native", record=["lag.x", "ramp.x"]) as batch:
+        for k in (0, 1, 0, None, 1, 0):
+            row = batch.run({"lag.rate": -1e300} if k is None else runs[k])
+            if k is None:
+                assert row.status == "failed"
+            else:
+                agree(row, singles[k])
