@@ -24,6 +24,13 @@ _LIBRARY = f"""#define FMI2_OVERRIDE_FUNCTION_PREFIX
 #if defined(__GLIBC__) && defined(__x86_64__)
 __asm__(".symver exp,exp@GLIBC_2.2.5\\n.symver log,log@GLIBC_2.2.5\\n.symver pow,pow@GLIBC_2.2.5");
 #endif
+
+#if defined(__wasm__) /* a page has no function of C to be given messages by: it asks for the last one */
+__attribute__((export_name("railcosim_message"))) const char *railcosim_message(fmi2Component c)
+{{
+    return ((const Instance *)c)->message;
+}}
+#endif
 """
 
 

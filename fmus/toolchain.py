@@ -9,6 +9,10 @@ other machines FMI 2.0.5 refers to the platform tuples of FMI 3.0, hence ``aarch
 Mac they look into ``darwin64``, which therefore holds a universal library; on Arm Linux FMPy 0.3 and OpenModelica look
 into ``linux64``, where an FMU for both machines has the x86 library. An FMU built for Arm Linux alone therefore carries
 its library under both names.
+
+A web page is a platform, too: ``wasm32-wasi`` holds a WebAssembly module that exports the FMI functions, ``malloc`` and
+``free``, and is to be started by ``_initialize``. Addresses are numbers of its memory. Since a page has no function of C
+to give as a logger, it asks ``railcosim_message(component)`` for what the last error was. No importer looks for it.
 """
 
 from __future__ import annotations
@@ -60,12 +64,18 @@ class Platform:
     options: tuple[str, ...]
 
 
+_EXPORTS = tuple(f"-Wl,--export{what}" for what in ("-dynamic", "=malloc", "=free"))
 PLATFORMS = {
-    "linux64": Platform("linux64", ".so", ("x86_64-linux-gnu.2.17",), ("-fPIC", "-lm")),
-    "win64": Platform("win64", ".dll", ("x86_64-windows-gnu",), ()),
-    "darwin64": Platform("darwin64", ".dylib", ("x86_64-macos.11.0", "aarch64-macos.11.0"), ("-fPIC",)),
-    "aarch64-linux": Platform("aarch64-linux", ".so", ("aarch64-linux-gnu.2.17",), ("-fPIC", "-lm")),
+    "linux64": Platform("linux64", ".so", ("x86_64-linux-gnu.2.17",), ("-shared", "-fPIC", "-lm")),
+    "win64": Platform("win64", ".dll", ("x86_64-windows-gnu",), ("-shared",)),
+    "darwin64": Platform("darwin64", ".dylib", ("x86_64-macos.11.0", "aarch64-macos.11.0"), ("-shared", "-fPIC")),
+    "aarch64-linux": Platform("aarch64-linux", ".so", ("aarch64-linux-gnu.2.17",), ("-shared", "-fPIC", "-lm")),
+    "wasm": Platform("wasm32-wasi", ".wasm", ("wasm32-wasi",), ("-mexec-model=reactor", *_EXPORTS)),
 }
+SYSTEMS = tuple(name for name in PLATFORMS if name != "wasm")
+"""What ``all`` means: those that an importer runs on."""
+_COSTS = {"win64": "minutes", "wasm": "half a minute"}
+"""How long ziglang takes for a platform's C library where that is not some seconds."""
 
 
 class CompilerError(ComponentError):
@@ -82,7 +92,7 @@ def here() -> str:
 
 
 def chosen(names: Iterable[str]) -> tuple[str, ...]:
-    """The platforms of those names in a fixed order; ``all`` is every one, nothing is this machine's.
+    """The platforms of those names in a fixed order; ``all`` is every one of `SYSTEMS`, nothing is this machine's.
 
     Raises:
         CompilerError: an unknown name; the message suggests the nearest one.
@@ -91,7 +101,7 @@ def chosen(names: Iterable[str]) -> tuple[str, ...]:
     for name in wanted:
         if name not in (*PLATFORMS, "all"):
             raise CompilerError(f"there is no platform {nearest(name, [*PLATFORMS, 'all'])}")
-    return tuple(name for name in PLATFORMS if name in wanted or "all" in wanted)
+    return tuple(name for name in PLATFORMS if name in wanted or ("all" in wanted and name in SYSTEMS))
 
 
 def folders(platforms: Iterable[str]) -> dict[str, tuple[str, ...]]:
@@ -136,14 +146,14 @@ def identity(platforms: tuple[str, ...]) -> str:
 
 
 def compile_library(source: Path, target: Path, name: str, *, only: bool, cache: Path | None = None) -> None:
-    """Compile one translation unit to a shared library; the same source gives the same bytes.
+    """Compile one translation unit to a shared library, or a module for a page; the same source gives the same bytes.
 
     Args:
         source: the C file; what it includes stands beside it.
         target: the library to write.
         name: a key of `PLATFORMS`.
         only: whether this machine's platform is all that is asked for; then the system's compiler serves.
-        cache: where ziglang keeps what it made of its own C libraries, which takes minutes for Windows and seconds for
+        cache: where ziglang keeps what it made of its own C libraries, which takes minutes for Windows and less for
             the others; several processes may share it. Its own folder in the user's home by default;
             ``ZIG_GLOBAL_CACHE_DIR`` overrides both.
 
@@ -178,7 +188,7 @@ class _Mark:
         chosen = os.environ.get("ZIG_GLOBAL_CACHE_DIR")
         folder = Path(chosen) if chosen else cache
         version = importlib.metadata.version("ziglang")
-        self._cost = "minutes" if name == "win64" else "some seconds"
+        self._cost = _COSTS.get(name, "some seconds")
         self._file = folder / "railcosim" / f"{name}-{version}" if folder else None
 
     @property
@@ -218,7 +228,7 @@ def _cross_compile(source: Path, made: Path, machine: Platform, cache: Path | No
         part.parent.mkdir()
         extra = [f"-Wl,-install_name,@rpath/{made.name}"] if "macos" in target else []
         output = part.relative_to(source.parent).as_posix()
-        command = [sys.executable, "-m", "ziglang", "cc", "-target", target, *FLAGS, "-s", "-shared"]
+        command = [sys.executable, "-m", "ziglang", "cc", "-target", target, *FLAGS, "-s"]
         headers = ["-I", str(_HEADERS)]
         _run([*command, *headers, source.name, "-o", output, *machine.options, *extra], source.parent, environment)
         parts.append(part)

@@ -108,7 +108,8 @@ def build(
     platforms: Annotated[
         str | None,
         typer.Option(
-            help="Of native FMUs: all, or some of linux64,win64,darwin64,aarch64-linux; this machine's by default.",
+            help="Of native FMUs: some of linux64,win64,darwin64,aarch64-linux, all of these, wasm for web pages; this "
+            "machine's by default.",
             autocompletion=completing.platforms,
         ),
     ] = None,

@@ -16,7 +16,7 @@ from railcosim.fmus import build as module
 from railcosim.fmus import toolchain
 from railcosim.fmus.build import native_problem, package
 from railcosim.fmus.release import CHECKSUMS, default_directory, release
-from railcosim.fmus.toolchain import PLATFORMS, CompilerError
+from railcosim.fmus.toolchain import SYSTEMS, CompilerError
 
 COMMAND = [sys.executable, "-c", "from railcosim.orchestrator.cli.app import main; main()"]
 WRONG_INPUT = 2
@@ -152,7 +152,7 @@ def test_every_platform_asked_for_is_built_and_told(tmp_path, told, monkeypatch)
     monkeypatch.setattr(module, "build", lambda *_, **how: asked.append(how) or made)
     release(["Gust"], {}, tmp_path, platforms=["all"], tell=told.append)
     assert len(told) == 1
-    assert f"Gust: native, {' '.join(PLATFORMS)} (" in told[0]
+    assert f"Gust: native, {' '.join(SYSTEMS)} (" in told[0]
     assert asked == [{"kind": "native", "platforms": ["all"]}]
 
 

@@ -24,7 +24,7 @@ from railcosim.components import CATALOGUE
 from railcosim.fmus import build as build_module
 from railcosim.fmus import native_fmu, toolchain
 from railcosim.fmus.build import build, native_problem
-from railcosim.fmus.toolchain import PLATFORMS, CompilerError, chosen, compile_library, folders
+from railcosim.fmus.toolchain import PLATFORMS, SYSTEMS, CompilerError, chosen, compile_library, folders
 
 SOURCE = (
     "#include <math.h>\n#ifdef _WIN32\n__declspec(dllexport)\n#else\n"
@@ -81,7 +81,8 @@ def zig_cache():
 def test_platforms_come_in_one_order_whatever_the_wish():
     assert chosen([]) == (toolchain.here(),)
     assert chosen(["win64", "linux64", "win64"]) == ("linux64", "win64")
-    assert chosen(["all"]) == tuple(PLATFORMS)
+    assert chosen(["all"]) == SYSTEMS == ("linux64", "win64", "darwin64", "aarch64-linux")
+    assert chosen(["wasm", "all"]) == tuple(PLATFORMS), "a page is no system, and asked for by name"
     with pytest.raises(CompilerError, match=r"there is no platform 'linux32'; did you mean 'linux64'\?"):
         chosen(["linux32"])
     with pytest.raises(CompilerError, match="there is no platform 'amiga'; it has aarch64-linux, all, darwin64"):
@@ -90,7 +91,8 @@ def test_platforms_come_in_one_order_whatever_the_wish():
 
 def test_every_platform_has_the_folder_its_importers_look_into(tmp_path):
     """FMI 2.0's names for x86; Arm Linux alone stands in linux64 too, where FMPy and OpenModelica look."""
-    assert folders(PLATFORMS) == {name: (name,) for name in PLATFORMS}
+    assert folders(SYSTEMS) == {name: (name,) for name in SYSTEMS}
+    assert folders(["wasm"]) == {"wasm": ("wasm32-wasi",)}
     assert folders(["win64"]) == {"win64": ("win64",)}
     assert folders(["aarch64-linux"]) == {"aarch64-linux": ("aarch64-linux", "linux64")}
     for names, found in ((["aarch64-linux"], {"linux64"}), (PLATFORMS, {"linux64", "win64", "darwin64"})):
@@ -387,6 +389,24 @@ def test_one_fmu_for_every_platform(monkeypatch, zig_cache):
     for library in found.values():
         for leak in (tempfile.gettempdir().encode(), str(Path.home()).encode(), b"ziglang"):
             assert leak not in library
+
+
+@needs_native
+@needs_zig
+@pytest.mark.long
+def test_an_fmu_for_web_pages(monkeypatch, zig_cache):
+    """It exports what FMI has and memory; a model without a tape asks for nothing at all (WebAssembly 1.0, 5.5)."""
+    monkeypatch.setenv("ZIG_GLOBAL_CACHE_DIR", str(zig_cache))
+    with zipfile.ZipFile(build("ComfortCruise", kind="native", platforms=["wasm"])) as archive:
+        assert [name for name in archive.namelist() if name.startswith("binaries/")] == [
+            "binaries/wasm32-wasi/ComfortCruise.wasm"
+        ]
+        module = archive.read("binaries/wasm32-wasi/ComfortCruise.wasm")
+    assert module.startswith(b"\0asm\1\0\0\0")
+    assert len(module) < 80_000
+    for name in (*functions(), "malloc", "free", "_initialize", "railcosim_message"):
+        assert bytes([len(name)]) + name.encode() in module, name
+    assert b"wasi_snapshot" not in module
 
 
 @needs_zig
