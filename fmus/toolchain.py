@@ -11,8 +11,8 @@ into ``linux64``, where an FMU for both machines has the x86 library. An FMU bui
 its library under both names.
 
 A web page is a platform, too: ``wasm32-wasi`` holds a WebAssembly module that exports the FMI functions, ``malloc`` and
-``free``, and is to be started by ``_initialize``. Addresses are numbers of its memory. Since a page has no function of C
-to give as a logger, it asks ``railcosim_message(component)`` for what the last error was. No importer looks for it.
+``free``, and is to be started by ``_initialize``. Since a page has no function of C to give as a logger, it asks
+``railcosim_message(component)`` for what the last error was. No importer looks for it.
 """
 
 from __future__ import annotations

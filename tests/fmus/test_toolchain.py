@@ -391,24 +391,6 @@ def test_one_fmu_for_every_platform(monkeypatch, zig_cache):
             assert leak not in library
 
 
-@needs_native
-@needs_zig
-@pytest.mark.long
-def test_an_fmu_for_web_pages(monkeypatch, zig_cache):
-    """It exports what FMI has and memory; a model without a tape asks for nothing at all (WebAssembly 1.0, 5.5)."""
-    monkeypatch.setenv("ZIG_GLOBAL_CACHE_DIR", str(zig_cache))
-    with zipfile.ZipFile(build("ComfortCruise", kind="native", platforms=["wasm"])) as archive:
-        assert [name for name in archive.namelist() if name.startswith("binaries/")] == [
-            "binaries/wasm32-wasi/ComfortCruise.wasm"
-        ]
-        module = archive.read("binaries/wasm32-wasi/ComfortCruise.wasm")
-    assert module.startswith(b"\0asm\1\0\0\0")
-    assert len(module) < 80_000
-    for name in (*functions(), "malloc", "free", "_initialize", "railcosim_message"):
-        assert bytes([len(name)]) + name.encode() in module, name
-    assert b"wasi_snapshot" not in module
-
-
 @needs_zig
 @pytest.mark.parametrize(
     "names",
