@@ -8,7 +8,7 @@ from typing import Annotated
 import typer
 
 from .documents import Answer, written
-from .options import Quiet
+from .options import Quiet, Trust
 
 
 def report(
@@ -16,6 +16,14 @@ def report(
     output: Annotated[
         Path | None, typer.Option("--output", "-o", help="The file; report.html in the first directory by default.")
     ] = None,
+    live: Annotated[
+        bool,
+        typer.Option(
+            "--live",
+            help="Put the models of a run into its page, with sliders for their parameters; takes the extra 'cross'.",
+        ),
+    ] = False,
+    trust: Trust = False,
     quiet: Quiet = False,
 ) -> Answer:
     """Make one page of a run: curves to zoom, trains on their line, verdicts, wiring, provenance.
@@ -24,5 +32,5 @@ def report(
     """
     from ..report import write_report
 
-    page = write_report([path.parent if path.is_file() else path for path in results], output)
-    return written([page], quiet)
+    directories = [path.parent if path.is_file() else path for path in results]
+    return written([write_report(directories, output, live=live, trust=trust)], quiet)

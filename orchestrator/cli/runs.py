@@ -88,6 +88,9 @@ def run(
     ] = None,
     no_figures: Annotated[bool, typer.Option("--no-figures", help="Draw nothing.")] = False,
     report: Report = False,
+    live: Annotated[
+        bool, typer.Option("--live", help="With --report: put the models into the page, with sliders.")
+    ] = False,
     figure_format: FigureFormat = None,
     dpi: Dpi = None,
     quiet: Quiet = False,
@@ -107,8 +110,10 @@ def run(
     from .documents import run_document
     from .printing import show_page, show_progress, show_run
 
+    if live and not report:
+        raise ScenarioError("--live is about the page of --report: give both")
     if report:
-        from ..report import check_drawable
+        from ..report import check_drawable, check_live
 
         check_drawable()
     how: Any = {"figures": not no_figures, "threads": threads, "checkpoint_every": checkpoint_every}
@@ -134,6 +139,8 @@ def run(
         system = load_system(scenario, preset, settings, builds, swaps, stop=stop, step=step, algorithm=algorithm)
         system = isolate(system, isolated or ())
         draw_as(system, figure_format, dpi)
+        if live:
+            check_live(system, kind.value)
         directory = output or Path("results") / "-".join(filter(None, (system.provenance.name, preset)))
         with show_progress(system.provenance.name, quiet, system.stepping.start_time) as progress:
             writing = progress and progress.writing
@@ -148,7 +155,8 @@ def run(
     if report and outcome.directory is not None:
         from ..report import write_report
 
-        page = write_report([outcome.directory])
+        goes = live and outcome.status == "completed"
+        page = write_report([outcome.directory], live=goes, trust=True)
 
     def show() -> None:
         show_run(outcome, second, verdict, quiet)

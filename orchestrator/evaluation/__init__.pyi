@@ -27,7 +27,7 @@ from .published import (
 from .requirements import Verdict, parse_requirement
 from .robustness import robustness
 from .signals import Part, Signals, parts_of
-from .syntax import Call, Node, Number, Operation, Reference
+from .syntax import Call, Name, Node, Number, Operation, Reference
 from .vocabulary import Names
 
 __all__ = [
@@ -45,6 +45,7 @@ __all__ = [
     "Judge",
     "Metric",
     "MetricChange",
+    "Name",
     "Names",
     "Node",
     "Number",

@@ -24,8 +24,12 @@ _LOOKED_AT = 8
 
 @dataclass
 class Columns:
-    """The columns of a page, each packed once; the script of the page unpacks them by number."""
+    """The columns of a page, each packed once; the script of the page unpacks them by number.
 
+    ``live``: whether curves are told with what they are made of.
+    """
+
+    live: bool = False
     packed: list[Packed] = field(default_factory=list)
     told: list[dict[str, Any]] = field(default_factory=list)
     _known: dict[bytes, int] = field(default_factory=dict)

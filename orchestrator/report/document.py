@@ -19,6 +19,9 @@ _OWN = Path(__file__).parent / "resources"
 _NETWORK = (("https://cdn.jsdelivr.net/", ""), ("https://maps.googleapis.com/", ""))
 """Where the library would load more from; a page has it all, and shows no mathematics or maps."""
 
+_ALLOWED = {"live.js": " 'wasm-unsafe-eval'; worker-src blob:"}
+"""What scripts may do beyond what all may, as a policy says it: compile models, and simulate in a thread."""
+
 
 def write_document(
     path: Path, title: str, body: Iterable[str], data: Mapping[str, Any], columns: Columns, *, scripts: Sequence[str]
@@ -83,9 +86,11 @@ def _page(
 ) -> Iterable[str]:
     folder = check_drawable()
     yield '<!DOCTYPE html>\n<html lang="en"><head><meta charset="utf-8">'
+    more = "".join(_ALLOWED.get(name, "") for name in scripts)
     yield (
-        "<meta http-equiv=\"Content-Security-Policy\" content=\"default-src 'none'; script-src 'unsafe-inline'; "
-        "style-src 'unsafe-inline'; img-src data: blob:; font-src data:; base-uri 'none'; form-action 'none'\">"
+        '<meta http-equiv="Content-Security-Policy" content="default-src \'none\'; '
+        f"script-src 'unsafe-inline'{more}; style-src 'unsafe-inline'; img-src data: blob:; font-src data:; "
+        "base-uri 'none'; form-action 'none'\">"
     )
     yield '<meta name="viewport" content="width=device-width, initial-scale=1">'
     yield f"<title>{escaped(title)}</title><style>{_own('report.css')}</style></head><body>"

@@ -4,50 +4,59 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from pathlib import Path
+from typing import Any
 
 from ..markup import escaped, number
 from . import tables
 from .content import Columns, Content, read_content, signals_of, told_of
 from .document import head, write_document
+from .live import Live
 from .panels import panels
 from .wiring import draw_wiring
 
 _PARTS = {"verdicts": "Verdicts", "trains": "Trains", "signals": "Signals", "wiring": "Wiring", "made": "Provenance"}
 
 
-def write_runs(directories: Sequence[Path], path: Path, names: Sequence[str] = ()) -> Path:
+def write_runs(directories: Sequence[Path], path: Path, names: Sequence[str] = (), live: Live | None = None) -> Path:
     """Write the page of one run, or of several that are seen together.
 
     Args:
         directories: of the runs.
         path: of the file.
         names: what each is called; scenario and preset, or else the directory, by default.
+        live: the models of the one run, if they are in its page.
 
     Raises:
         ScenarioError: there is no run that can be read.
         RailcosimError: the library that draws is not installed, or the file cannot be written.
     """
-    columns = Columns()
+    columns = Columns(live=live is not None)
     contents = [read_content(directory, columns) for directory in directories]
     names = list(names) or _names(contents)
-    data = {
+    data: dict[str, Any] = {
         "runs": [told_of(content, name, columns) for content, name in zip(contents, names, strict=True)],
         "signals": signals_of(contents),
         "panels": panels(contents, names, columns),
     }
-    body = _body(contents, names, columns)
-    return write_document(path, contents[0].title, body, data, columns, scripts=("trains.js", "report.js"))
+    scripts = ["trains.js", "report.js"]
+    if live is not None:
+        data["live"] = live.data
+        scripts.insert(1, "live.js")
+    body = _body(contents, names, columns, live)
+    return write_document(path, contents[0].title, body, data, columns, scripts=scripts)
 
 
-def _body(contents: Sequence[Content], names: Sequence[str], columns: Columns) -> Iterator[str]:
+def _body(contents: Sequence[Content], names: Sequence[str], columns: Columns, live: Live | None) -> Iterator[str]:
     lines = [
         f'<span class="{"holds" if content.record.get("status") == "completed" else "broken"}">'
         f"{escaped(content.record.get('status', ''))}</span> {escaped(name)}"
         for content, name in zip(contents, names, strict=True)
     ]
-    yield head(contents[0].title, lines, _PARTS)
+    parts = _PARTS if live is None else {"live": "Live", **_PARTS}
+    yield head(contents[0].title, lines, parts)
     yield "<main>"
     yield _verdicts(contents, names)
+    yield "" if live is None else live.section
     yield '<section id="trains" hidden><h2>Trains</h2></section>'
     yield '<section id="signals"><h2>Signals</h2><noscript><p>The curves need JavaScript.</p></noscript></section>'
     yield _wirings(contents, names)

@@ -9,6 +9,7 @@ from typing import Any
 from ..errors import RailcosimError
 from ..figures import bands_of, bracketed, curves_of, filled_title, marks_of, number, panels_of, x_label_of
 from .content import Columns, Content, requirements_of
+from .live import tracks_of
 
 
 @dataclass(frozen=True)
@@ -93,7 +94,8 @@ def _lines(shown: _Shown, panel: Mapping[str, Any], columns: Columns) -> Iterato
         return
     scale = float(panel.get("scale", 1.0))
     over_time, stepwise = panel.get("x") is None, content.stepwise
-    for k, curve in enumerate(curves):
+    tracks = tracks_of(panel, content.results) if columns.live else [{}] * len(curves)
+    for k, (curve, track) in enumerate(zip(curves, tracks, strict=True)):
         label = curve.label.replace("\\$", "$")
         recorded = curve.signals & content.places.keys()
         line: dict[str, Any] = {
@@ -107,6 +109,7 @@ def _lines(shown: _Shown, panel: Mapping[str, Any], columns: Columns) -> Iterato
         else:
             line["column"] = columns.add(curve.y * scale)
             line |= {} if over_time and len(curve.y) == content.results.points else {"x": columns.add(curve.x)}
+        line |= track
         line |= {"steps": True} if over_time and recorded and recorded <= stepwise else {}
         marked = [told for signals, told in shown.decided if recorded and recorded <= signals]
         yield line | ({"decided": marked} if marked else {})

@@ -7,31 +7,45 @@ from pathlib import Path
 
 from ..errors import ScenarioError
 from ..run import read_json
+from .live import make_live
 from .page import write_runs
 
 REPORT_FILE = "report.html"
 _COMPARISON = "compare.json"
 
 
-def write_report(directories: Sequence[Path], output: Path | None = None, names: Sequence[str] = ()) -> Path:
+def write_report(
+    directories: Sequence[Path],
+    output: Path | None = None,
+    names: Sequence[str] = (),
+    *,
+    live: bool = False,
+    trust: bool = False,
+) -> Path:
     """Write the page of what directories hold.
 
     Args:
         directories: of runs or comparisons, which are seen together.
         output: the file; in the first of the directories by default.
         names: what each run is called; scenario and preset, or else the directory, by default.
+        live: whether the models of the run are in the page, to change their parameters; it is a single run then.
+        trust: see `make_live`.
 
     Returns:
         The file.
 
     Raises:
-        ScenarioError: a directory holds nothing that can be read.
+        ScenarioError: a directory holds nothing that can be read, or no run that a page can do again.
+        ComponentError: a model cannot be compiled for a page.
         RailcosimError: the library that draws is not installed, or the file cannot be written.
     """
     path = output if output is not None else directories[0] / REPORT_FILE
     found = [pair for directory in directories for pair in _runs_in(directory)]
     known = list(names) or ([name for name, _ in found] if all(name for name, _ in found) else [])
-    return write_runs([each for _, each in found], path, known)
+    if live and len(found) > 1:
+        raise ScenarioError("a live page has the models of one run: name one directory, or leave --live out")
+    models = make_live(found[0][1], trust=trust) if live else None
+    return write_runs([each for _, each in found], path, known, models)
 
 
 def _runs_in(directory: Path) -> Iterator[tuple[str, Path]]:

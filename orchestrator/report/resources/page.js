@@ -22,10 +22,12 @@ const page = (() => {
     for (let k = 0; k < raw.length; k++) bytes[k] = raw.charCodeAt(k);
     return bytes;
   };
+  const inflated = async (text) => {
+    const stream = new Blob([bytesOf(text)]).stream().pipeThrough(new DecompressionStream("deflate-raw"));
+    return new Uint8Array(await new Response(stream).arrayBuffer());
+  };
   const unpack = async (place) => {
-    const told = data.columns[place];
-    const stream = new Blob([bytesOf(document.getElementById(`column-${place}`).textContent)]).stream();
-    const bytes = new Uint8Array(await new Response(stream.pipeThrough(new DecompressionStream("deflate-raw"))).arrayBuffer());
+    const told = data.columns[place], bytes = await inflated(document.getElementById(`column-${place}`).textContent);
     const n = told.points, whole = new Uint8Array(4 * n);
     for (let part = 0; part < 4; part++) for (let k = 0; k < n; k++) whole[4 * k + part] = bytes[part * n + k];
     const single = new Float32Array(whole.buffer), values = new Float64Array(n);
@@ -36,6 +38,7 @@ const page = (() => {
     if (!unpacked.has(place)) unpacked.set(place, unpack(place));
     return unpacked.get(place);
   };
+  const live = new Map(); // signals as the live models of the page have computed them, by name
   const timeOf = async (run) => {
     if (typeof run.time === "number") return column(run.time);
     const values = new Float64Array(run.points), { first, last } = run.time;
@@ -118,5 +121,5 @@ const page = (() => {
     for (const grid of plot.center) if ("grid_line_color" in grid) grid.grid_line_color = style("--line");
   };
 
-  return { data, COLOURS, DASHES, VERDICTS, make, digits, column, timeOf, placeIn, outline, thinned, shape, style, dark, still, shades };
+  return { data, COLOURS, DASHES, VERDICTS, make, digits, column, inflated, live, timeOf, placeIn, outline, thinned, shape, style, dark, still, shades };
 })();

@@ -36,7 +36,7 @@ const { Explorer, Panel } = (() => {
 
   class Explorer {
     constructor(runs, host, times) {
-      this.runs = runs; this.host = host; this.times = times; this.panels = []; this.listeners = []; this.chosen = new Set();
+      this.runs = runs; this.host = host; this.times = times; this.panels = []; this.listeners = []; this.trains = []; this.chosen = new Set();
       const ends = times.filter((time) => time.length);
       this.axis = new Axis(Math.min(...ends.map((time) => time[0])), Math.max(...ends.map((time) => time[time.length - 1])), () => this.moved());
       this.now = this.axis.whole[0];
@@ -106,7 +106,7 @@ const { Explorer, Panel } = (() => {
       const known = new Map(data.signals.map((one) => [one.name, one])), several = this.runs.length > 1;
       return names.filter((name) => known.has(name)).flatMap((name, k) => {
         const one = known.get(name);
-        return one.columns.map((place, run) => ({ label: several ? `${this.runs[run].name}: ${name}` : name, run, column: place, unit: one.unit, steps: one.steps,
+        return one.columns.map((place, run) => ({ label: several ? `${this.runs[run].name}: ${name}` : name, run, column: place, unit: one.unit, steps: one.steps, track: ["signal", name],
           decided: decided.filter((told) => told.run === run), look: several ? [run, k] : [k, Math.floor(k / COLOURS.length)] })).filter((line) => line.column !== null);
       });
     }

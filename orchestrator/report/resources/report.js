@@ -9,6 +9,7 @@
     const host = document.getElementById("signals"), times = await Promise.all(data.runs.map(timeOf));
     if (!data.runs.some((run) => run.points)) { host.append("No point was recorded."); return; }
     const explorer = new Explorer(data.runs, host, times);
+    document.dispatchEvent(new CustomEvent("explore", { detail: explorer }));
     for (const told of data.panels) explorer.add(told);
     if (!data.panels.length) explorer.show(data.signals.slice(0, 6).map((one) => one.name), false);
     explorer.at(explorer.now);
@@ -28,7 +29,8 @@
       const own = make("div");
       if (data.runs.length > 1) own.append(make("h3", {}, run.name));
       part.hidden = false; part.append(own);
-      await new Trains(k, own, explorer).load();
+      explorer.trains.push(new Trains(k, own, explorer));
+      await explorer.trains.at(-1).load();
     }
     await Promise.all(explorer.panels.slice(0, FIRST).map((panel) => panel.ready));
     explorer.queue.then(() => (document.documentElement.dataset.whole = "true"));

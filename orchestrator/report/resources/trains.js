@@ -1,7 +1,7 @@
 "use strict";
 // Trains on their line: where each is at the time of the cursor, over time, and how fast over place.
 const Trains = (() => {
-  const { COLOURS, make, digits, column, placeIn, style, dark } = page;
+  const { COLOURS, make, digits, column, live, placeIn, style, dark } = page;
   const STILL = 1e-3, NO_LIMIT = 200; // m/s
 
   class Trains {
@@ -32,9 +32,9 @@ const Trains = (() => {
       this.slider.addEventListener("input", () => this.explorer.at(this.first + (this.slider.value / 1000) * (this.last - this.first)));
       return make("div", { class: "bar", role: "group", "aria-label": "Animation" }, this.play, rates, follow, this.slider);
     }
-    async load() {
+    async take() { // where the trains are, as it is known now
       const places = new Map(page.data.signals.map((one) => [one.name, one.columns[this.place]]));
-      const get = (name) => (places.get(name) !== undefined ? column(places.get(name)) : null);
+      const get = (name) => live.get(name) ?? (places.get(name) !== undefined ? column(places.get(name)) : null);
       this.trains = await Promise.all(this.run.trains.map(async (train, k) => ({
         ...train, colour: COLOURS[k % COLOURS.length], x: await get(train.position), v: await get(train.speed), rear: train.tail ? await get(train.tail) : null,
         ceiling: await Promise.all(train.limits.map(get)), allowed: train.strip ? await get(train.strip) : null })));
@@ -46,7 +46,11 @@ const Trains = (() => {
         for (const values of train.ceiling) if (values[k] < NO_LIMIT && values[k] > fastest) fastest = values[k];
       }
       this.low = low - 0.02 * (high - low) - 1; this.high = high + 0.02 * (high - low) + 1; this.fastest = fastest;
-      const lines = this.run.trains.map((train, k) => ({ label: train.name, run: this.place, column: places.get(train.position), unit: "m", look: [k, Math.floor(k / COLOURS.length)] }));
+    }
+    async load() {
+      await this.take();
+      const places = new Map(page.data.signals.map((one) => [one.name, one.columns[this.place]]));
+      const lines = this.run.trains.map((train, k) => ({ label: train.name, run: this.place, column: places.get(train.position), unit: "m", track: ["signal", train.position], look: [k, Math.floor(k / COLOURS.length)] }));
       this.space = this.explorer.add({ title: "Position over time", label: "position [m]", lines, stays: true }, false, this.host);
       this.draw();
       await this.space.ready;
