@@ -54,7 +54,7 @@ def _resource(name: str) -> str:
 
 
 def check_live(system: System, kind: Kind) -> None:
-    """Refuse what a live page could not do, before a system runs.
+    """Refuse what a live page could not do, before a system runs; compile its models for a page.
 
     Args:
         system: what is to run.
@@ -62,12 +62,14 @@ def check_live(system: System, kind: Kind) -> None:
 
     Raises:
         ScenarioError: it cannot be checked, or done; all reasons together.
+        ComponentError: a model cannot be compiled for a page.
     """
     with Workspace() as workspace:
         checked = check(system, workspace, kind)
         kinds: dict[str, str] = {name: model.kind for name, model in checked.models.items()}
         if problems := [*_unable(kinds), *refusals(system, checked)]:
             raise ScenarioError(problems)
+        _modules(checked, workspace)
 
 
 def make_live(directory: Path, *, trust: bool = False) -> Live:
@@ -97,19 +99,16 @@ def make_live(directory: Path, *, trust: bool = False) -> Live:
         problems = [*refusals(system, checked), *_changed(record, checked)]
         if problems:
             raise ScenarioError(problems)
-        modules: dict[bytes, int] = {}
-        chosen = {}
-        for name, model in checked.models.items():
-            content = _module(system.instances[name], model, workspace)
-            chosen[name] = modules.setdefault(content, len(modules))
+        modules = _modules(checked, workspace)
         with assembled(checked) as master:
             plan = plan_of(checked, master)
+    distinct = list(dict.fromkeys(modules.values()))
     for instance in plan["instances"]:
         name = instance["name"]
-        instance |= {"module": chosen[name], "guid": checked.models[name].interface.guid}
+        instance |= {"module": distinct.index(modules[name]), "guid": checked.models[name].interface.guid}
     parameters = {name: value for name, value in record["parameters"].items() if isinstance(value, int | float)}
     data = {"plan": plan, "controls": controls_of(checked), "parameters": parameters}
-    return Live(data, [_packed(content) for content in modules])
+    return Live(data, [_packed(content) for content in distinct])
 
 
 def _unrepeatable(record: Mapping[str, Any]) -> list[Problem]:
@@ -176,6 +175,11 @@ def _tell_truth_values(system: System, models: Mapping[str, Model]) -> None:
         for what, value in instance.start.items():
             if variables[what].type == "Boolean":
                 instance.start[what] = bool(value)
+
+
+def _modules(checked: Checked, workspace: Workspace) -> dict[str, bytes]:
+    """The WebAssembly of every instance."""
+    return {name: _module(checked.system.instances[name], model, workspace) for name, model in checked.models.items()}
 
 
 def _module(instance: Instance, model: Model, workspace: Workspace) -> bytes:

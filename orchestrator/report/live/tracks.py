@@ -1,7 +1,7 @@
 """What the curves of a panel are made of, for a page to make them anew of other numbers.
 
-A track is a number (one that JSON lacks as text), ``["time"]``, ``["signal", name]``, ``["parameter", name]``, or one of
-`OPERATIONS` with its operands.
+A track is a number (one that JSON lacks as text), ``["time"]``, ``["signal", name]``, ``["parameter", name]``, or one
+of `OPERATIONS` with its operands.
 """
 
 from __future__ import annotations
