@@ -10,6 +10,7 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from concurrent.futures import CancelledError
 from typing import Any, NamedTuple, Protocol
 
+from ... import world
 from ..rows import Row
 from .pace import Pace
 
@@ -26,6 +27,8 @@ _DEADLY = 3
 """So many workers a run ends before it is a row that says so."""
 _TICK = 0.2
 """How often, in s, it is asked whether to go on."""
+_FETCH = 60.0
+"""How long, in s, a result may take to come from who has it: Dask's client does not recover from one cut short."""
 
 
 class Sender(Protocol):
@@ -105,6 +108,9 @@ class Flight:
 
     def _submit(self, chunk: _Chunk, *, with_files: bool = False) -> None:
         future = self._sender.submit([changes for _, changes in chunk.points], with_files=with_files)
+        self._await(future, chunk)
+
+    def _await(self, future: Future, chunk: _Chunk) -> None:
         self._flying[future.key] = future, chunk
         future.add_done_callback(self._landed.put)
 
@@ -112,11 +118,14 @@ class Flight:
         from distributed import KilledWorker
 
         _, chunk = self._flying.pop(future.key)
+        if future.status in ("pending", "lost"):  # its worker died before the result was fetched: it is had again
+            world.sleep(_TICK)  # of one that is lost it is told at once
+            self._await(future, chunk)
+            return
         try:
-            answer = future.result(timeout=_TICK)
-        except TimeoutError:  # its worker died before the result was fetched: it is had again
-            self._flying[future.key] = future, chunk
-            self._landed.put(future)
+            answer = future.result(timeout=_FETCH)
+        except TimeoutError:  # as above, meanwhile
+            self._await(future, chunk)
         except KilledWorker as error:
             yield from self._died(chunk, error.allowed_failures + 1)
         except (CancelledError, OSError):  # what goes wrong on a worker is no OSError

@@ -7,6 +7,7 @@ from concurrent.futures import CancelledError
 
 import pytest
 from distributed import KilledWorker
+from railcosim.orchestrator import world
 from railcosim.orchestrator.study import Row
 from railcosim.orchestrator.study.campaign.flight import Flight
 
@@ -14,7 +15,7 @@ from railcosim.orchestrator.study.campaign.flight import Flight
 class Future:
     """What comes back at once."""
 
-    numbers = itertools.count()
+    numbers, status = itertools.count(), "finished"
 
     def __init__(self, outcome):
         self.key, self._outcomes, self.is_cancelled = next(self.numbers), [*outcome], False
@@ -26,6 +27,7 @@ class Future:
         call(self)
 
     def result(self, timeout):
+        assert timeout == 60.0
         outcome = self._outcomes.pop(0) if len(self._outcomes) > 1 else self._outcomes[0]
         if isinstance(outcome, Exception):
             raise outcome
@@ -110,7 +112,12 @@ def test_a_scheduler_that_began_anew_gets_what_it_lost(error):
     assert workers.waits == 2
 
 
-def test_a_result_that_was_lost_with_its_worker_is_waited_for():
+@pytest.mark.parametrize("status", ["finished", "pending", "lost"])
+def test_a_result_that_was_lost_with_its_worker_is_waited_for(monkeypatch, status):
+    """No fetch is cut short for it: of that Dask's client does not recover."""
+    monkeypatch.setattr(world, "sleep", lambda seconds: None)
+    statuses = iter([status])
+    monkeypatch.setattr(Future, "status", property(lambda _: next(statuses, "finished")))
     workers = Workers(first=[TimeoutError()])
     assert len(fly(workers)) == 60
     assert sum(map(len, workers.sent)) == 60
