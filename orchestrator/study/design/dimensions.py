@@ -92,6 +92,9 @@ class Dimension:
 
 
 def _of_text(name: str, text: str) -> Dimension:
+    if re.match(r"signal\s*\(", text):  # with a rate its pieces depend on one another
+        remedy = "vary the values of a Schedule one by one: target.values[1]=60:85"
+        raise ScenarioError(Problem("", "a signal over time is for falsify and optimize", remedy))
     law = Law.read(text)
     if law is not None:
         return Dimension(name, law=law)

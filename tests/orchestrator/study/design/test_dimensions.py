@@ -100,6 +100,10 @@ def test_how_it_is_shown(text, shown):
         ("a.x=2:2:3", "--vary a.x=2:2:3: a grid from a number to itself; give the number alone"),
         ("a.x=1,,2", "--vary a.x=1,,2: a value is empty; is there a comma too many?"),
         ("a.x=1,2,1.0", "--vary a.x=1,2,1.0: 1.0 stands there twice; each value once"),
+        (
+            "a.x=signal(1, 2, 3, linear)",
+            "--vary a.x=signal(1, 2, 3, linear): a signal over time is for falsify and opti",
+        ),
         ("a.x=norml(1,2)", "--vary a.x=norml(1,2): there is no distribution 'norml'; did you mean 'normal'?"),
     ],
 )
