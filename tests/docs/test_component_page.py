@@ -4,7 +4,7 @@ import re
 from xml.etree import ElementTree
 
 import pytest
-from railcosim.components import CATALOGUE, AtoController, ComfortCruise, Component, CruiseController, Train
+from railcosim.components import CATALOGUE, AtoController, ComfortCruise, CruiseController, Train
 from railcosim.components.declarations import Data, Size
 from railcosim.orchestrator import load
 from railcosim.orchestrator.fmi import Workspace
@@ -107,13 +107,3 @@ def test_signals_are_constants_lines_with_jumps_or_one_for_each_element(componen
     line = signal([[0, 0], [10, 20], [10, 5], [20, 5]])
     assert (line(5.0), line(10.001), line(30.0)) == (10.0, 5.0, 5.0)
     assert signal([[[0, 0], [10, 20]], 7.0])(5.0) == [10.0, 7.0]
-
-
-@pytest.mark.long
-@pytest.mark.parametrize("name", NAMES)
-def test_every_figure_can_be_drawn(component_page, name):
-    component = CATALOGUE[name]()
-    assert isinstance(component, Component)
-    figure, caption = component_page.draw(component)
-    assert figure.count('id="axes_') == len(component_page.EXPERIMENTS[name]["panels"])
-    assert caption.endswith(".")

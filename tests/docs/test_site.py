@@ -25,13 +25,14 @@ def site(tmp_path_factory):
     return target
 
 
-def test_each_component_has_a_page_with_mathml_and_figure(site):
+def test_each_component_has_a_page_with_mathml_and_figure(site, component_page):
     for name, cls in CATALOGUE.items():
         page = (site / "components" / f"{name}.html").read_text(encoding="utf-8")
         assert page.count("<math ") == sum(text.count("$") for text in cls.equations) // 2
         assert "arithmatex" not in page
-        assert '<figure class="signals"' in page
-        assert "<svg" in page[page.index('<figure class="signals"') :]
+        figure = page[page.index('<figure class="signals"') : page.index("</figure>")]
+        assert figure.count('id="axes_') == len(component_page.EXPERIMENTS[name]["panels"])
+        assert figure.endswith(".</figcaption>")
 
 
 def test_nothing_is_loaded_from_elsewhere(site):
