@@ -210,7 +210,11 @@ def test_what_the_compiler_said_is_told(monkeypatch, tmp_path):
 
 
 @pytest.mark.parametrize(
-    "name", ["Tape", "tape", "Log", "state", "inputs", "equations", "all", "Noise", "instance", "library"]
+    "name",
+    [
+        *("Tape", "state", "all", "library"),
+        *(pytest.param(x, marks=pytest.mark.long) for x in ("tape", "Log", "inputs", "equations", "Noise", "instance")),
+    ],
 )
 def test_a_component_may_bear_the_name_of_a_file_of_the_runtime(write_component, unpack, name):
     text = component("return {'y': 2.0 * self.u}").replace("class C(", f"class {name}(")
@@ -238,10 +242,8 @@ def test_every_component_compiles_without_a_warning(tmp_path, reference):
 
 
 @pytest.mark.parametrize("compiler", COMPILERS)
-@pytest.mark.parametrize("name", ["PointMassTrain", "Learner", "Counter", "Mixed"])
-def test_the_optimizer_of_either_compiler_finds_nothing_to_warn_of(tmp_path, sample, name, compiler):
-    path = {"PointMassTrain": name, "Mixed": MIXED}.get(name) or sample(name)
-    strictly_compiled(path, tmp_path, compiler, "-O2")
+def test_the_optimizer_of_either_compiler_finds_nothing_to_warn_of(tmp_path, compiler):
+    strictly_compiled(MIXED, tmp_path, compiler, "-O2")
 
 
 @pytest.mark.long
@@ -386,7 +388,10 @@ def test_the_cross_compiler_gives_the_same_bits(tmp_path, what):
         assert np.array_equal(ours[name], cross[name]), name
 
 
-@pytest.mark.parametrize("what", ["PointMassTrain", MIXED, "Learner", "Dice", "Counter"])
+@pytest.mark.parametrize(
+    "what",
+    [MIXED, *(pytest.param(x, marks=pytest.mark.long) for x in ("PointMassTrain", "Learner", "Dice", "Counter"))],
+)
 def test_the_whole_interface_runs_clean_under_the_sanitizers(tmp_path, sample, what):
     """AddressSanitizer (leaks included) and UndefinedBehaviorSanitizer, on a driver that calls everything."""
     if shutil.which("gcc") is None:
