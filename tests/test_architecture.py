@@ -14,7 +14,8 @@ PACKAGES = ("components", "fmus", "orchestrator")
 ORDER = (
     ("",),  # orchestrator/__init__.py
     ("cli",),
-    ("driving", "report", "study"),
+    ("report",),
+    ("driving", "study"),
     ("linearization", "comparison", "packing"),
     ("run",),
     ("validation",),

@@ -12,7 +12,10 @@ from .options import Quiet, Trust
 
 
 def report(
-    results: Annotated[list[Path], typer.Argument(help="The directory of a run; of several, to see them together.")],
+    results: Annotated[
+        list[Path],
+        typer.Argument(help="Directories of runs, to see them together; or that of a comparison, a study or a search."),
+    ],
     output: Annotated[
         Path | None, typer.Option("--output", "-o", help="The file; report.html in the first directory by default.")
     ] = None,
@@ -26,7 +29,7 @@ def report(
     trust: Trust = False,
     quiet: Quiet = False,
 ) -> Answer:
-    """Make one page of a run: curves to zoom, trains on their line, verdicts, wiring, provenance.
+    """Make one page of runs: curves to zoom, trains on their line, verdicts, wiring, provenance; or of a study.
 
     The page is a file that opens in any browser, from disk and without a network. Needs the extra 'report'.
     """

@@ -20,6 +20,7 @@ from .options import (
     KindName,
     Preset,
     Quiet,
+    Report,
     Scenario,
     Scheduler,
     Set,
@@ -84,6 +85,7 @@ def study(
         Path | None, typer.Option("--output", "-o", help="Directory; results/<scenario>-study by default.")
     ] = None,
     no_figures: Annotated[bool, typer.Option("--no-figures", help="Draw nothing.")] = False,
+    report: Report = False,
     quiet: Quiet = False,
 ) -> Answer:
     """Run a scenario many times, with other values each time: one table of all runs.
@@ -97,9 +99,13 @@ def study(
     from ..study.design import make_plan, plan_notes
     from .documents import study_document
     from .lines import tell
-    from .printing import show_runs, show_study
+    from .printing import show_page, show_runs, show_study
 
     check_workers(workers, scheduler)
+    if report:
+        from ..report import check_drawable
+
+        check_drawable()
     system = load_system(scenario, preset, settings, builds, swaps, stop=stop, step=step, algorithm=algorithm)
     plan = make_plan(system, vary or (), runs=runs, seed=seed, design=design)
     how: dict[str, Any] = {
@@ -129,10 +135,20 @@ def study(
             begun=shown.begun,
         )
     figures = [] if no_figures or done.signal else done.draw()
+    page = None
+    if report and not done.signal:
+        from ..report import write_report
+
+        page = write_report([directory])
     code = FMU_FAILED if done.broken else FAILED if done.failed else OK
+
+    def show() -> None:
+        show_study(done, quiet, len(figures))
+        show_page(page, quiet)
+
     return Answer(
-        lambda: study_document(done, figures),
-        lambda: show_study(done, quiet, len(figures)),
+        lambda: study_document(done, figures, page),
+        show,
         interrupted(done.signal) if done.signal else code,
     )
 

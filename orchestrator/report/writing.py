@@ -1,4 +1,4 @@
-"""Which page belongs to directories: of a run, or of the variants of a comparison."""
+"""Which page belongs to directories: of a run, of the variants of a comparison, of a study or a search."""
 
 from __future__ import annotations
 
@@ -7,11 +7,12 @@ from pathlib import Path
 
 from ..errors import ScenarioError
 from ..run import read_json
+from . import studies
 from .live import make_live
 from .page import write_runs
 
 REPORT_FILE = "report.html"
-_COMPARISON = "compare.json"
+_RUN, _COMPARISON, _STUDIES = "run.json", "compare.json", ("study.json", "search.json")
 
 
 def write_report(
@@ -25,7 +26,7 @@ def write_report(
     """Write the page of what directories hold.
 
     Args:
-        directories: of runs or comparisons, which are seen together.
+        directories: of runs or comparisons, which are seen together; or of one study or search.
         output: the file; in the first of the directories by default.
         names: what each run is called; scenario and preset, or else the directory, by default.
         live: whether the models of the run are in the page, to change their parameters; it is a single run then.
@@ -35,11 +36,19 @@ def write_report(
         The file.
 
     Raises:
-        ScenarioError: a directory holds nothing that can be read, or no run that a page can do again.
+        ScenarioError: a directory holds nothing that can be read, what does not go with the others, or no run that a
+            page can do again.
         ComponentError: a model cannot be compiled for a page.
         RailcosimError: the library that draws is not installed, or the file cannot be written.
     """
     path = output if output is not None else directories[0] / REPORT_FILE
+    many = [directory for directory in directories if _is_study(directory)]
+    if many and len(directories) > 1:
+        raise ScenarioError(f"{many[0]} is a study or a search, of which a page shows one alone; make one of each")
+    if many and live:
+        raise ScenarioError(f"{many[0]} is a study or a search: a live page has the models of one run; replay one")
+    if many:
+        return studies.write_study(directories[0], path)
     found = [pair for directory in directories for pair in _runs_in(directory)]
     known = list(names) or ([name for name, _ in found] if all(name for name, _ in found) else [])
     if live and len(found) > 1:
@@ -48,9 +57,14 @@ def write_report(
     return write_runs([each for _, each in found], path, known, models)
 
 
+def _is_study(directory: Path) -> bool:
+    """Whether it holds a study or a search, and no run."""
+    return not (directory / _RUN).is_file() and any((directory / name).is_file() for name in _STUDIES)
+
+
 def _runs_in(directory: Path) -> Iterator[tuple[str, Path]]:
     """The run that a directory holds, or those of the variants that were compared there, with their names."""
-    if (directory / "run.json").is_file() or not (directory / _COMPARISON).is_file():
+    if (directory / _RUN).is_file() or not (directory / _COMPARISON).is_file():
         yield "", directory
         return
     try:
@@ -60,7 +74,7 @@ def _runs_in(directory: Path) -> Iterator[tuple[str, Path]]:
     runs = [
         (name, directory / folder)
         for name, folder in told
-        if isinstance(folder, str) and Path(folder).name == folder and (directory / folder / "run.json").is_file()
+        if isinstance(folder, str) and Path(folder).name == folder and (directory / folder / _RUN).is_file()
     ]
     if not runs:
         raise ScenarioError(f"{directory}: no variant that was compared has left results")

@@ -21,6 +21,7 @@ class StudyDocument:
         verdicts: of each requirement, how many of each kind. summary: how often they hold, how metrics are spread.
         sensitivities: what the parameters do to each output.
         directory: with runs.parquet, one row a run. interrupted: whether a signal ended it before its time.
+        report: the page that was made of it.
     """
 
     scenario: str
@@ -35,14 +36,16 @@ class StudyDocument:
     sensitivities: list[Sensitivity]
     directory: str
     figures: list[str]
+    report: str | None
 
 
-def study_document(study: Study, figures: Sequence[Path]) -> StudyDocument:
+def study_document(study: Study, figures: Sequence[Path], report: Path | None) -> StudyDocument:
     """The document of a study.
 
     Args:
         study: that was run.
         figures: that were drawn of it.
+        report: the page that was made.
     """
     told = study.told
     return StudyDocument(
@@ -58,6 +61,7 @@ def study_document(study: Study, figures: Sequence[Path]) -> StudyDocument:
         study.sensitivities(),
         str(study.directory),
         [str(path) for path in figures],
+        None if report is None else str(report),
     )
 
 

@@ -1,6 +1,11 @@
-"""Runs whose pages are looked at."""
+"""Runs whose pages are looked at, and a browser to open them from disk with the network off.
 
+Screenshots stay in ``build/pages`` to be looked at.
+"""
+
+import shutil
 from functools import partial
+from pathlib import Path
 
 import pytest
 from railcosim.orchestrator import System, run
@@ -67,3 +72,66 @@ def tell(*directories):
 def told():
     """Tells what a page is given of runs."""
     return tell
+
+
+@pytest.fixture(scope="module")
+def browser():
+    """A Chromium, where there is one."""
+    api = pytest.importorskip("playwright.sync_api", reason="playwright is not installed")
+    found = shutil.which("chromium")
+    if found is None:
+        pytest.skip("there is no chromium")
+    with api.sync_playwright() as driver:
+        started = driver.chromium.launch(executable_path=found, args=["--no-sandbox", "--disable-gpu"])
+        yield started
+        started.close()
+
+
+@pytest.fixture
+def opened(browser):
+    """Opens a page; whatever the browser complains of fails the test in the end."""
+    complaints, contexts = [], []
+
+    def open_page(path, scheme="light", width=1280):
+        context = browser.new_context(color_scheme=scheme, viewport={"width": width, "height": 900}, offline=True)
+        contexts.append(context)
+        page = context.new_page()
+        page.on("console", lambda said: complaints.append(said.text) if said.type in ("error", "warning") else None)
+        page.on("pageerror", lambda error: complaints.append(str(error)))
+        page.on("dialog", lambda dialog: (complaints.append(dialog.message), dialog.dismiss()))
+        page.on(
+            "request",
+            lambda asked: complaints.append(asked.url) if not asked.url.startswith(("file:", "blob:")) else None,
+        )
+        page.goto(path.as_uri())
+        page.wait_for_selector("html[data-ready]", timeout=30_000)
+        return page
+
+    yield open_page
+    for context in contexts:
+        context.close()
+    assert not complaints
+
+
+@pytest.fixture
+def pictures():
+    """The folder of screenshots."""
+    folder = Path(__file__).parents[3] / "build" / "pages"
+    folder.mkdir(parents=True, exist_ok=True)
+    return folder
+
+
+@pytest.fixture
+def looked_at(pictures):
+    """Keeps a picture of a whole page, and fails for what axe-core finds of WCAG, but for what is not serious."""
+    axe = pytest.importorskip("axe_playwright_python.sync_playwright", reason="axe-playwright-python is not installed")
+
+    def look(page, name):
+        page.wait_for_selector("html[data-whole]", timeout=30_000)
+        page.wait_for_timeout(300)
+        page.screenshot(path=pictures / f"{name}.png", full_page=True)
+        assert page.evaluate("() => document.documentElement.scrollWidth <= innerWidth"), "it is wider than the screen"
+        found = axe.Axe().run(page).response["violations"]
+        assert not [each["id"] for each in found if each["impact"] in ("serious", "critical")], found
+
+    return look

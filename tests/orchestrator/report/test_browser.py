@@ -1,54 +1,14 @@
 """Pages in a browser, from disk and with the network off: they draw, zoom, move and can be used by keyboard alone.
 
-Screenshots stay in ``build/pages`` to be looked at.
+What the pages of runs do; ``studies/`` has those of studies.
 """
-
-import shutil
-from pathlib import Path
 
 import pytest
 from railcosim.orchestrator import load, run
 from railcosim.orchestrator.errors import FmuError
 from railcosim.orchestrator.report import write_report
 
-CHROMIUM = shutil.which("chromium")
-playwright = pytest.importorskip("playwright.sync_api", reason="playwright is not installed")
-axe = pytest.importorskip("axe_playwright_python.sync_playwright", reason="axe-playwright-python is not installed")
-pytestmark = [pytest.mark.long, pytest.mark.skipif(CHROMIUM is None, reason="there is no chromium")]
-PICTURES = Path(__file__).parents[3] / "build" / "pages"
-
-
-@pytest.fixture(scope="module")
-def browser():
-    with playwright.sync_playwright() as driver:
-        started = driver.chromium.launch(executable_path=CHROMIUM, args=["--no-sandbox", "--disable-gpu"])
-        yield started
-        started.close()
-
-
-@pytest.fixture
-def opened(browser):
-    """Opens a page; whatever the browser complains of fails the test in the end."""
-    complaints, contexts = [], []
-
-    def open_page(path, scheme="light", width=1280):
-        context = browser.new_context(color_scheme=scheme, viewport={"width": width, "height": 900}, offline=True)
-        contexts.append(context)
-        page = context.new_page()
-        page.on("console", lambda said: complaints.append(said.text) if said.type in ("error", "warning") else None)
-        page.on("pageerror", lambda error: complaints.append(str(error)))
-        page.on(
-            "request",
-            lambda asked: complaints.append(asked.url) if not asked.url.startswith(("file:", "blob:")) else None,
-        )
-        page.goto(path.as_uri())
-        page.wait_for_selector("html[data-ready]", timeout=30_000)
-        return page
-
-    yield open_page
-    for context in contexts:
-        context.close()
-    assert not complaints
+pytestmark = pytest.mark.long
 
 
 @pytest.fixture(scope="module")
@@ -56,20 +16,6 @@ def comfort(tmp_path_factory):
     directory = tmp_path_factory.mktemp("comfort") / "run"
     run(load("comfort_cruise"), output=directory, figures=False)
     return write_report([directory])
-
-
-def photographed(page, name):
-    """Keep a picture of the whole page to be looked at."""
-    PICTURES.mkdir(parents=True, exist_ok=True)
-    page.wait_for_selector("html[data-whole]", timeout=30_000)
-    page.wait_for_timeout(300)
-    page.screenshot(path=PICTURES / f"{name}.png", full_page=True)
-
-
-def has_no_barrier(page):
-    """What axe-core finds of WCAG, but for what is not serious."""
-    found = axe.Axe().run(page).response["violations"]
-    assert not [each["id"] for each in found if each["impact"] in ("serious", "critical")], found
 
 
 def clock(page):
@@ -84,12 +30,10 @@ def seen(page):
 
 
 @pytest.mark.parametrize(("scheme", "width"), [("light", 1280), ("dark", 400)])
-def test_a_run(opened, comfort, scheme, width):
+def test_a_run(opened, comfort, scheme, width, looked_at):
     page = opened(comfort, scheme, width)
-    photographed(page, f"comfort_cruise_{scheme}_{width}")
+    looked_at(page, f"comfort_cruise_{scheme}_{width}")
     assert page.locator(".panel").count() == 9  # one of them is of the trains
-    assert page.evaluate("() => document.documentElement.scrollWidth <= innerWidth"), "it is wider than the screen"
-    has_no_barrier(page)
 
 
 def test_zoom_and_hover(opened, comfort):
@@ -171,16 +115,15 @@ def test_names_that_want_to_be_markup(opened, directory):
     assert page.locator("img").count() == 0
 
 
-def test_two_runs(opened, wavy, directory, tmp_path):
+def test_two_runs(opened, wavy, directory, tmp_path, looked_at):
     run(wavy(stop_time=10.0), kind="native", output=tmp_path / "other", figures=False)
     page = opened(write_report([directory, tmp_path / "other"]))
     assert page.locator(".legend [aria-pressed]").count() == 2 * (4 + 1 + 1)
-    photographed(page, "two_runs")
+    looked_at(page, "two_runs")
     page.locator("th").get_by_role("button", name="metric").click()
-    has_no_barrier(page)
 
 
-def test_a_failed_run(opened, wavy, mine, tmp_path):
+def test_a_failed_run(opened, wavy, mine, tmp_path, looked_at):
     """What failed, when and who stands on top; what was recorded until then is drawn."""
     system = wavy()
     system.add("fails", mine("Fails"), until=5.0)
@@ -189,8 +132,7 @@ def test_a_failed_run(opened, wavy, mine, tmp_path):
     page = opened(write_report([tmp_path]))
     assert page.locator("header .broken").text_content() == "failed"
     assert page.locator("#verdicts li.broken").text_content().startswith("fails, t = 5")
-    photographed(page, "failed_run")
-    has_no_barrier(page)
+    looked_at(page, "failed_run")
 
 
 def test_a_curve_over_another_signal(opened, directory):
@@ -212,7 +154,7 @@ def test_a_curve_over_another_signal(opened, directory):
     assert clock(page) == 20.0
 
 
-def test_signals_of_two_units_have_two_axes(opened, comfort):
+def test_signals_of_two_units_have_two_axes(opened, comfort, pictures):
     page = opened(comfort)
     page.get_by_text("Choose signals").click()
     for name in ("train[1].speed", "cruise[1].force"):
@@ -223,4 +165,4 @@ def test_signals_of_two_units_have_two_axes(opened, comfort):
     assert page.evaluate("() => Bokeh.documents.at(-1).roots()[0].right.map((axis) => axis.axis_label)") == ["[N]"]
     shown = page.locator("#signals .panel").first.locator("output").all_text_contents()
     assert [text.split()[-1] for text in shown] == ["m/s", "N"]
-    page.locator("#signals .panel").first.screenshot(path=PICTURES / "two_units.png")
+    page.locator("#signals .panel").first.screenshot(path=pictures / "two_units.png")

@@ -1,0 +1,3 @@
+from .page import write_study
+
+__all__ = ["write_study"]
