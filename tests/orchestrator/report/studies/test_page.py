@@ -71,4 +71,4 @@ def test_a_study_makes_its_page(study, tmp_path, capsys):
     assert f"Report: {directory / 'report.html'}" in capsys.readouterr().out
     again = tmp_path / "again"
     assert cli.call([*words, "-o", str(again), "--report", "--json"]) == 1
-    assert json.loads(capsys.readouterr().out)["report"] == str(again / "report.html")
+    assert json.loads(capsys.readouterr().out)["result"]["report"] == str(again / "report.html")
