@@ -149,7 +149,7 @@ def told_of_search(directory: Path) -> Told:
 
 def _labels(frame: pd.DataFrame, objectives: Iterable[str]) -> dict[str, str]:
     """What the columns of objectives are called: those of expressions are numbered in the table."""
-    found = {}
+    found: dict[str, str] = {}
     for k, text in enumerate(objectives, 1):
         numbered = [name for name in map(str, frame) if name.rstrip("_") == f"metric.objective_{k}"]
         own = f"metric.{text}"
