@@ -14,6 +14,7 @@ from typing import Any
 
 import component_page
 import json_page
+import notebook_page
 import typer
 from latex2mathml.converter import convert
 from mkdocs.config.defaults import MkDocsConfig
@@ -60,6 +61,11 @@ def on_files(files: Files, config: MkDocsConfig) -> Files:
     pages |= {"components/index.md": overview(), "reference/command_line.md": command_line()}
     for name, text in pages.items():
         files.append(File.generated(config, name, content=text))
+    for name in notebook_page.names():
+        notebook = notebook_page.page(name)
+        files.append(File.generated(config, f"notebooks/{name}.md", content=notebook.text))
+        for picture, content in notebook.pictures.items():
+            files.append(File.generated(config, f"notebooks/{picture}", content=content))
     for section in config.nav or []:
         if "Components" in section:
             section["Components"] = ["components/index.md", *_navigation()]

@@ -6,6 +6,7 @@ import math
 import threading
 from collections.abc import Iterator
 from contextlib import contextmanager
+from importlib.util import find_spec
 from typing import Any
 
 from rich.console import Console
@@ -60,7 +61,7 @@ class Bar:
 
 @contextmanager
 def progress_bar(title: str = "", start: float = 0.0, *, console: Console | None = None) -> Iterator[Bar]:
-    """A bar for as long as the block lasts; in a pipe or file nothing is shown.
+    """A bar for as long as the block lasts; in a pipe or file, or a notebook without ipywidgets, nothing is shown.
 
     ``with progress_bar("night train") as bar: run(system, progress=bar)``.
 
@@ -70,7 +71,8 @@ def progress_bar(title: str = "", start: float = 0.0, *, console: Console | None
         console: of rich; standard error by default.
     """
     out = console or Console(stderr=True)
-    if not (out.is_terminal or out.is_jupyter):
+    shows = find_spec("ipywidgets") is not None if out.is_jupyter else out.is_terminal
+    if not shows:
         yield Bar(None, title, start)
         return
     from rich.progress import Progress

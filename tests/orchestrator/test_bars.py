@@ -60,6 +60,14 @@ def test_in_a_pipe_and_within_a_second_nothing_is_shown():
         assert not [each for each in threading.enumerate() if isinstance(each, threading.Timer)]
 
 
+@pytest.mark.parametrize("there", [False, True])
+def test_in_a_notebook_it_takes_ipywidgets(there, monkeypatch):
+    monkeypatch.setattr(bars, "find_spec", lambda _: there or None)
+    with progress_bar("in a notebook", console=Console(force_jupyter=True)) as bar:
+        bar(1.0, 2.0)
+    assert (bar._display is not None) == there
+
+
 def test_a_run_of_a_script_can_have_one(clock, tmp_path):
     text = "[simulation]\nstop_time = 1.0\nstep = 0.5\n[instances.train]\nstart.force = 0.0\n"
     (tmp_path / "train.toml").write_text(text + 'component = "PointMassTrain"\n')
