@@ -134,7 +134,8 @@ def plot(expressions: Sequence[str], signals: Signals, ax: "Axes | None" = None)
 
         ax = pyplot.subplots()[1]
     curves = curves_of(panel, signals)
-    styles = ({"color": colour(k, len(curves))} for k in range(len(curves)))
+    there = len(ax.get_lines())  # of another run: its curves keep their colours to themselves
+    styles = ({"color": colour(there + k, there + len(curves))} for k in range(len(curves)))
     draw_curves(ax, panel, zip(curves, styles, strict=True), signals, x_label=True)
     ax.legend()
     return ax

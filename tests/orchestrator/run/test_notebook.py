@@ -83,7 +83,7 @@ def test_a_plot(system):
     assert len(drawn.lines) == 3
     assert drawn.get_xlabel() == "time [s]"
     assert outcome.plot("lag[1].x", ax=drawn) is drawn
-    assert len(drawn.lines) == 4
+    assert len(drawn.lines) == len({line.get_color() for line in drawn.lines}) == 4
     with pytest.raises(ScenarioError, match=r"lag\[3\]"):
         outcome.plot("lag[3].x")
     plt.close("all")
