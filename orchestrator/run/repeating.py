@@ -80,7 +80,7 @@ class Repeater:
         fixed = {f"{name}.{v.name}": v.start for name, face in interfaces.items() for v in face.of("parameter")}
         self._fixed: dict[str, Any] = fixed
         constant = fixed.keys() | checked.wiring.left.keys()
-        self._names = [name for name in signal_names(interfaces, checked.wiring) if name not in constant]
+        self._names = dict.fromkeys(x for x in signal_names(interfaces, checked.wiring) if x not in constant)
         self._units = checked.units
 
     def fly(self, checked: Checked, interruption: Interruption) -> Flown | None:
