@@ -28,6 +28,10 @@ _CONFIG = {
     "distributed.scheduler.allowed-failures": 0,  # which run ends its worker is found by division
     "distributed.scheduler.worker-ttl": None,  # a long step is no death; of that the connection tells
     "distributed.admin.large-graph-warning-threshold": "1TiB",  # an FMU is as large as it is
+    # Dask watches itself all the time: it took a twentieth of two processors.
+    "distributed.worker.profile.enabled": False,
+    "distributed.admin.tick.interval": "1s",
+    "distributed.admin.system-monitor.interval": "2s",
 }
 
 
