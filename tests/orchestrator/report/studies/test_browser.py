@@ -1,5 +1,6 @@
 """Pages of studies in a browser: points show their runs, limits sift them, and the keyboard reaches everything."""
 
+import pandas as pd
 import pytest
 from railcosim.orchestrator.report import write_report
 
@@ -97,3 +98,19 @@ def test_a_search(opened, search, looked_at):
     page.keyboard.press("Enter")
     assert page.locator("#run .broken").first.text_content() == "it <fails>"
     looked_at(page, "search")
+
+
+def test_texts_that_want_to_run(opened, search, hostile, is_inert):
+    text = hostile
+    frame = pd.DataFrame({"run": [0, 1], "status": [text, "completed"], "error": [text, ""], text: [text, "other"]})
+    frame = frame.assign(
+        **{f"metric.{text}": [1.0, 2.0], f"margin.{text}": [1.0, 2.0], f"verdict.{text}": [text, "pass"]}
+    )
+    directory = search(minimize=[text], best=[{"run": 0, "scenario": text, "values": [1.0]}], vary=[text], seed=text)
+    frame.to_parquet(directory / "runs.parquet")
+    page = opened(write_report([directory]))
+    page.evaluate("() => document.querySelectorAll('details').forEach((one) => (one.open = true))")
+    page.locator("#summary [data-number]").first.click()
+    page.wait_for_timeout(300)
+    is_inert(page)
+    assert text[:16] in page.locator("#run").text_content()
