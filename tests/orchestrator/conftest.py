@@ -1,6 +1,8 @@
 """What the tests of the orchestrator share: a cache of their own, components of a user's, FMUs of another maker's."""
 
+import ast
 import contextlib
+import functools
 import hashlib
 import os
 import shutil
@@ -106,9 +108,27 @@ def own_cache(session_cache):
 
 
 @pytest.fixture(scope="session")
-def mine():
-    """Reference of a toy component by its class name: a component of a user's, in a file of theirs."""
-    return lambda cls: f"{TOYS}:{cls}"
+def mine(session_cache):
+    """Reference of a toy component by its class name: a component of a user's, in a file of theirs.
+
+    The file has this toy alone, in its lines: a user's file is run each time one of its components is asked for.
+    """
+    text = TOYS.read_text(encoding="utf-8")
+    places = {node.name: node for node in ast.parse(text).body if isinstance(node, ast.ClassDef)}
+
+    @functools.cache
+    def alone(cls):
+        lines = text.splitlines()
+        for node in (node for name, node in places.items() if name != cls):
+            lines[node.lineno - 1 : node.end_lineno] = [""] * (node.end_lineno - node.lineno + 1)
+        path = session_cache.with_name("toys") / cls / TOYS.name
+        path.parent.mkdir(parents=True, exist_ok=True)
+        own = path.with_suffix(f".{os.getpid()}")
+        own.write_text("\n".join(lines) + "\n", encoding="utf-8")
+        own.replace(path)  # other processes of the session write the same
+        return f"{path}:{cls}"
+
+    return alone
 
 
 @pytest.fixture

@@ -13,11 +13,13 @@ from railcosim.orchestrator.run.execution import execute, resume, run
 from railcosim.orchestrator.run.recording import Results
 from railcosim.orchestrator.system import Event, System
 
+TOYS = Path(__file__).parents[2] / "toys.py"
+
 
 @pytest.fixture
-def mine(mine, tmp_path):
+def mine(tmp_path):
     """A toy out of a file that a test may change."""
-    path = Path(shutil.copy(mine("Lag").rpartition(":")[0], tmp_path / "mine.py"))
+    path = Path(shutil.copy(TOYS, tmp_path / "mine.py"))
     return lambda cls: f"{path}:{cls}"
 
 

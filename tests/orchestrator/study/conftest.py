@@ -1,6 +1,7 @@
 """A small system of toys that batches run."""
 
 import logging
+import re
 
 import pytest
 from distributed import LocalCluster
@@ -48,7 +49,7 @@ low = "always lag[i].x <= 1.5"
 def scenario(tmp_path, mine):
     """The path of the scenario."""
     path = tmp_path / "small.toml"
-    path.write_text(TEXT.replace("{toys}", mine("Lag").rpartition(":")[0]), encoding="utf-8")
+    path.write_text(re.sub(r"\{toys\}:(\w+)", lambda found: mine(found[1]), TEXT), encoding="utf-8")
     return path
 
 
