@@ -30,6 +30,7 @@ from .errors import ComponentError
 from .simulate import Simulation, simulate
 from .supervision.etcs import EtcsSupervision
 from .supervision.etcs_driver import EtcsDriver
+from .supervision.line_timetable import LineTimetable
 from .supervision.moving_block import MovingBlock
 from .supervision.protection import Protection
 from .supervision.timetable import Timetable
@@ -37,6 +38,7 @@ from .supervision.trip_monitor import TripMonitor
 from .trains.consist import Carriages, Consist
 from .trains.coupled_subway import CoupledSubwayTrain
 from .trains.drive import Drive
+from .trains.freight_train import FreightTrain
 from .trains.line_train import LineTrain
 from .trains.point_mass import PointMassTrain
 from .trains.port import DavisResistance, Train
@@ -66,6 +68,7 @@ __all__ = [
     "FaultTolerantCruiseIntermediate",
     "FixedDistanceCruise",
     "ForceDistribution",
+    "FreightTrain",
     "GaussianDisturbance",
     "GuardedCruise",
     "Gust",
@@ -73,6 +76,7 @@ __all__ = [
     "IntermediateEstimator",
     "LearningEnergy",
     "Line",
+    "LineTimetable",
     "LineTrain",
     "Memory",
     "MovingBlock",

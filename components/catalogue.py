@@ -27,6 +27,7 @@ from .environment.sensor import Sensor
 from .environment.sinusoid import Sinusoid
 from .supervision.etcs import EtcsSupervision
 from .supervision.etcs_driver import EtcsDriver
+from .supervision.line_timetable import LineTimetable
 from .supervision.moving_block import MovingBlock
 from .supervision.protection import Protection
 from .supervision.timetable import Timetable
@@ -34,6 +35,7 @@ from .supervision.trip_monitor import TripMonitor
 from .trains.consist import Consist
 from .trains.coupled_subway import CoupledSubwayTrain
 from .trains.drive import Drive
+from .trains.freight_train import FreightTrain
 from .trains.line_train import LineTrain
 from .trains.point_mass import PointMassTrain
 from .trains.subway import SubwayTrain
@@ -70,6 +72,7 @@ CATALOGUE: dict[str, type[Component]] = {
         ForceDistribution,
         LearningEnergy,
         Timetable,
+        LineTimetable,
         Protection,
         EtcsSupervision,
         EtcsDriver,
@@ -77,6 +80,7 @@ CATALOGUE: dict[str, type[Component]] = {
         TripMonitor,
         Sensor,
         LineTrain,
+        FreightTrain,
         Drive,
     )
 }
