@@ -18,7 +18,15 @@ def test_gains_and_limits_may_change_in_a_run_and_masses_may_not():
     assert tunable["PidAto"] == {"alpha", "proportional_gain", "integral_gain", "derivative_gain"}
     assert tunable["Schedule"] == {"values"}
     still = {name for name, names in tunable.items() if not names}
-    made_of_data = {"Line", "LineTrain", "ReferenceProfile", "ActuatorFaults", "Timetable"}
+    made_of_data = {
+        "FreightTrain",
+        "Line",
+        "LineTimetable",
+        "LineTrain",
+        "ReferenceProfile",
+        "ActuatorFaults",
+        "Timetable",
+    }
     assert still == made_of_data | {"TripMonitor", "LearningEnergy"}
 
 
