@@ -1,7 +1,8 @@
 """What mkdocs does beside turning Markdown into pages: pages made from the code, and formulas as MathML.
 
 Generated are the start page and its neighbours (README.md, CONTRIBUTING.md, SECURITY.md, CHANGELOG.md, whose links are
-led into the site), a page for each component (`component_page`), and the reference of the command line.
+led into the site), a page for each component (`component_page`), the reference of the command line, and live pages
+(`live_pages`).
 """
 
 from __future__ import annotations
@@ -17,6 +18,7 @@ import json_page
 import notebook_page
 import typer
 from latex2mathml.converter import convert
+from live_pages import live_pages
 from mkdocs.config.defaults import MkDocsConfig
 from mkdocs.structure.files import File, Files
 from mkdocs.structure.pages import Page
@@ -66,6 +68,8 @@ def on_files(files: Files, config: MkDocsConfig) -> Files:
         files.append(File.generated(config, f"notebooks/{name}.md", content=notebook.text))
         for picture, content in notebook.pictures.items():
             files.append(File.generated(config, f"notebooks/{picture}", content=content))
+    for name, path in live_pages().items():
+        files.append(File.generated(config, f"live/{name}.html", abs_src_path=str(path)))
     for section in config.nav or []:
         if "Components" in section:
             section["Components"] = ["components/index.md", *_navigation()]

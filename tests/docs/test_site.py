@@ -62,3 +62,10 @@ def test_python_reference_has_what_a_script_imports(site):
     page = (site / "reference" / "python.html").read_text(encoding="utf-8")
     for name in ("orchestrator.load", "orchestrator.run.run", "orchestrator.System", "components.Component"):
         assert f'id="railcosim.{name}"' in page
+
+
+def test_each_paper_has_a_live_page(site):
+    links = re.findall(r'href="(live/[a-z_]+\.html)"', (site / "live.html").read_text(encoding="utf-8"))
+    assert len(set(links)) == 4
+    for link in links:
+        assert 'id="live"' in (site / link).read_text(encoding="utf-8")
