@@ -9,7 +9,8 @@ marked with ``/* uncovered: the reason */``, which stands for its line, or for t
 What the parts ``python`` and ``c`` find is kept in ``build/coverage`` and told by the part ``report``; without a part
 all three are done, from nothing. ``--select`` names the tests for Python: several calls of ``python`` add up, and so
 does any other run of tests with the environment that the part ``environment`` prints: continuous integration has its
-one run of the quick tier measured by it.
+one run of the quick tier measured by it. Which tests do not count, because they aim at no branch, stands in
+``conftest.py``.
 """
 
 import argparse
