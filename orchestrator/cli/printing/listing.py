@@ -16,7 +16,7 @@ if TYPE_CHECKING:
     from ...scenario import Listed
 
 _GAP = "  "
-_NARROWEST = 10
+_NARROWEST = 8
 """Columns that a column which may take several lines keeps at least."""
 
 
@@ -45,7 +45,8 @@ def show_listing(
     widths = _fitted(widths, wraps, out.width - len(_GAP) * (len(heads) - 1))
     to_right = [head in right for head in heads]
     out.print(Text(f"\n{title}", style="bold"))
-    out.print(Text(_line(heads, widths, to_right), style="underline"), soft_wrap=True)
+    for line in _lines(out, heads, widths, to_right):
+        out.print(Text(line, style="underline"), soft_wrap=True)
     lines: list[str] = []
     for row in cells:
         lines += _lines(out, row, widths, to_right)

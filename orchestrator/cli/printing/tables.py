@@ -7,7 +7,8 @@ import sys
 from collections.abc import Iterable, Sequence
 from typing import Any
 
-from rich.console import Console
+from rich.cells import cell_len
+from rich.console import Console, ConsoleOptions, RenderResult
 from rich.measure import Measurement
 from rich.table import Table
 from rich.text import Text
@@ -30,8 +31,31 @@ _PREFIXES = ((1e12, "T"), (1e9, "G"), (1e6, "M"), (1e3, "k"))
 _PREFIXED = {**dict.fromkeys(("J", "N", "W", "Pa", "V", "A", "Hz"), 1e3), "m": 1e6}
 """The units that take a prefix, each with the size from which on it does."""
 PLAIN: Any = {"box": None, "pad_edge": False, "padding": (0, 2, 0, 0), "header_style": "underline"}
+_GAP, _NARROWEST = 2, 12
+"""Between columns; and what a column that may take several lines has at least, before rows are shown by themselves."""
 SIDE_BY_SIDE = 8
 """How many columns, or names in a line, a reader still takes in."""
+
+
+class _Foldable(Table):
+    """A table that is shown row by row where it has no room: a column of two letters is none, nor half a number."""
+
+    def __rich_console__(self, console: Console, options: ConsoleOptions) -> RenderResult:
+        widths = [
+            min(_NARROWEST if column.overflow == "fold" else sys.maxsize, max(cell_len(str(cell)) for cell in cells))
+            for column in self.columns
+            if (cells := [column.header, *column.cells])
+        ]
+        if sum(widths) + _GAP * (len(widths) - 1) <= options.max_width:
+            yield from super().__rich_console__(console, options)
+            return
+        if self.title:
+            yield Text.assemble(self.title, style="bold")
+        for row in zip(*(column.cells for column in self.columns), strict=True):
+            for k, (column, cell) in enumerate(zip(self.columns, row, strict=True)):
+                head = f"  {column.header}: " if str(column.header) else "  "
+                if str(cell):
+                    yield Text.assemble(head if k else "", cell)
 
 
 def table(title: str, columns: Sequence[str], *, right: Sequence[str] = (), fold: Sequence[str] = ()) -> Table:
@@ -43,7 +67,7 @@ def table(title: str, columns: Sequence[str], *, right: Sequence[str] = (), fold
         right: which of them are aligned to the right.
         fold: which of them may take several lines a row.
     """
-    made = Table(title=Text(f"\n{title}", style="bold") if title else None, title_justify="left", **PLAIN)
+    made = _Foldable(title=Text(f"\n{title}", style="bold") if title else None, title_justify="left", **PLAIN)
     for head in columns:
         wraps = head in fold
         made.add_column(
