@@ -23,7 +23,7 @@ PAGES = [
     *(ROOT / f"{name}.md" for name in ("README", "CONTRIBUTING", "SECURITY")),
     *sorted((ROOT / "docs").rglob("*.md")),
 ]
-MADE = ("components/", "live/", "reference/command_line.md")
+MADE = ("components/", "live/", "notebooks/", "reference/command_line.md")
 """Pages of the site that docs/generate.py makes; tests/docs has them."""
 BLOCK = re.compile(r"^```(console|python|toml|diff)\n(.*?)^```$", re.MULTILINE | re.DOTALL)
 FILE = re.compile(r"# ([\w/-]+\.(?:pyi?|toml))\n")
