@@ -134,4 +134,4 @@ def _print(command: str, code: int, told: _Failed | None, result: object) -> Non
         facts = {**told.facts}
         problems = [Mistake(one.place, one.message, one.remedy) for one in facts.pop("problems", ())]
         failure = Failure("\n".join(told.lines), problems, **facts)
-    print(text_of(Document(command, code, failure, result)))
+    print(text_of(Document(command, code, failure, result)), flush=True)

@@ -1,5 +1,6 @@
 """No path leads to exit code 0 but a finished command: what ends or crashes its process is told."""
 
+import json
 import os
 import pty
 import signal
@@ -170,3 +171,14 @@ def test_what_a_command_has_decided_on_is_said_by_nobody_else():
     work = "from railcosim.orchestrator.fmi.guard import NOTES; NOTES.decide(130); os._exit(130)"
     assert end_of(start(work)) == (130, "")
     assert NOTES.decided is None
+
+
+def test_a_command_that_crashes_leaves_a_document_where_one_was_asked_for():
+    code = CODE.replace("WORK", "os.kill(os.getpid(), signal.SIGSEGV)").replace(
+        "print(os.getpid(), flush=True)", "pass"
+    )
+    command = [sys.executable, "-c", code, "run", "small.toml", "--json"]
+    done = subprocess.run(command, capture_output=True, text=True, check=False)
+    document = json.loads(done.stdout)
+    assert (done.returncode, document["exit_code"], document["command"], document["result"]) == (3, 3, "run", None)
+    assert "crashed (SIGSEGV)" in document["error"]["message"]
