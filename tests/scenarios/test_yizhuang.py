@@ -1,6 +1,5 @@
 """Ten days on the Yizhuang line under CAILC: limits kept, stops met after learning, energy closed."""
 
-import numpy as np
 import pytest
 from railcosim.orchestrator import load, run
 
@@ -13,13 +12,13 @@ def test_a_train_learns_the_line_and_stops_on_the_spot():
     assert {check.name: check.verdict for check in result.requirements} == dict.fromkeys(
         ("limits", "barrier", "on_the_spot", "energy_closes"), "pass"
     )
-    time, error = np.asarray(result["time"]), abs(np.asarray(result["ato.position_error"]))
+    time, error = result.time, abs(result["ato.position_error"])
     days = [error[(time >= k * DAY) & (time < (k + 1) * DAY)].max() for k in range(10)]
     assert days[9] < 0.5 * days[0]
     assert days[9] < 0.2
     # It stands within 0.3 m of every station on the last day.
     last = time >= 9 * DAY
-    stands = np.asarray(result["train.position"])[last & (np.asarray(result["train.speed"]) == 0.0)]
+    stands = result["train.position"][last & (result["train.speed"] == 0.0)]
     stops = [stop.position for stop in _stops()]
     assert max(min(abs(stands - stop)) for stop in stops[1:]) < 0.3
 
