@@ -41,6 +41,7 @@ def write_runs(directories: Sequence[Path], path: Path, names: Sequence[str] = (
     scripts = ["trains.js", "report.js"]
     if live is not None:
         data["live"] = live.data
+        data["panels"].sort(key=lambda panel: not any("track" in line for line in panel["lines"]))  # what follows first
         scripts.insert(1, "live.js")
     body = _body(contents, names, columns, live)
     return write_document(path, contents[0].title, body, data, columns, scripts=scripts)

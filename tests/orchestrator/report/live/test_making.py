@@ -64,6 +64,16 @@ def test_a_page_with_models(directory, compiled):
     ]
 
 
+def test_what_follows_comes_first(directory, compiled):
+    path, function = directory / "run.json", {"title": "alone", "x": {"name": "d", "from": 0, "to": 1}, "y": "d"}
+    record = json.loads(path.read_text())
+    path.write_text(json.dumps(record | {"figures_wanted": [function, *record["figures_wanted"]]}))
+    for live in (False, True):
+        text = write_report([directory], live=live, trust=live).read_text(encoding="utf-8")
+        panels = json.loads(re.search(r'id="data">(.*?)</script>', text, re.DOTALL)[1])["panels"]
+        assert panels[-1 if live else 0]["title"] == "alone"
+
+
 def test_several_runs_have_no_live_page(directory):
     with pytest.raises(ScenarioError, match="the models of one run"):
         write_report([directory, directory], live=True)
