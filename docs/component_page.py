@@ -278,7 +278,7 @@ def _signal(given: Any) -> Callable[[float], Any]:
 
 
 def _typed(slot: Slot, value: Any) -> Any:
-    return round(value) if slot.type is int else value
+    return slot.type(round(value)) if slot.type in (int, bool) else value
 
 
 def _excited(component: Component) -> tuple[dict[str, Any], list[list[Slot]]]:
