@@ -145,7 +145,7 @@ def looked_at(pictures):
 
 
 @pytest.fixture(params=TEXTS)
-def hostile(request):
+def hostile_text(request):
     """A text that wants to be run by a page that shows it."""
     return request.param
 

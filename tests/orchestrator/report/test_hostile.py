@@ -30,8 +30,8 @@ def told(record, text):
     )
 
 
-def test_a_run(opened, directory, hostile, is_inert):
-    text = hostile
+def test_a_run(opened, directory, hostile_text, is_inert):
+    text = hostile_text
     path = directory / "run.json"
     path.write_text(json.dumps(told(json.loads(path.read_text()), text)))
     path = directory / "metrics.json"
