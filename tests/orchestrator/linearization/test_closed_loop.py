@@ -6,9 +6,8 @@ import sys
 
 import numpy as np
 import pytest
-import typer
 from railcosim.orchestrator import System, load, run
-from railcosim.orchestrator.cli import analysis as cli_analysis
+from railcosim.orchestrator.cli.app import app
 from railcosim.orchestrator.errors import ScenarioError
 from railcosim.orchestrator.isolation import isolate
 from railcosim.orchestrator.linearization.blocks import differences
@@ -289,10 +288,6 @@ def test_the_state_space_has_the_same_numbers_with_and_without_python_control(st
 
 @pytest.fixture(scope="module")
 def orchestrate():
-    app = typer.Typer()
-    app.command()(cli_analysis.linearize)
-    app.command()(cli_analysis.compare)
-
     def run(*arguments):
         return CliRunner().invoke(app, [str(argument) for argument in arguments])
 
