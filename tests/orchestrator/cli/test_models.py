@@ -4,6 +4,7 @@ import re
 
 import pytest
 from railcosim.fmus import build
+from railcosim.orchestrator import packing
 from railcosim.orchestrator.cli.app import app, call
 from typer.main import get_command
 
@@ -115,3 +116,12 @@ def test_describe_tells_what_another_file_is(tmp_path, xml, capsys):
     for name, what in ((ssp, "is an SSP, a system of 1 FMUs; unpack it"), (tmp_path, "is a folder, not an FMU file")):
         assert call(["describe", str(name)]) == 2
         assert what in capsys.readouterr().err
+
+
+def test_pack_says_what_it_has_written(capsys, monkeypatch, tmp_path):
+    packed = packing.Packed(tmp_path / "a.fmu", (), ("linux64", "win64"), ("a note",))
+    monkeypatch.setattr(packing, "pack", lambda system, path, **how: packed)
+    written = f"{tmp_path / 'a.fmu'}: 10 FMUs as one, 0 variables, for linux64, win64"
+    for more, lines in (((), ["note: a note", written]), (("--quiet",), ["note: a note"])):
+        assert call(["pack", "comfort_cruise", "-o", str(packed.path), *more]) == 0
+        assert capsys.readouterr().out.splitlines() == lines
