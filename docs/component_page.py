@@ -19,7 +19,7 @@ import numpy as np
 from railcosim import models
 from railcosim.components import CATALOGUE, Component, Simulation, simulate
 from railcosim.components.component import Slot
-from railcosim.components.declarations import Data, Input, Memory, Parameter, Size, State
+from railcosim.components.declarations import Data, Input, Memory, Output, Parameter, Size, State
 from railcosim.components.tracing import TracingError, feedthrough
 from railcosim.fmus.description import default_step
 from railcosim.fmus.documentation import stepping
@@ -107,8 +107,11 @@ def _fits(component: Component, scenario: Mapping[str, Any], place: str) -> bool
     name = re.compile(rf"{place}(?:\[[^\]]*\])?\.(\w+)")
     fed, taken = ({m[1] for m in map(name.match, ends) if m} for ends in (connections, sources))
     needed = {slot.name for slot in component.of(Input) if not slot.declaration.optional}
-    built = scenario["instances"][place].get("build", {}).keys() <= component.build_arguments.keys()
-    return built and needed <= fed and taken <= {slot.name for slot in component.output_slots}
+    entry, known = scenario["instances"][place], {slot.name for slot in component.of(Input)}
+    built = entry.get("build", {}).keys() <= component.build_arguments.keys()
+    begun = entry.get("start", {}).keys().isdisjoint(slot.name for slot in component.of(Output))  # those are computed
+    shown = taken <= {slot.name for slot in component.output_slots}
+    return built and begun and needed <= fed <= known and shown
 
 
 def _places(scenario: Mapping[str, Any]) -> dict[str, str]:

@@ -8,7 +8,7 @@ STEP = 0.01
 
 
 def watch(observer, fault, amplitude=0.0):
-    """One carriage with a fault and a constant command for 17 s; largest errors over the last 13 s, a period.
+    """One carriage with a fault and a constant command for 26 s; largest errors over the last 13 s, a period.
 
     The plant gets the mean of the fault over each step. (Carriages that swing on their couplers would add the error of
     holding n over a step.)
@@ -22,7 +22,7 @@ def watch(observer, fault, amplitude=0.0):
     monitor.set("speed", train.get("speed"))
     monitor.start()
     errors = []
-    for k in range(1700):
+    for k in range(2600):
         t = k * STEP
         monitor.set("position", train.get("position"))
         monitor.set("speed", train.get("speed"))
