@@ -24,7 +24,10 @@ def find_starts(system: System, instance: Instance, interface: Interface, wiring
     """The start values of one instance by scalar variable; what is wrong with them is noted in the wiring."""
     values: dict[str, Any] = {}
     dropped = []
+    hidden = _overridden(system, instance, interface)
     for name, given in instance.start.items():
+        if name in hidden:
+            continue
         held = interface.start_name(name)
         scalars = interface.scalars(held)
         signal = SignalName(instance.name, name)
@@ -46,7 +49,7 @@ def find_starts(system: System, instance: Instance, interface: Interface, wiring
             wiring.problems.append(problem.at(origin))
         else:
             try:
-                if held != name and held in instance.start:
+                if held != name and held in instance.start and held not in hidden:
                     raise ScenarioError(f"it is given twice, as {name} and as {held}")
                 values.update(_elements(instance, interface, held, scalars, given))
             except ScenarioError as error:
@@ -56,6 +59,19 @@ def find_starts(system: System, instance: Instance, interface: Interface, wiring
     _set_runtime(system, instance, interface, values)
     _check_rising(system, instance, interface, wiring, values)
     return values
+
+
+def _overridden(system: System, instance: Instance, interface: Interface) -> set[str]:
+    """Start values that the scenario gives by one of a state's two names, and a user by the other."""
+    found = set()
+    for name in instance.start:
+        held = interface.start_name(name)
+        if held == name or held not in instance.start:
+            continue
+        origins = ((one, system.provenance.origins.get(f"{instance.name}.{one}", "")) for one in (name, held))
+        written = {one for one, origin in origins if not origin.startswith("--set ")}
+        found |= written if len(written) == 1 else set()
+    return found
 
 
 def _check_rising(

@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 from railcosim.orchestrator.fmi.reader import read_interface
+from railcosim.orchestrator.scenario import changed
 from railcosim.orchestrator.system import System
 from railcosim.orchestrator.wiring import wire
 from railcosim.orchestrator.wiring.starts import instance_seed
@@ -85,6 +86,15 @@ def test_wrong_start_values(started, given, problem):
     problems, _, _ = started(index=1, count=2, **given)
     assert len(problems) == 1
     assert problems[0].startswith(problem)
+
+
+@pytest.mark.parametrize("written", ["x", "x_start"])
+@pytest.mark.parametrize("given", ["x", "x_start"])
+def test_what_a_user_sets_wins_by_either_name(resolve, mine, written, given):
+    system = System()
+    system.add("s", mine("Settings"), **{written: 1.0})
+    wiring = resolve(changed(system, {f"s.{given}": 2.0}))
+    assert (wiring.problems, wiring.starts["s"]) == ([], {"x_start": 2.0})
 
 
 def test_without_a_count_there_is_no_index(started):
