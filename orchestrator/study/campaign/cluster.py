@@ -61,6 +61,7 @@ class Cluster:
         self._parcel, self._scheduler, self._wanted = parcel, scheduler, workers
         self._held = ExitStack()
         self._counted, self._count = -_LOOK, 0
+        self._own: Any = None
         self.dashboard = ""
 
     def __enter__(self) -> Cluster:
@@ -82,11 +83,14 @@ class Cluster:
 
     @property
     def workers(self) -> int:
-        """How many there are now."""
+        """How many there are now; of those on this machine, what Dask has given up is started again."""
         if world.monotonic() - self._counted > _LOOK:
             self._counted = world.monotonic()
             with suppress(OSError, TimeoutError):
                 self._count = len(self._client.nthreads())
+            # One that dies before its nanny has seen it run is not started again, and with none the runs would wait.
+            if self._own is not None and self._count < (wanted := len(self._own.worker_spec)):
+                self._own.scale(wanted)
         return self._count
 
     def rows(
@@ -139,7 +143,7 @@ class Cluster:
         held.enter_context(dask.dask.config.set({"temporary-directory": str(folder)}))
         dask.utils.get_mp_context().Lock()  # its tracker makes the thread that starts it hear again
         with _deaf():
-            cluster = dask.LocalCluster(
+            self._own = dask.LocalCluster(
                 n_workers=self._wanted,
                 threads_per_worker=1,
                 processes=True,
@@ -149,7 +153,7 @@ class Cluster:
                 silence_logs=logging.CRITICAL,
                 env={"TMPDIR": str(folder)},
             )
-        return dask.Client(held.enter_context(cluster), set_as_default=False, timeout=_PATIENCE)
+        return dask.Client(held.enter_context(self._own), set_as_default=False, timeout=_PATIENCE)
 
     def _remote(self) -> Any:
         try:

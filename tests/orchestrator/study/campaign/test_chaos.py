@@ -8,11 +8,14 @@ import subprocess
 import sys
 import time
 
+import dask
 import psutil
 import pytest
+from distributed.core import Status
 from railcosim.orchestrator import Study, load
 from railcosim.orchestrator.errors import RunError
 from railcosim.orchestrator.study.campaign import run_study
+from railcosim.orchestrator.study.campaign.cluster import Cluster
 
 from .conftest import plan_of, same
 
@@ -65,6 +68,26 @@ def test_a_killed_study_goes_on_as_often_as_it_is_killed(native, system, scenari
         study.wait()
     assert subprocess.run([*command, "--resume"], check=False, timeout=300).returncode in (0, 1)
     assert same(Study.load(tmp_path / "out"), undisturbed)
+
+
+def test_workers_that_die_before_they_are_seen_to_run_are_started_again(native, system, tmp_path, monkeypatch):
+    """Their nannies, who start them, then do not: they are made to believe here that they are still at it."""
+    how, undisturbed = native
+    enter, entered, killed = Cluster.__enter__, [], []
+    monkeypatch.setattr(Cluster, "__enter__", lambda self: entered.append(self) or enter(self))
+
+    def kill(done, count, failed):
+        if not killed:
+            for nanny in entered[0]._own.workers.values():
+                nanny.status = Status.starting
+            killed.extend(workers_of(psutil.Process()))
+            for one in killed:
+                one.kill()
+
+    with dask.config.set({"distributed.deploy.lost-worker-timeout": "1s"}):
+        study = run_study(plan_of(system, runs=RUNS), how, tmp_path / "out", workers=2, progress=kill)
+    assert len(killed) == 2
+    assert same(study, undisturbed)
 
 
 def test_runs_that_end_their_worker_are_rows(hostile, tmp_path):

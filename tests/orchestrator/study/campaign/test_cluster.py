@@ -3,6 +3,7 @@
 import os
 import signal
 import threading
+from typing import ClassVar
 
 import pytest
 from distributed import LocalCluster
@@ -50,6 +51,25 @@ def test_a_scheduler_that_went_is_waited_for(system, how, monkeypatch, states, i
     else:
         with pytest.raises(RunError, match="the scheduler tcp://far:8786 is gone: start it and go on by --resume"):
             made.wait_for_scheduler()
+
+
+@pytest.mark.parametrize("there", [0, 1, 2])
+def test_a_worker_that_was_given_up_is_started_again(system, how, there):
+    class Client:
+        def nthreads(self):
+            return dict.fromkeys(range(there), 1)
+
+    class Own:
+        worker_spec = (0, 1)
+        asked: ClassVar = []
+
+        def scale(self, count):
+            self.asked.append(count)
+
+    made = Cluster(packed(how, [system], "plain"), workers=2)
+    made._client, made._own = Client(), Own()
+    assert made.workers == there
+    assert Own.asked == ([2] if there < 2 else [])
 
 
 def test_a_cluster_is_closed_whole_whatever_a_user_presses(system, how, scheduler, monkeypatch):
