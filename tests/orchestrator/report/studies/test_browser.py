@@ -100,8 +100,8 @@ def test_a_search(opened, search, looked_at):
     looked_at(page, "search")
 
 
-def test_texts_that_want_to_run(opened, search, hostile, is_inert):
-    text = hostile
+def test_texts_that_want_to_run(opened, search, hostile_text, is_inert):
+    text = hostile_text
     frame = pd.DataFrame({"run": [0, 1], "status": [text, "completed"], "error": [text, ""], text: [text, "other"]})
     frame = frame.assign(
         **{f"metric.{text}": [1.0, 2.0], f"margin.{text}": [1.0, 2.0], f"verdict.{text}": [text, "pass"]}
