@@ -9,11 +9,21 @@ import pytest
 FOLDER = Path(__file__).parents[2] / "docs"
 
 
+def _module(name):
+    sys.path.insert(0, str(FOLDER))
+    try:
+        return importlib.import_module(name)
+    finally:
+        sys.path.remove(str(FOLDER))
+
+
 @pytest.fixture(scope="session")
 def component_page():
     """The module that makes component pages."""
-    sys.path.insert(0, str(FOLDER))
-    try:
-        return importlib.import_module("component_page")
-    finally:
-        sys.path.remove(str(FOLDER))
+    return _module("component_page")
+
+
+@pytest.fixture(scope="session")
+def json_page():
+    """The module that makes the page of what `--json` prints."""
+    return _module("json_page")

@@ -1,24 +1,10 @@
 """The schema of what `--json` prints is that of the code, and the page shows all of it."""
 
-import importlib
 import json
-import sys
 from dataclasses import dataclass
-from pathlib import Path
 
 import pytest
 from railcosim.orchestrator.cli.documents import DOCUMENTS
-
-FOLDER = Path(__file__).parents[2] / "docs"
-
-
-@pytest.fixture(scope="module")
-def json_page():
-    sys.path.insert(0, str(FOLDER))
-    try:
-        return importlib.import_module("json_page")
-    finally:
-        sys.path.remove(str(FOLDER))
 
 
 def test_the_schema_beside_the_code_is_that_of_the_code(json_page):
