@@ -3,7 +3,6 @@
 Screenshots stay in ``build/pages`` to be looked at.
 """
 
-import shutil
 from pathlib import Path
 
 import numpy as np
@@ -13,49 +12,25 @@ from railcosim.orchestrator import System, load, run
 from railcosim.orchestrator.report import write_report
 from railcosim.orchestrator.run import Results
 
-CHROMIUM = shutil.which("chromium")
-playwright = pytest.importorskip("playwright.sync_api", reason="playwright is not installed")
 axe = pytest.importorskip("axe_playwright_python.sync_playwright", reason="axe-playwright-python is not installed")
 pytestmark = [
     pytest.mark.long,
-    pytest.mark.skipif(CHROMIUM is None, reason="there is no chromium"),
     pytest.mark.skipif(not has_zig(), reason="ziglang is not installed"),
 ]
 PICTURES = Path(__file__).parents[4] / "build" / "pages"
 SAID = "#live output"
 
 
-@pytest.fixture(scope="module")
-def browser():
-    with playwright.sync_playwright() as driver:
-        started = driver.chromium.launch(executable_path=CHROMIUM, args=["--no-sandbox", "--disable-gpu"])
-        yield started
-        started.close()
-
-
 @pytest.fixture
-def opened(browser):
-    """Opens a page; whatever the browser complains of fails the test in the end."""
-    complaints, contexts = [], []
+def opened(opened):
+    """Opens a page as for those that are not live, and waits until it has simulated."""
 
-    def open_page(path, scheme="light", width=1280):
-        context = browser.new_context(color_scheme=scheme, viewport={"width": width, "height": 900}, offline=True)
-        contexts.append(context)
-        page = context.new_page()
-        page.on("console", lambda said: complaints.append(said.text) if said.type in ("error", "warning") else None)
-        page.on("pageerror", lambda error: complaints.append(str(error)))
-        page.on(
-            "request",
-            lambda asked: complaints.append(asked.url) if not asked.url.startswith(("file:", "blob:")) else None,
-        )
-        page.goto(path.as_uri())
-        page.wait_for_selector("html[data-ready][data-live]", timeout=60_000)
+    def open_live(path, **how):
+        page = opened(path, **how)
+        page.wait_for_selector("html[data-live]", timeout=60_000)
         return page
 
-    yield open_page
-    for context in contexts:
-        context.close()
-    assert not complaints
+    return open_live
 
 
 @pytest.fixture(scope="module")
