@@ -148,7 +148,7 @@ class Cluster:
                 threads_per_worker=1,
                 processes=True,
                 host="127.0.0.1",
-                dashboard_address="127.0.0.1:0" if _can_show() else None,
+                dashboard_address="127.0.0.1:0",  # None would take port 8787 all the same
                 local_directory=str(folder),
                 silence_logs=logging.CRITICAL,
                 env={"TMPDIR": str(folder)},

@@ -63,6 +63,7 @@ def system(scenario):
 @pytest.fixture
 def scheduler():
     """The address of one of Dask in this process, with a worker."""
-    how = {"n_workers": 1, "threads_per_worker": 2, "processes": False, "dashboard_address": None}
-    with LocalCluster(**how, silence_logs=logging.CRITICAL) as made:
+    how = {"n_workers": 1, "threads_per_worker": 2, "processes": False, "silence_logs": logging.CRITICAL}
+    # Without an address for it, Dask takes port 8787 even where nothing is shown: there is one such port on a machine.
+    with LocalCluster(**how, dashboard_address="127.0.0.1:0", scheduler_kwargs={"dashboard": False}) as made:
         yield made.scheduler_address

@@ -4,6 +4,7 @@ import contextlib
 import os
 import random
 import signal
+import socket
 import subprocess
 import sys
 import time
@@ -154,10 +155,12 @@ def by_hand(tmp_path):
 
 def test_a_scheduler_by_hand_is_restarted(native, system, tmp_path, by_hand):
     how, undisturbed = native
-    address, port = "tcp://127.0.0.1:18786", "18786"
+    with socket.create_server(("127.0.0.1", 0)) as free:
+        port = str(free.getsockname()[1])
+    address, here = f"tcp://127.0.0.1:{port}", ("--host", "127.0.0.1", "--port", port)
 
     def up():
-        found = [by_hand("scheduler", "--host", "127.0.0.1", "--port", port, "--no-dashboard")]
+        found = [by_hand("scheduler", *here, "--dashboard-address", "127.0.0.1:0", "--no-dashboard")]
         return found + [by_hand("worker", address, "--nthreads", "1", "--no-dashboard") for _ in range(2)]
 
     running, restarts = up(), iter([100])
