@@ -161,3 +161,29 @@ def piecewise_linear(x: Any, breakpoints: Sequence[Any] | np.ndarray, values: Se
         fraction = clip((x - breakpoints[k]) / width, 0.0, 1.0)
         result = where(x >= breakpoints[k], values[k] + fraction * (values[k + 1] - values[k]), result)
     return result
+
+
+def repeat(step: Callable[[Any, Any], Any], times: int, values: Any, given: Any) -> Any:
+    """What a fixed number of equal steps makes of values: an iteration, in C one function that is called as often.
+
+    Args:
+        step: takes the values and what is given, and returns the next values; it reads nothing else that varies.
+        times: how often.
+        values: before the first step, shape (n,).
+        given: what every step may read besides, shape (m,).
+    """
+    column, fixed = _column(values), _column(given)
+    symbol = next((cell for cell in (*column, *fixed) if hasattr(cell, "repeated")), None)
+    if symbol is not None:
+        return symbol.repeated(step, times, column, fixed)
+    for _ in range(times):
+        column = _column(step(column, fixed))
+    return column
+
+
+def _column(cells: Any) -> Any:
+    """Scalars as an array: of numbers, or of symbols."""
+    column = np.empty(len(cells), dtype=object)
+    column[:] = list(cells)
+    plain = all(isinstance(cell, bool | int | float | np.generic) for cell in column)
+    return column.astype(float) if plain else column.view(SymbolArray)

@@ -6,8 +6,10 @@ nobody calls here. This one writes the operations alone, in CasADi's order, with
 
 from __future__ import annotations
 
+import hashlib
 import math
-from collections.abc import Iterator, Mapping, Sequence
+import re
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from typing import Any, NamedTuple
 
 import casadi as ca
@@ -43,10 +45,14 @@ _TRUTHS = {
 }
 _OF_TRUTHS = {ca.OP_NOT: "!{0}", ca.OP_AND: "{0} && {1}", ca.OP_OR: "{0} || {1}"}
 """Operations with the result 0 or 1, of numbers and of truths: as C's own truth values compilers branch on them."""
+_STATEMENTS = (ca.OP_OUTPUT, ca.OP_CALL)
+"""Operations without a value of their own."""
 _DEEPEST = 60
 """How many choices may stand inside one another: compilers need not take more than 127 nested blocks."""
 _SHORT = 200
 """Up to how many operations a function is copied to where it is called: integration then shares work between stages."""
+_CALL = re.compile(r"\] = (\w+)\(")
+"""A call in what CasADi prints of a function, one line for each operation: the only place where it tells the name."""
 _NAMES = {value: name for name, value in vars(ca).items() if name.startswith("OP_")}
 
 Path = tuple[int, ...]
@@ -63,8 +69,8 @@ def number(value: Any) -> str:
     return repr(value)
 
 
-def function(name: str, arguments: Sequence[tuple[str, Any]], results: Sequence[Any]) -> str:
-    """A C function of arrays.
+def function(name: str, arguments: Sequence[tuple[str, Any]], results: Sequence[Any]) -> list[str]:
+    """A C function of arrays, after those that it calls: a function of one content has one name.
 
     Args:
         name: of the function.
@@ -73,17 +79,47 @@ def function(name: str, arguments: Sequence[tuple[str, Any]], results: Sequence[
     """
     symbols = [symbol for _, symbol in arguments]
     compiled = ca.Function("f", symbols, [ca.densify(ca.vertcat(*results))], {"cse": True})
-    steps = _steps(compiled, [argument for argument, _ in arguments])
-    inside: dict[Path, list[int]] = {}
-    for k, place in enumerate(_places(steps)):
-        inside.setdefault(place, []).append(k)
-    lines = list(_lines((), inside, steps))
+    names = [argument for argument, _ in arguments]
+    called, lines, steps = _body(compiled, lambda k, place: f"{names[k]}[{place}]", f"{name.rpartition('_')[0]}_step")
     used = "".join(lines)
-    unused = [f"    (void){argument};" for argument, _ in arguments if f"{argument}[" not in used]
-    signature = ", ".join(f"const double *{argument}" for argument, _ in arguments)
-    body = "\n".join([*unused, *lines])
-    kept_in_place = "ALWAYS_INLINE" if len(steps) <= _SHORT else "static inline"
-    return f"{kept_in_place} void {name}({signature}, double *result)\n{{\n{body}\n}}\n"
+    unused = [f"    (void){argument};" for argument in names if f"{argument}[" not in used]
+    kept_in_place = "ALWAYS_INLINE" if steps <= _SHORT else "static inline"
+    return [*called, _definition(f"{kept_in_place} void {name}", names, [*unused, *lines])]
+
+
+def _called(compiled: Any, name: str) -> tuple[str, list[str]]:
+    """The name in C of a function that is called, and what defines it: its arguments stand in one array."""
+    firsts = [0]
+    for k in range(compiled.n_in()):
+        firsts.append(firsts[-1] + compiled.nnz_in(k))
+    called, lines, _ = _body(compiled, lambda k, place: f"values[{firsts[k] + place}]", name)
+    name = f"{name}_{hashlib.sha256(''.join(lines).encode()).hexdigest()[:12]}"
+    return name, [*called, _definition(f"static void {name}", ["values"], lines)]
+
+
+def _definition(head: str, arguments: Sequence[str], lines: Sequence[str]) -> str:
+    signature = ", ".join(f"const double *{argument}" for argument in arguments)
+    return f"{head}({signature}, double *result)\n{{\n" + "\n".join(lines) + "\n}\n"
+
+
+def _body(compiled: Any, value: Callable[[int, int], str], name: str) -> tuple[list[str], list[str], int]:
+    """Of a CasADi function: definitions of those it calls, its own lines, the number of its operations.
+
+    Args:
+        compiled: the function.
+        value: the C of one value of one argument.
+        name: beginning of the names of those it calls.
+    """
+    called = {each: _called(compiled.get_function(each), name) for each in compiled.get_function()}
+    calls = iter([called[each][0] for each in _CALL.findall(compiled.str(True))])
+    steps = _steps(compiled, value, calls)
+    inside: dict[Path, list[int]] = {}
+    asked_for = {n for step in steps for n in step.read}
+    for k, place in enumerate(_places(steps)):
+        if k in asked_for or steps[k].operation in _STATEMENTS:
+            inside.setdefault(place, []).append(k)
+    definitions = list(dict.fromkeys(text for _, texts in called.values() for text in texts))
+    return definitions, list(_lines((), inside, steps)), len(steps)
 
 
 class _Step(NamedTuple):
@@ -99,31 +135,45 @@ class _Step(NamedTuple):
         return self.operation in _TRUTHS or self.operation in _OF_TRUTHS
 
 
-def _steps(compiled: Any, arguments: Sequence[str]) -> list[_Step]:
+def _steps(compiled: Any, value: Callable[[int, int], str], calls: Iterator[str]) -> list[_Step]:
     """The operations of a CasADi function in order; the value of step k is the variable ``a<k>``."""
     steps: list[_Step] = []
     holds: dict[int, int] = {}  # the step whose value a place of CasADi's work memory holds
     for k in range(compiled.n_instructions()):
         operation, places = compiled.instruction_id(k), compiled.instruction_input(k)
         written = compiled.instruction_output(k)
+        if operation == ca.OP_OUTPUT:
+            steps.append(_Step(operation, (holds[places[0]],), f"result[{written[1]}] = a{holds[places[0]]}"))
+            continue
         if operation == ca.OP_INPUT:
-            steps.append(_Step(operation, (), f"{arguments[places[0]]}[{places[1]}]"))
+            steps.append(_Step(operation, (), value(*places)))
         elif operation == ca.OP_CONST:
             steps.append(_Step(operation, (), number(compiled.instruction_constant(k))))
-        elif operation == ca.OP_OUTPUT:
-            value = holds[places[0]]
-            steps.append(_Step(operation, (value,), f"result[{written[1]}] = a{value}"))
+        elif operation == ca.OP_CALL:
+            steps += _call(next(calls), tuple(holds[place] for place in places), len(written), steps)
         else:
             read = tuple(holds[place] for place in places)
             steps.append(_Step(operation, read, _code(operation, read, steps)))
-        if operation != ca.OP_OUTPUT:
-            holds[written[0]] = k
+        for place, step in zip(reversed(written), reversed(range(len(steps))), strict=False):
+            holds[place] = step
     return steps
+
+
+def _call(name: str, read: tuple[int, ...], results: int, steps: Sequence[_Step]) -> list[_Step]:
+    """A call of a function, and its results."""
+    k = len(steps)
+    values = f"const double v{k}[] = {{{', '.join(_numbers(read, steps))}}}"
+    call = _Step(ca.OP_CALL, read, f"{values}; double r{k}[{results}]; {name}(v{k}, r{k})")
+    return [call, *(_Step(ca.OP_ASSIGN, (k,), f"r{k}[{place}]") for place in range(results))]
+
+
+def _numbers(read: Sequence[int], steps: Sequence[_Step]) -> list[str]:
+    return [f"(double)a{n}" if steps[n].is_truth else f"a{n}" for n in read]
 
 
 def _code(operation: int, read: tuple[int, ...], steps: Sequence[_Step]) -> str:
     """The C of an operation on the values of earlier steps."""
-    numbers = [f"(double)a{n}" if steps[n].is_truth else f"a{n}" for n in read]
+    numbers = _numbers(read, steps)
     truths = [f"a{n}" if steps[n].is_truth else f"(a{n} != 0.0)" for n in read]
     if operation == ca.OP_IF_ELSE_ZERO:
         return f"{truths[0]} ? {numbers[1]} : 0.0"
@@ -168,7 +218,7 @@ def _lines(here: Path, inside: Mapping[Path, Sequence[int]], steps: Sequence[_St
     indent = "    " * (len(here) + 1)
     for k in inside[here]:
         operation, read, code = steps[k]
-        if operation == ca.OP_OUTPUT:
+        if operation in _STATEMENTS:
             yield f"{indent}{code};"
         elif (*here, k) in inside:
             yield f"{indent}double a{k} = 0.0;"

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import contextlib
 import functools
+import itertools
 from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
@@ -37,6 +38,8 @@ _FUNCTIONS = {
     "abs": ca.fabs,
 }
 _REMEDY = "on values use operators, slices, reshaping and railcosim.components.maths, nothing else"
+_NUMBERS = itertools.count()
+"""CasADi tells functions apart by name."""
 _NOT_THE_AUTHORS = (Path(__file__).parent, Path(__file__).parents[1])
 """Folders whose files are never to blame."""
 
@@ -61,6 +64,17 @@ class Symbol:
     def where(self, then: Any, otherwise: Any) -> Symbol:
         """The result of a choice on this condition."""
         return Symbol(ca.if_else(self.sx, _expression(then), _expression(otherwise)))
+
+    def repeated(self, step: Callable[[Any, Any], Any], times: int, values: Any, given: Any) -> Any:
+        """The result of a `maths.repeat` on symbols: calls of one function."""
+        known = [ca.SX.sym(name, len(cells)) for name, cells in (("values", values), ("given", given))]
+        cells = step(*(_arranged([Symbol(x) for x in ca.vertsplit(column)], column.shape[:1]) for column in known))
+        options = {"cse": True, "never_inline": True}
+        once = ca.Function(f"step{next(_NUMBERS)}", known, [ca.vertcat(*map(_expression, cells))], options)
+        column, fixed = (ca.vertcat(*map(_expression, cells)) for cells in (values, given))
+        for _ in range(times):
+            column = once(column, fixed)
+        return _arranged([Symbol(x) for x in ca.vertsplit(column)], column.shape[:1])
 
     def _refuse(self, *_: Any) -> Any:
         raise TracingError(
@@ -244,15 +258,17 @@ def _code(found: Expressions, prefix: str) -> Traced:
         "keep": found.keep,
     }
     arguments = [("clock", found.clock), ("values", found.values)]
-    code = [function(f"{prefix}_{name}", arguments, column) for name, column in functions.items() if column]
+    code: dict[str, None] = {}  # what several of them call stands there once
+    for name, column in functions.items():
+        code |= dict.fromkeys(function(f"{prefix}_{name}", arguments, column) if column else [])
     along = {"directional": [*found.outputs, *found.derivatives], "initial_directional": found.initial}
     for name, column in along.items():
         if column:
-            code.append(_directional(f"{prefix}_{name}", arguments, column))
+            code |= dict.fromkeys(_directional(f"{prefix}_{name}", arguments, column))
     return Traced("\n".join(code), found.layout, found.started, found.reinitialised)
 
 
-def _directional(name: str, arguments: list[tuple[str, Any]], column: list[Any]) -> str:
+def _directional(name: str, arguments: list[tuple[str, Any]], column: list[Any]) -> list[str]:
     """The derivative of expressions along a direction in the space of the values, ``seed``."""
     values = arguments[1][1]
     seed = ca.SX.sym("seed", values.shape[0])

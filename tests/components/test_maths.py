@@ -102,3 +102,10 @@ def test_piecewise_functions_take_arrays_and_keep_their_shape():
 def test_a_jump_may_be_written_as_two_equal_breakpoints():
     assert maths.piecewise_linear(0.999999, [0.0, 1.0, 1.0, 2.0], [0.0, 0.0, 5.0, 5.0]) == 0.0
     assert maths.piecewise_linear(1.0, [0.0, 1.0, 1.0, 2.0], [0.0, 0.0, 5.0, 5.0]) == 5.0
+
+
+def test_a_repeated_step_is_an_iteration():
+    """Newton's for the square root, and a count."""
+    found = maths.repeat(lambda x, a: [0.5 * (x[0] + a[0] / x[0]), x[1] + 1], 6, [2.0, 0], [2.0])
+    assert found.tolist() == [pytest.approx(math.sqrt(2.0), abs=1e-15), 6.0]
+    assert maths.repeat(lambda x, a: [2.0 * x[0]], 0, [3.0], []).tolist() == [3.0]

@@ -76,13 +76,18 @@ class Functions(Component):
     w = Input("1", [0.5, -0.25, 2.0], shape=(3,), minimum=-3.0, maximum=3.0, description="an array")
     flag = Input("1", False, description="a condition")
     s = State("1", 0.5, description="a state")
-    scalars = Output("1", shape=(22,), description="of scalars")
+    scalars = Output("1", shape=(24,), description="of scalars")
     arrays = Output("1", shape=(12,), description="of arrays")
     flags = Output("1", bool, shape=(6,), description="conditions")
     integer = Output("1", int, description="an integer")
 
     def derivatives(self):
         return {"s": maths.sin(self.u) - self.s**2}
+
+    def _newton(self, values, given):
+        """Towards the square root of the first of two; how often the other was exceeded."""
+        root, count = values
+        return [0.5 * (root + given[0] / root), count + maths.where(root > given[1], 1.0, 0.0)]
 
     def outputs(self):
         a, u, w = self.a, self.u, self.w
@@ -111,6 +116,7 @@ class Functions(Component):
                 maths.piecewise_constant(u, [0.0, 1.0], self.table[:2]),
                 maths.piecewise_linear(u, [-1.0, 0.0, 2.0], self.table),
                 self.whole / 2 + self.whole * u - self.whole,
+                *maths.repeat(self._newton, 4, [positive, 0.0], [positive, u]),
             ],
             "arrays": [
                 *(w * a - u / (w * w + 1.0)),

@@ -19,8 +19,8 @@ def compiled(tmp_path):
     """The C function of some expressions in x and y, as a function of Python's."""
 
     def build(results, symbols):
-        text = HEAD + ccode.function("f", [("u", ca.vertcat(*symbols))], results)
-        text += "void call(const double *u, double *result) { f(u, result); }\n"
+        text = HEAD + "\n".join(ccode.function("x_f", [("u", ca.vertcat(*symbols))], results))
+        text += "void call(const double *u, double *result) { x_f(u, result); }\n"
         (tmp_path / "f.c").write_text(text)
         command = ["gcc", "-std=c11", "-Wall", "-Wextra", "-Werror", "-O1", "-ffp-contract=off", "-shared", "-fPIC"]
         subprocess.run([*command, tmp_path / "f.c", "-o", tmp_path / "f.so", "-lm"], check=True)
@@ -103,7 +103,7 @@ def test_what_is_not_chosen_is_not_computed():
     x, y = ca.SX.sym("x"), ca.SX.sym("y")
     shared, rare = ca.sin(x), ca.exp(y)
     chosen = ca.if_else(x > 0, shared, ca.if_else(y > 0, rare * shared, ca.cos(y)))
-    code = ccode.function("f", [("u", ca.vertcat(x, y))], [chosen, shared])
+    (code,) = ccode.function("f", [("u", ca.vertcat(x, y))], [chosen, shared])
     depth = {name: code.split(f"{name}(")[0].splitlines()[-1].count("    ") for name in ("sin", "exp", "cos")}
     assert depth == {"sin": 1, "exp": 3, "cos": 3}
 
@@ -122,6 +122,25 @@ def test_choices_inside_choices_and_truths_as_numbers(compiled):
 def test_arguments_that_nothing_reads_are_no_warnings(compiled):
     x, y = ca.SX.sym("x"), ca.SX.sym("y")
     assert compiled([ca.SX(7.0)], [x, y])(1.0, 2.0) == [7.0]
+
+
+def test_functions_that_are_called_stand_there_once_each(compiled):
+    """Nested, with derivatives, with arguments that are conditions, and with results that nobody reads."""
+    x, y = ca.SX.sym("x"), ca.SX.sym("y")
+    kept = {"never_inline": True}
+    inner = ca.Function("inner", [x], [ca.vertcat(ca.sin(x), x * x)], kept)
+    both = ca.SX.sym("both", 2)
+    outer = ca.Function("outer", [both, y], [ca.vertcat(inner(both[0])[0] * y, both[1] + both[0], y)], kept)
+    first = outer(ca.vertcat(x, x < y), y)
+    second = outer(first[:2], 2.0)
+    column = ca.vertcat(second[:2], ca.jtimes(second[:2], x, ca.SX(1.0)))
+    seen = compiled([column[k] for k in range(4)], [x, y])(0.3, 0.7)
+    a, b = math.sin(0.3) * 0.7, 1.0 + 0.3
+    assert seen[:2] == [math.sin(a) * 2.0, b + a]
+    slope = math.cos(0.3) * 0.7
+    assert seen[2:] == pytest.approx([math.cos(a) * slope * 2.0, 1.0 + slope], abs=1e-15)
+    texts = ccode.function("x_f", [("u", ca.vertcat(x, y))], [second[0], second[1]])
+    assert [text.count("x_step_") - text.count("static void x_step_") for text in texts] == [0, 1, 2]
 
 
 @pytest.mark.parametrize("value", [0.1, 1 / 3, -5e-324, 1.7976931348623157e308, -0.0, 12345678901234567.0, 1.0])
