@@ -15,6 +15,7 @@ from .cruise.guarded import GuardedCruise
 from .cruise.monitors import IntermediateEstimator, StateFaultObserver
 from .cruise.port import CruiseController
 from .cruise.range_potential import RangePotentialCruise
+from .cruise.time_headway import TimeHeadwayCruise
 from .cruise.tunable_potential import TunablePotentialCruise
 from .declarations import Data, Input, Memory, Noise, Output, Parameter, Size, State, Tape
 from .environment.actuator_faults import ActuatorFaults
@@ -99,6 +100,7 @@ __all__ = [
     "StateFaultObserver",
     "SubwayTrain",
     "Tape",
+    "TimeHeadwayCruise",
     "Timetable",
     "Train",
     "TripMonitor",

@@ -15,6 +15,7 @@ from .cruise.fault_tolerant import BacksteppingCruise, FaultTolerantCruise, Faul
 from .cruise.fixed_distance import FixedDistanceCruise
 from .cruise.monitors import IntermediateEstimator, StateFaultObserver
 from .cruise.range_potential import RangePotentialCruise
+from .cruise.time_headway import TimeHeadwayCruise
 from .cruise.tunable_potential import TunablePotentialCruise
 from .environment.actuator_faults import ActuatorFaults
 from .environment.gaussian_disturbance import GaussianDisturbance
@@ -48,6 +49,7 @@ CATALOGUE: dict[str, type[Component]] = {
         TunablePotentialCruise,
         FixedDistanceCruise,
         RangePotentialCruise,
+        TimeHeadwayCruise,
         Schedule,
         Gust,
         Sinusoid,

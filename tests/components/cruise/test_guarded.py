@@ -12,10 +12,11 @@ from railcosim.components import (
     GuardedCruise,
     RangePotentialCruise,
     Simulation,
+    TimeHeadwayCruise,
     TunablePotentialCruise,
 )
 
-LAWS = (ComfortCruise, FixedDistanceCruise, RangePotentialCruise, TunablePotentialCruise)
+LAWS = (ComfortCruise, FixedDistanceCruise, RangePotentialCruise, TimeHeadwayCruise, TunablePotentialCruise)
 SCENE = {
     "position": 0.0,
     "speed": 70.0,
