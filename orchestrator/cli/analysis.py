@@ -8,6 +8,7 @@ from typing import Annotated, Any
 import typer
 
 from .. import world
+from ..errors import ScenarioError
 from . import completing
 from .documents import Answer
 from .options import (
@@ -36,8 +37,9 @@ Scenarios = Annotated[
     list[str],
     typer.Argument(
         metavar="SCENARIO...",
-        help="Shipped scenarios (see 'orchestrate list'), or .toml files.",
-        autocompletion=completing.scenarios,
+        help="Shipped scenarios (see 'orchestrate list'), or .toml files; or results: directories of runs, and "
+        "files of any tool (.csv, .parquet, .h5, .mat), the first of which is the reference.",
+        autocompletion=completing.comparable,
     ),
 ]
 
@@ -74,6 +76,27 @@ def compare(
         ),
     ] = None,
     kind: Kind = KindName.auto,
+    tolerance: Annotated[
+        float | None,
+        typer.Option(
+            min=1e-15,
+            help="Of results: half the tube around the reference, as part of a signal's range and of the duration; "
+            "0.002 by default.",
+        ),
+    ] = None,
+    time_tolerance: Annotated[
+        float | None, typer.Option(min=0.0, metavar="S", help="Of results: half the tube in time in s instead.")
+    ] = None,
+    nominal: Annotated[
+        float | None,
+        typer.Option(
+            min=1e-300, help="Of results: the range that a signal is taken to have at least; 0.001 by default."
+        ),
+    ] = None,
+    signals: Annotated[
+        list[str] | None,
+        typer.Option("--signal", metavar="PATTERN", help="Of results: compare these, as 'train*.speed'; repeatable."),
+    ] = None,
     output: Annotated[
         Path | None, typer.Option("--output", "-o", help="Directory; results/compare-<scenarios> by default.")
     ] = None,
@@ -83,17 +106,35 @@ def compare(
     dpi: Dpi = None,
     quiet: Quiet = False,
 ) -> Answer:
-    """Run variants side by side: one table of metrics, a winner per row, overlaid figures.
+    """Run variants side by side: one table of metrics, a winner per row, overlaid figures. Or compare recorded results.
 
     Variants: each SCENARIO as it stands, then under each --preset, then with each --swap. Several changes to one
     variant are parted by commas: --swap cruise=A,train=B. Exit codes: 0 fine; 1 a requirement failed in a variant; 2
     the input is wrong; 3 a variant failed; 130 interrupted by Ctrl-C, 143 by SIGTERM, 129 by SIGHUP.
+
+    Results: each signal that the others share with the first is to run in a tube around it. Exit codes: 0 all do; 1 one
+    leaves its tube, or ends too early; 2 the input is wrong.
     """
     from ..comparison import compare as compare_systems
-    from ..comparison import read_directions, variants
+    from ..comparison import is_recorded, read_directions, variants
     from .documents import compare_document
     from .printing import show_comparison, show_page, show_progress
 
+    of_results = {"tolerance": tolerance, "time_tolerance": time_tolerance, "nominal": nominal, "signals": signals}
+    of_variants = (presets, swaps, settings, builds, directions, stop, step, report or None, figure_format, dpi)
+    if any(map(is_recorded, scenarios)):
+        if not all(map(is_recorded, scenarios)) or any(of_variants) or kind is not KindName.auto:
+            raise ScenarioError(
+                "results are compared with results alone, as they are: give no scenario beside them, and of the "
+                "options --tolerance, --time-tolerance, --nominal, --signal, --output, --no-figures and --quiet"
+            )
+        given = {key: value for key, value in of_results.items() if value is not None}
+        return _compare_recorded(scenarios, output, given, figures=not no_figures, quiet=quiet)
+    if any(value is not None for value in of_results.values()):
+        raise ScenarioError(
+            "--tolerance, --time-tolerance, --nominal and --signal are about recorded results: name directories of "
+            "runs, or files such as a.csv"
+        )
     if report:
         from ..report import check_drawable
 
@@ -135,6 +176,18 @@ def compare(
     code = FMU_FAILED if comparison.broken else FAILED if comparison.requirement_failed else OK
     code = interrupted(comparison.interrupted) if comparison.interrupted else code
     return Answer(lambda: compare_document(comparison, page), show, code)
+
+
+def _compare_recorded(
+    paths: list[str], output: Path | None, given: dict[str, Any], *, figures: bool, quiet: bool
+) -> Answer:
+    from ..comparison import compare_recorded
+    from .documents import recorded_document
+    from .printing import show_recorded
+
+    directory = output or Path("results") / "-".join(["compare", *dict.fromkeys(Path(path).stem for path in paths)])
+    found = compare_recorded(paths, output=directory, figures=figures, **given)
+    return Answer(lambda: recorded_document(found), lambda: show_recorded(found, quiet), OK if found.same else FAILED)
 
 
 def linearize(

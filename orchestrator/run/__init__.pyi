@@ -7,7 +7,7 @@ from .execution import at_half_the_step, execute, go_on, resume, run
 from .outcome import Run, Status
 from .record import add_step_check, read_metrics
 from .record import read as read_record
-from .recording import CSV_FILE, ROWS_FILE, Results, Telling, read_json, recover_rows
+from .recording import CSV_FILE, RESULT_ENDINGS, ROWS_FILE, Results, Telling, read_json, recover_rows
 from .repeating import Flown, Repeater, listening
 from .revision import Revision
 from .session import Progress
@@ -17,6 +17,7 @@ from .watching import Finding
 __all__ = [
     "CHECKPOINT_FILE",
     "CSV_FILE",
+    "RESULT_ENDINGS",
     "ROWS_FILE",
     "Checked",
     "Finding",

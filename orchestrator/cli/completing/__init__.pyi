@@ -2,6 +2,7 @@ from .bash import completing_bash
 from .words import (
     algorithms,
     assignments,
+    comparable,
     components,
     designs,
     instances,
@@ -21,6 +22,7 @@ from .words import (
 __all__ = [
     "algorithms",
     "assignments",
+    "comparable",
     "completing_bash",
     "components",
     "designs",

@@ -24,6 +24,12 @@ def scenarios(incomplete: str) -> list[tuple[str, str]]:
     return [*shipped(), *((path, "") for path in _files(incomplete, ".toml"))]
 
 
+def comparable(incomplete: str) -> list[tuple[str, str]]:
+    """Scenarios, and files of results, by `run.RESULT_ENDINGS`."""
+    endings = (".csv", ".h5", ".hdf5", ".mat", ".mtsf", ".parquet")
+    return [*scenarios(incomplete), *((path, "") for path in _files(incomplete, *endings) if not path.endswith("/"))]
+
+
 def components(incomplete: str) -> list[str]:
     """Shipped components, and files with ones of one's own."""
     return [*_component_names(), *_files(incomplete, ".py")]

@@ -1,4 +1,4 @@
-from .analysis import compare_document, linearize_document
+from .analysis import compare_document, linearize_document, recorded_document
 from .answer import Answer, answering, fail, failed, wants_json
 from .catalogue import DOCUMENTS
 from .envelope import Document, Failure, Mistake
@@ -32,6 +32,7 @@ __all__ = [
     "optimize_document",
     "pack_document",
     "plain",
+    "recorded_document",
     "replay_document",
     "reproduce_document",
     "run_document",

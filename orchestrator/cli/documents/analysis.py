@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from ...comparison import Comparison, Row
+from ...comparison import Comparison, RecordedComparison, Row
 from ...run import Finding
 
 if TYPE_CHECKING:
@@ -76,6 +76,84 @@ def compare_document(comparison: Comparison, report: Path | None) -> CompareDocu
         str(comparison.directory) if comparison.directory else None,
         [str(path) for path in comparison.figures],
         None if report is None else str(report),
+    )
+
+
+@dataclass(frozen=True)
+class DeviationDocument:
+    """A signal against the reference: the distance of its worst point, at a time in s, and how large it may be."""
+
+    signal: str
+    unit: str
+    inside: bool
+    distance: float
+    height: float
+    width: float
+    at: float
+    value: float
+    outside: int
+    points: int
+
+
+@dataclass(frozen=True)
+class TestedDocument:
+    """Results that were compared with the reference.
+
+    Attributes:
+        short: why they do not cover its time. lacking: signals that it has alone. more: signals that these have alone.
+    """
+
+    name: str
+    same: bool
+    short: str
+    signals: list[DeviationDocument]
+    lacking: list[str]
+    more: list[str]
+    notes: list[str]
+
+
+@dataclass(frozen=True)
+class RecordedDocument:
+    """Recorded results, of which the first is the reference of the others."""
+
+    reference: str
+    same: bool
+    tested: list[TestedDocument]
+    directory: str | None
+    figures: list[str]
+
+
+def recorded_document(comparison: RecordedComparison) -> RecordedDocument:
+    """The document of a comparison of recorded results."""
+    tested = [
+        TestedDocument(
+            one.name,
+            one.same,
+            one.short,
+            [
+                DeviationDocument(
+                    row.signal,
+                    row.unit,
+                    row.inside,
+                    row.departure.distance,
+                    row.tube.height,
+                    row.tube.width,
+                    row.departure.at,
+                    row.departure.value,
+                    row.departure.outside,
+                    row.departure.points,
+                )
+                for row in one.deviations
+            ],
+            one.lacking,
+            one.more,
+            one.notes,
+        )
+        for one in comparison.tested
+    ]
+    directory = str(comparison.directory) if comparison.directory else None
+    return RecordedDocument(
+        comparison.reference, comparison.same, tested, directory, [str(path) for path in comparison.figures]
     )
 
 

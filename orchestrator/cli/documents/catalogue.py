@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
-from .analysis import CompareDocument, LinearizeDocument
+from .analysis import CompareDocument, LinearizeDocument, RecordedDocument
 from .listing import ListDocument
 from .models import ModelDocument, NewDocument, PackDocument, ValidateDocument
 from .runs import ReproduceDocument, RunDocument
@@ -25,7 +25,7 @@ DOCUMENTS: dict[str, Any] = {
     "pack": PackDocument,
     "validate": ValidateDocument,
     "new": NewDocument,
-    "compare": CompareDocument,
+    "compare": CompareDocument | RecordedDocument,
     "linearize": LinearizeDocument,
     "falsify": FalsifyDocument,
     "optimize": OptimizeDocument,

@@ -1,4 +1,4 @@
-from .comparison import show_comparison
+from .comparison import show_comparison, show_recorded
 from .console import open_console, say, show_notes, show_page
 from .findings import show_findings
 from .interface import show_interface, show_model, show_report
@@ -25,6 +25,7 @@ __all__ = [
     "show_optimized",
     "show_page",
     "show_progress",
+    "show_recorded",
     "show_report",
     "show_reproduced",
     "show_run",

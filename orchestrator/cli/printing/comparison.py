@@ -1,4 +1,8 @@
-"""A comparison as it is printed: a column for each variant, the best value of a row in green."""
+"""Comparisons as they are printed.
+
+Of variants with a column for each, the best value of a row in green; of recorded results those signals that leave the
+tubes around the reference.
+"""
 
 from __future__ import annotations
 
@@ -8,13 +12,16 @@ from rich.console import Console
 from rich.table import Table
 from rich.text import Text
 
-from ...comparison import Comparison
+from ...comparison import Comparison, RecordedComparison
 from ..lines import and_figures
 from .console import open_console, say, show_notes
 from .findings import show_findings
 from .tables import fits, number, prefixed, show_reasons, table, verdict
 
 _BEST = "bold green"
+_MOST = 20
+"""Signals that are shown of those that leave their tubes."""
+_LISTED = 6
 
 
 def show_comparison(comparison: Comparison, quiet: bool) -> None:
@@ -79,3 +86,43 @@ def _verdicts(comparison: Comparison, heads: Sequence[str]) -> Table:
     for name, verdicts in comparison.verdicts().items():
         made.add_row(Text(name), *map(verdict, verdicts))
     return made
+
+
+def show_recorded(comparison: RecordedComparison, quiet: bool) -> None:
+    """A table and a line for each of the results; when quiet, the lines of those that depart alone."""
+    out = open_console(stderr=quiet)
+    for one in comparison.tested:
+        outside = [row for row in one.deviations if not row.inside]
+        if not quiet:
+            show_notes(out, one.notes)
+            _tell(out, f"{comparison.reference} alone has", one.lacking)
+            _tell(out, f"{one.name} alone has", one.more)
+            heads = ("furthest away", "may be", "at s", "points outside")
+            made = table(
+                f"{one.name} against {comparison.reference}",
+                ("signal", *heads, "unit", ""),
+                right=heads,
+                fold=("signal",),
+            )
+            for row in outside[:_MOST] or one.deviations[:1]:
+                told = row.departure
+                numbers = (f"{told.distance:.4g}", f"{row.tube.height:.4g}", f"{told.at:.6g}")
+                counted = f"{told.outside} of {told.points}"
+                made.add_row(row.signal, *numbers, counted, row.unit, verdict("pass" if row.inside else "fail"))
+            out.print(made)
+            out.print()
+        if one.same and quiet:
+            continue
+        inside = f"{len(one.deviations) - len(outside)} of {len(one.deviations)} signals stay in their tubes"
+        say(out, f"{one.name}: {inside}", "green" if one.same else "bold red")
+        if one.short:
+            say(out, f"{one.name}: {one.short}", "bold red")
+    if not quiet and comparison.directory is not None:
+        files = f"compare.json, compare.csv{and_figures(len(comparison.figures))}"
+        say(out, f"Files in {comparison.directory}: {files}", whole=True)
+
+
+def _tell(out: Console, head: str, names: Sequence[str]) -> None:
+    if names:
+        more = f" and {len(names) - _LISTED} more" if len(names) > _LISTED else ""
+        say(out, f"{head} {', '.join(names[:_LISTED])}{more}", "dim")

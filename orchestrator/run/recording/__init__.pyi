@@ -1,4 +1,5 @@
 from .binary import remove_rows
+from .formats import ENDINGS as RESULT_ENDINGS
 from .recorder import ROWS_FILE, SEEN_FILE, Due, Recorder
 from .recording import Recording, check_stored
 from .results import Results
@@ -8,6 +9,7 @@ from .told import check_size, read_json
 
 __all__ = [
     "CSV_FILE",
+    "RESULT_ENDINGS",
     "ROWS_FILE",
     "SEEN_FILE",
     "Due",

@@ -16,6 +16,7 @@ from ...figures import plot
 from ...markup import escaped, number, table
 from ...times import digits
 from .columns import Columns, InMemory
+from .formats import ENDINGS, read_file
 from .missing import missing_signal, shortened
 from .stored import read_stored
 from .told import read_json
@@ -161,12 +162,19 @@ class Results(Mapping[str, NDArray[Any]]):
 
     @classmethod
     def load(cls, directory: str | Path) -> Results:
-        """Read a results directory back, complete or cut short.
+        """Read a results directory back, complete or cut short, or a result file of any tool.
+
+        Args:
+            directory: of a run; or a file, by its ending CSV, Parquet, HDF5 or MAT, which knows no parameters and whose
+                step is the median of those between its points.
 
         Raises:
-            ScenarioError: the directory holds no readable run.
+            ScenarioError: the directory holds no readable run, or the file no results.
+            RailcosimError: a library for the file is missing.
         """
         directory = Path(directory)
+        if directory.suffix.lower() in ENDINGS and not directory.is_dir():
+            return cls._of_file(directory)
         try:
             record = read_json(directory / "run.json")
             columns = read_stored(directory, record)
@@ -187,6 +195,14 @@ class Results(Mapping[str, NDArray[Any]]):
             raise ScenarioError(f"{directory} holds no run that can be read: it has no {error}") from error
         except (OSError, ValueError, TypeError, RecursionError) as error:
             raise ScenarioError(f"{directory} holds no run that can be read: {error}") from error
+
+    @classmethod
+    def _of_file(cls, path: Path) -> Results:
+        found = read_file(path)
+        time = found.columns[_TIME]
+        steps = np.diff(time)
+        step, stop = float(np.median(steps)) if len(steps) else 0.0, float(time[-1])
+        return cls(found.columns, None, units=found.units, parameters={}, step=step, stop_time=stop, completed=True)
 
 
 def _check_record(record: Mapping[str, Any]) -> None:
