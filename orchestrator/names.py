@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import re
 from collections.abc import Iterable, Iterator
 from typing import NamedTuple
@@ -13,6 +14,8 @@ _INDICES = re.compile(r"\[( *-?\d{1,9} *(?:, *-?\d{1,9} *)*)\]")
 _NAME_OR_INDICES = re.compile(rf"'(?:[^'\\]|\\.)*'|{_INDICES.pattern}", re.DOTALL)
 
 _PARTS = re.compile(r"(?:'(?:[^'\\]|\\.)*'|\[[^\]]*\]|[^,])+")
+_SPAN = re.compile(r"(-?\d{1,9})?:(-?\d{1,9})?")
+_BRACKETS = re.compile(r"\[[^\[\]]*\]")
 
 
 class SignalName(NamedTuple):
@@ -76,6 +79,70 @@ class SignalName(NamedTuple):
         return self.instance in (other.instance, other.group) and (
             other.variable == self.variable or other.variable.startswith(f"{self.variable}[")
         )
+
+
+class Slice(NamedTuple):
+    """Elements chosen by ranges of indices, both ends included: ``a[2:4]``, ``m[1,:]``, ``cell[2:].t``.
+
+    Attributes:
+        pattern: of the elements' names as `plainly` writes them, a group for each range.
+        ends: the first and the last index of each range; None where it is open.
+    """
+
+    pattern: re.Pattern[str]
+    ends: tuple[tuple[int | None, int | None], ...]
+
+    @classmethod
+    def parse(cls, variable: str) -> Slice | None:
+        """The slice that a variable's name stands for; None where it has no range."""
+        ends: list[tuple[int | None, int | None]] = []
+
+        def read(item: str) -> str:
+            match = _SPAN.fullmatch(item)
+            if match is None:
+                return re.escape(item)
+            ends.append((int(match[1]) if match[1] else None, int(match[2]) if match[2] else None))
+            return INDEX
+
+        text, pattern, done = plainly(variable), "", 0
+        for group in _BRACKETS.finditer(text):
+            items = ",".join(map(read, group[0][1:-1].split(",")))
+            pattern += f"{re.escape(text[done : group.start()])}\\[{items}\\]"
+            done = group.end()
+        return cls(re.compile(pattern + re.escape(text[done:])), tuple(ends)) if ends else None
+
+    def among(self, names: Iterable[str]) -> list[tuple[tuple[int, ...], str]]:
+        """Those of some names that it chooses, with their indices in the ranges and in their order.
+
+        None are chosen where one of the ends is not among them: a range says which elements there are.
+        """
+        matches = ((match, name) for name in names if (match := self.pattern.fullmatch(name)))
+        found = sorted((tuple(map(int, match.groups())), name) for match, name in matches)
+        chosen = [(place, name) for place, name in found if self._covers(place)]
+        there = [{place[k] for place, _ in chosen} for k in range(len(self.ends))]
+        missing = (
+            end not in own for ends, own in zip(self.ends, there, strict=True) for end in ends if end is not None
+        )
+        return [] if any(missing) else chosen
+
+    def _covers(self, place: tuple[int, ...]) -> bool:
+        return all(
+            (low is None or low <= index) and (high is None or index <= high)
+            for index, (low, high) in zip(place, self.ends, strict=True)
+        )
+
+
+def shape_of(elements: Iterable[str]) -> tuple[int, ...]:
+    """How many elements stand side by side in each direction; a direction that has one does not count.
+
+    Elements that fill no rectangle, and what has no indices, are one row.
+    """
+    indices = [SignalName("", element).indices for element in elements]
+    if len({len(place) for place in indices}) != 1:
+        return (len(indices),)
+    sizes = (len(set(direction)) for direction in zip(*indices, strict=True))
+    shape = tuple(size for size in sizes if size > 1)
+    return shape if math.prod(shape) == len(indices) else (len(indices),)
 
 
 def arrays_of(variable: str) -> Iterator[tuple[str, tuple[int, ...]]]:

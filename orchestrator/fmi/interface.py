@@ -10,7 +10,7 @@ from typing import Any, Literal, NamedTuple
 
 from ...fmus.annotation import Annotation
 from ...fmus.kinds import FmuKind
-from ..names import INDEX, SignalName, plainly
+from ..names import SignalName, Slice, plainly
 
 Type = Literal["Real", "Integer", "Boolean", "String", "Enumeration"]
 
@@ -40,6 +40,8 @@ class Sort(NamedTuple):
     relative: bool = False
     fmi_type: str = ""
     negated: bool = False
+    media: str = ""
+    longest: int | None = None
 
 
 class Variable(NamedTuple):
@@ -49,6 +51,8 @@ class Variable(NamedTuple):
     ``derivative`` names the state that it is the rate of. ``choices`` are the items of an enumeration, name and value.
     ``relative``: a difference, to which the offset of its unit does not apply. ``fmi_type`` is its type in FMI 3.0
     (``"Float32"``), empty in other versions. ``negated``: what the FMU keeps is its negative (FMI 1.0).
+    ``media`` and ``longest``: of a Binary variable, whose values are texts of hexadecimal digits here: its MIME type,
+    and how many bytes it may have.
     ``element``: of an FMI 3.0 array, whose elements share its reference: the array's name, and the place from 0.
 
     An FMU may have a million of them: what many have in common is kept once, as their ``sort``.
@@ -124,6 +128,21 @@ class Variable(NamedTuple):
         return self.sort.negated
 
     @property
+    def media(self) -> str:
+        """The MIME type of a Binary variable; empty where the FMU does not say."""
+        return self.sort.media
+
+    @property
+    def longest(self) -> int | None:
+        """How many bytes a Binary variable may have; None where the FMU does not say."""
+        return self.sort.longest
+
+    @property
+    def is_binary(self) -> bool:
+        """Whether its values are bytes, written as hexadecimal digits."""
+        return self.fmi_type == "Binary"
+
+    @property
     def settable(self) -> bool:
         """Whether a start value may be set before initialization."""
         if self.variability == "constant":
@@ -155,7 +174,8 @@ class Interface:
         version: of the FMI standard, ``"1.0"``, ``"2.0"`` or ``"3.0"``.
         event_mode: whether its events may be handled by its importer (FMI 3.0).
         output_derivatives: the highest order of them that it gives.
-        left_out: what variables are that the FMU has and we do not take, by name: ``"an array"``, ``"binary"``.
+        left_out: what variables are that the FMU has and we do not take, by name: ``"a clock"``.
+        structure: the structural parameters that were given other values than the file's, with these (FMI 3.0).
         warnings: what is wrong with the file though it can be used.
     """
 
@@ -182,6 +202,7 @@ class Interface:
     output_derivatives: int = 0
     annotation: Annotation | None = None
     left_out: Mapping[str, str] = field(default_factory=dict)
+    structure: Mapping[str, Any] = field(default_factory=dict)
     warnings: tuple[str, ...] = ()
 
     @property
@@ -268,7 +289,7 @@ class Interface:
         return tuple(v for v in self.variables.values() if v.causality in causalities)
 
     def scalars(self, name: str) -> tuple[str, ...] | None:
-        """The scalar names behind a name: itself, an array's elements or a part of them (``a[1,:]``), or None.
+        """The scalar names behind a name: itself, an array's elements or some of them (``a[1,2:4]``), or None.
 
         An index may be written with blanks or without, and those of one array in one pair of brackets or in several.
         """
@@ -287,18 +308,15 @@ class Interface:
         return {plainly(name): name for name in reversed(list(self.variables)) if "[" in name or " " in name}
 
     def _slice(self, name: str) -> tuple[str, ...] | None:
-        """The scalars of ``a[1,:]`` or ``cell[:].t``, in the order of their indices."""
-        pattern = re.compile(re.escape(plainly(name)).replace(":", INDEX))
-        found = [
-            (tuple(map(int, match.groups())), self._plainly[match[0]])
-            for match in map(pattern.fullmatch, self._plainly)
-            if match
-        ]
-        return tuple(scalar for _, scalar in sorted(found)) or None
+        """The scalars of ``a[1,2:4]`` or ``cell[:].t``, in the order of their indices."""
+        wanted = Slice.parse(name)
+        chosen = [] if wanted is None else wanted.among(self._plainly)
+        return tuple(self._plainly[plain] for _, plain in chosen) or None
 
     def elements_beside(self, name: str) -> str:
         """A remedy for an element that is not there: which there are; empty where it is an element of no array."""
-        there = self.arrays.get(SignalName("", name).array, ())
+        array = name[: name.rfind("[")] if ":" in name else SignalName("", name).array
+        there = self.arrays.get(array, ())
         if not there:
             return ""
         return f"there are {there[0]!r} to {there[-1]!r}" if len(there) > 1 else f"there is {there[0]!r}"
@@ -306,4 +324,4 @@ class Interface:
     def why_left_out(self, name: str) -> str:
         """A clause to append to an error about a name that is no variable: the FMU may have it all the same."""
         what = self.left_out.get(name)
-        return f": in the FMU it is {what}, and only numbers, booleans and texts are supported" if what else ""
+        return f": in the FMU it is {what}, which is not supported" if what else ""

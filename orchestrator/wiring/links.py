@@ -8,7 +8,7 @@ from typing import Any
 
 from ..errors import ScenarioError
 from ..fmi import Interface, Variable
-from ..names import SignalName
+from ..names import SignalName, shape_of
 from ..problems import Problem, suggestion
 from ..system import Connection
 from .conversion import fit
@@ -92,6 +92,11 @@ def find_links(connection: Connection, interfaces: Mapping[str, Interface], wiri
         raise ScenarioError(problems)
     if len(sources) != len(targets):
         raise ScenarioError(f"the output has {len(sources)} elements, the input {len(targets)}")
+    if len(sources) > 1 and (shapes := (shape_of(sources), shape_of(targets)))[0] != shapes[1]:
+        given, taken = (" by ".join(map(str, shape)) for shape in shapes)
+        raise ScenarioError(
+            Problem("", f"the output is {given}, the input {taken}", "connect it row by row, as y[1,:]")
+        )
     of_a, of_b = interfaces[source.instance], interfaces[target.instance]
     links = []
     for one, other in zip(sources, targets, strict=True):

@@ -3,7 +3,7 @@
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from railcosim.orchestrator.names import SignalName, arrays_of, parted, plainly
+from railcosim.orchestrator.names import SignalName, arrays_of, parted, plainly, shape_of
 
 
 @pytest.mark.parametrize(
@@ -43,6 +43,23 @@ def test_any_name_comes_back_as_it_was_written(text):
     assert "." not in name.instance
     assert str(name) == (text.removesuffix(".") if not name.variable else text)
     assert SignalName.parse(str(name)) == name
+
+
+@pytest.mark.parametrize(
+    ("names", "shape"),
+    [
+        (("a",), ()),
+        (("a[1]", "a[2]", "a[3]"), (3,)),
+        (("m[1,1]", "m[1,2]", "m[1,3]", "m[2,1]", "m[2,2]", "m[2,3]"), (2, 3)),
+        (("m[2,1]", "m[2,2]"), (2,)),
+        (("n[1][1]", "n[1][2]", "n[2][1]"), (3,)),
+        (("cell[1].t[2]", "cell[2].t[2]"), (2,)),
+        (("a[1]", "b"), (2,)),
+        (("a", "b"), (2,)),
+    ],
+)
+def test_the_shape_of_elements(names, shape):
+    assert shape_of(names) == shape
 
 
 def test_thousands_of_digits_are_no_index():
