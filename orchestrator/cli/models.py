@@ -64,8 +64,6 @@ def describe(
     # Any other file is told for what it is: an SSP, a folder with an unpacked FMU.
     is_file = not (is_scenario or name in CATALOGUE or ".py" in name) and Path(name).exists()
     is_fmu = is_fmu_name(name) or is_file
-    if is_fmu and arguments:
-        raise ScenarioError(f"{name} is built already; it takes no --with {', '.join(arguments)}")
     if is_scenario:
         system = load_system(name, None, None, builds, None)
         return Answer(lambda: scenario_document(system), lambda: show_system(open_console(), system))
@@ -75,7 +73,7 @@ def describe(
         raise ScenarioError(Problem("", f"there is no component or shipped scenario {name!r}", remedy))
     with show_compilations(quiet, doing=f"reading {name}"), Workspace() as workspace:
         path, _, lacks = (Path(name), "", "") if is_fmu else package(name, arguments)
-        interface = load_fmu(path, workspace).interface
+        interface = load_fmu(path, workspace, structure=arguments if is_fmu else {}).interface
     annotation = interface.annotation or Annotation()
     facts = {
         "": interface.description,

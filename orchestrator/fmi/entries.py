@@ -20,6 +20,8 @@ _RARE = {
     "max": "max",
     "nominal": "nominal",
     "derivative": "derivative",
+    "mimeType": "media",
+    "maxSize": "longest",
 }
 """Attributes that most variables do not have, and what they are called here."""
 _OF_PARAMETERS = {
@@ -69,7 +71,7 @@ class Entry:
         negated, guessed: of FMI 1.0: whether its value is another's negative, and whether its start value is a guess.
         fmi_type: in FMI 3.0. aliases: its other names there, as elements. alias: what this one is another name of.
         sizes: of FMI 3.0: the dimensions of an array, each a number or the reference of the variable that has it.
-        shape: the numbers.
+        shape: the numbers. media, longest: of Binary variables: the MIME type, and the most bytes.
     """
 
     # What nearly all of them have takes no dictionary; of the rest most have what stands here.
@@ -105,6 +107,9 @@ class Entry:
     clocks: str | None = None
     sizes: tuple[int | str, ...] = ()
     shape: tuple[int, ...] = ()
+    media: str | None = None
+    longest: str | None = None
+    resized: bool = False
 
     def named(self, name: str, start: str | None) -> Entry:
         """The same under another name, with another start value, and no array."""

@@ -10,7 +10,7 @@ from typing import Any, NamedTuple
 
 from ...fmus.build import Plain, package, plain
 from ...fmus.kinds import FmuKind, Kind, ModelKind, PackagingKind
-from ..errors import FmuFileError, ScenarioError
+from ..errors import ScenarioError
 from ..names import SignalName
 from ..problems import Problem
 from ..system import Instance, System
@@ -22,6 +22,8 @@ from .plain import PlainSlave
 from .reader import read_interface
 from .recognition import is_fmu_name
 from .slave import Slave
+
+_NO_STRUCTURE: Mapping[str, Any] = {}
 
 
 class Packaged(NamedTuple):
@@ -96,11 +98,7 @@ def _origin(system: System, instance: Instance, message: str) -> str:
 
 def _load(instance: Instance, workspace: Workspace, kind: Kind) -> Model:
     if is_fmu_name(instance.model):
-        if instance.build:
-            raise FmuFileError(
-                f"{instance.model} is built already; it takes no build arguments {sorted(instance.build)}"
-            )
-        model = load_fmu(Path(instance.model), workspace, "fmu")
+        model = load_fmu(Path(instance.model), workspace, "fmu", instance.build)
         found = library(model.folder, model.interface, instance.model)  # said now, not when the run has begun
         if found.stem == model.interface.identifier:
             return model
@@ -141,12 +139,20 @@ def _asked(reference: str, arguments: Mapping[str, Any], kind: PackagingKind) ->
     return json.dumps([reference, dict(arguments), kind], sort_keys=True, default=str)
 
 
-def load_fmu(path: Path, workspace: Workspace, kind: ModelKind = "fmu") -> Model:
+def load_fmu(
+    path: Path, workspace: Workspace, kind: ModelKind = "fmu", structure: Mapping[str, Any] = _NO_STRUCTURE
+) -> Model:
     """Unpack and read one FMU file; of one that is made here what a run needs.
 
+    Args:
+        path: the file.
+        workspace: where it is unpacked.
+        kind: what it is.
+        structure: values of its structural parameters by name (FMI 3.0).
+
     Raises:
-        FmuFileError: missing, hostile or unusable.
+        FmuFileError: missing, hostile or unusable, or it has no such structural parameters.
     """
     folder, digest, notes = workspace.unpack(path, to_run=kind != "fmu")
-    interface = read_interface(folder, str(path))
+    interface = read_interface(folder, str(path), structure)
     return Model(replace(interface, warnings=(*notes, *interface.warnings)), kind, folder, path, digest)

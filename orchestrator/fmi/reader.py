@@ -18,22 +18,24 @@ from .interface import Interface, Sort, Type, Unit, Variable
 from .reading import read
 from .translation import Beside, is_pedantry, translate
 
+_NO_STRUCTURE: Mapping[str, Any] = {}
 _EXPONENTS = ("kg", "m", "s", "A", "K", "mol", "cd", "rad")
 
 
-def read_interface(folder: Path, name: str) -> Interface:
+def read_interface(folder: Path, name: str, structure: Mapping[str, Any] = _NO_STRUCTURE) -> Interface:
     """The interface of an unpacked FMU.
 
     Args:
         folder: where it was unpacked.
         name: the file as the user knows it, for messages.
+        structure: values of its structural parameters by name (FMI 3.0).
 
     Raises:
         FmuFileError: not a co-simulation FMU of a version of FMI that is known, or a description beyond repair.
     """
     try:
         with _without_collection():
-            return _read(folder, name)
+            return _read(folder, name, structure)
     except FmuFileError:
         raise
     except Exception as error:
@@ -52,14 +54,16 @@ def _without_collection() -> Iterator[None]:
             gc.enable()
 
 
-def _read(folder: Path, name: str) -> Interface:
-    reading = read(folder / "modelDescription.xml", name)
+def _read(folder: Path, name: str, structure: Mapping[str, Any]) -> Interface:
+    reading = read(folder / "modelDescription.xml", name, structure=structure)
     version, faults = reading.version, reading.faults
     faults.add(problem for problem in reading.problems() if not is_pedantry(version, problem))
     beside = translate(reading.description, reading.root, version)
     warnings = [f"{name}: {text}" for text in faults.told()]
     interface = _interface(reading.description, reading.root, beside)
-    return replace(interface, version=version, warnings=(*warnings, *beside.warnings(name)))
+    given = {key: interface.variables[key].start for key in structure}
+    warnings += beside.warnings(name)
+    return replace(interface, version=version, structure=given, warnings=tuple(warnings))
 
 
 def _interface(description: Description, root: Any, beside: Beside) -> Interface:
@@ -115,7 +119,7 @@ def _variable(entry: Entry, made: Any, relative: Set[str], beside: Beside, sorts
         )
     key = (
         entry.type, entry.causality, entry.variability, entry.initial, unit, low, high, nominal, entry.declared,
-        entry.relative, entry.fmi_type, entry.negated,
+        entry.relative, entry.fmi_type, entry.negated, entry.media, entry.longest,
     )  # fmt: skip
     if key not in sorts:
         sorts[key] = Sort(
@@ -131,6 +135,8 @@ def _variable(entry: Entry, made: Any, relative: Set[str], beside: Beside, sorts
             relative=entry.declared in relative if entry.relative is None else entry.relative,
             fmi_type=entry.fmi_type,
             negated=entry.negated,
+            media=entry.media or "",
+            longest=None if entry.longest is None else int(entry.longest),
         )
     rate = entry.derivative
     return Variable(
@@ -167,7 +173,7 @@ def _start(entry: Entry) -> Any:
         return int(text)
     if entry.type == "Boolean":
         return text in ("true", "1", "True")
-    return text
+    return text.lower() if entry.fmi_type == "Binary" else text
 
 
 def _number(text: Any) -> float | None:

@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
+import copy
 import io
 import zipfile
 from array import array
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from pathlib import Path
 from typing import Any
 
@@ -16,29 +17,44 @@ from ..errors import FmuFileError
 from .document import Schema, parse, sections
 from .entries import Description, Entry, Texts, problems, read_entry, resolve
 from .repair import Faults, Repair
-from .translation import VERSIONS, is_for_co_simulation, other_kind, standard
+from .translation import VERSIONS, is_for_co_simulation, other_kind, restructure, standard
 
 _VARIABLES, _STRUCTURE = "ModelVariables", "ModelStructure"
 _OUTPUTS = {"2.0": ("ModelStructure/Outputs", "Unknown", "index"), "3.0": (_STRUCTURE, "Output", "valueReference")}
 """By version: where outputs are listed, as which elements, and by what they say which variable they are."""
 
+_OF_TYPES = {
+    "name",
+    "description",
+    "quantity",
+    "unit",
+    "displayUnit",
+    "relativeQuantity",
+    "min",
+    "max",
+    "nominal",
+    "unbounded",
+}
+"""Attributes of types that FMPy reads."""
 
-def read(path: Path, name: str, *, mending: bool = True) -> Reading:
+
+def read(path: Path, name: str, *, mending: bool = True, structure: Mapping[str, Any] | None = None) -> Reading:
     """Read a file.
 
     Args:
         path: the file.
         name: the FMU as the user knows it, for messages.
         mending: whether what tools get wrong is put right.
+        structure: values of structural parameters by name, in place of those in the file.
 
     Raises:
         FmuFileError: it is none of a co-simulation FMU of a version that is known.
         Exception: it cannot be used.
     """
-    reading = Reading(name, mending=mending)
+    reading = Reading(name, mending=mending, structure=structure)
     reading.take_all(path)
     if reading.is_late:
-        reading = Reading(name, mending=mending, before=reading)
+        reading = Reading(name, mending=mending, structure=structure, before=reading)
         reading.take_all(path)
     return reading
 
@@ -49,6 +65,7 @@ class Reading:
     Args:
         name: the FMU as the user knows it, for messages.
         mending: whether what tools get wrong is put right.
+        structure: values of structural parameters by name.
         before: a reading of the whole file, where what is referred to comes after what refers.
 
     Attributes:
@@ -59,8 +76,11 @@ class Reading:
     root: Any
     _schema: Schema
 
-    def __init__(self, name: str, *, mending: bool, before: Reading | None = None) -> None:
+    def __init__(
+        self, name: str, *, mending: bool, structure: Mapping[str, Any] | None, before: Reading | None = None
+    ) -> None:
         self.version = ""
+        self._structure = structure or {}
         self._name, self._is_mending = name, mending
         self._is_last = before is not None
         self._repair: Repair = Repair(None if before is None else before._repair)
@@ -183,6 +203,7 @@ class Reading:
                 known[depend] = frozenset(by_number[int(one)].name for one in (depend or "").split())
             by_number[number].depends = known[depend]
         del by_number, self._outputs, self._depend
+        restructure(entries, self._structure, self._name)
         resolve(entries, self.version)
 
 
@@ -195,8 +216,14 @@ def _refers_ahead(root: Any) -> bool:
 
 
 def _read_rest(root: Any) -> Any:
-    """What FMPy makes of everything else, out of an archive in memory."""
-    archive = io.BytesIO()
+    """What FMPy makes of everything else, out of an archive in memory.
+
+    Of types it is given the attributes that it knows: those of binary values and clocks it cannot read.
+    """
+    archive, root = io.BytesIO(), copy.deepcopy(root)
+    for made in root.iterfind("TypeDefinitions/*"):
+        for key in set(made.attrib) - _OF_TYPES:
+            del made.attrib[key]
     with zipfile.ZipFile(archive, "w") as stream:
         stream.writestr("modelDescription.xml", etree.tostring(root, encoding="UTF-8", xml_declaration=True))
     return read_model_description(archive, validate=False)

@@ -9,10 +9,12 @@ from __future__ import annotations
 import itertools
 import math
 import re
-from collections.abc import Iterator, Mapping, Set
+from collections.abc import Iterator, Mapping, Sequence, Set
 from dataclasses import dataclass, field
 from typing import Any
 
+from ..errors import FmuFileError
+from ..problems import suggestion
 from .entries import Description, Entry
 
 VERSIONS = {"1.0": re.compile(r"1\.0"), "2.0": re.compile(r"2\.0(\..*)?"), "3.0": re.compile(r"3\.\d+(\.\d+)?")}
@@ -20,8 +22,11 @@ VERSIONS = {"1.0": re.compile(r"1\.0"), "2.0": re.compile(r"2\.0(\..*)?"), "3.0"
 _TYPES_3 = {
     **dict.fromkeys(("Float32", "Float64"), "Real"),
     **{f"{sign}Int{bits}": "Integer" for sign in ("", "U") for bits in (8, 16, 32, 64)},
+    "Binary": "String",  # of hexadecimal digits
 }
 _TRUE = ("true", "1")
+_WHOLE = re.compile(r"U?Int\d+|Enumeration")
+_REAL = re.compile(r"Float\d+")
 _CAPABILITIES_1 = (
     "canHandleVariableCommunicationStepSize",
     "canInterpolateInputs",
@@ -142,11 +147,16 @@ def _from_3(description: Description, root: Any) -> Beside:
     left_out = {}
     arrays = any(v.sizes for v in description.entries)
     names = {v.name for v in description.entries} if arrays else set()
+    clocks = {str(v.reference): v.name for v in description.entries if v.type == "Clock"}
+    binaries = {each.get("name"): each for each in root.iterfind("TypeDefinitions/BinaryType")}
     for v in description.entries:
-        reason = _not_taken(v, names)
+        reason = _not_taken(v, names, clocks)
         if reason:
             left_out[v.name] = reason
             continue
+        if v.type == "Binary" and v.declared in binaries:  # what the variable does not say itself, its type does
+            v.media = v.media or binaries[v.declared].get("mimeType")
+            v.longest = v.longest or binaries[v.declared].get("maxSize")
         v.type = _TYPES_3.get(v.type, v.type)
         if v.causality == "structuralParameter":
             v.initial = None  # can be set in configuration mode only, which is for arrays
@@ -158,13 +168,11 @@ def _from_3(description: Description, root: Any) -> Beside:
     return Beside(left_out=left_out, places=places)
 
 
-def _not_taken(v: Entry, names: Set[str]) -> str:
+def _not_taken(v: Entry, names: Set[str], clocks: Mapping[str, str]) -> str:
     if v.type == "Clock":
         return "a clock"
-    if v.type == "Binary":
-        return "binary"
     if v.clocks:
-        return "clocked"
+        return f"clocked by {', '.join(clocks.get(each, each) for each in v.clocks.split())}"
     if not v.sizes:
         return ""
     count = math.prod(v.shape)
@@ -203,8 +211,13 @@ def _element_names(v: Entry) -> list[str]:
 
 
 def _starts(v: Entry, count: int) -> list[Any]:
-    """The start values of an array's elements; one that stands alone is that of all."""
+    """The start values of an array's elements; one that stands alone is that of all.
+
+    A list belongs to the size in the file: what the FMU makes of it at another size, nobody says.
+    """
     starts = list(v.starts) if v.type == "String" else (v.start or "").split()
+    if v.resized and len(starts) > 1:
+        return [None] * count
     if len(starts) not in (0, 1, count):
         raise ValueError(f'the array "{v.name}" has {len(starts)} start values for {count} elements')
     return starts if len(starts) == count else [*(starts or [None])] * count
@@ -215,3 +228,56 @@ def _show_as_alias(v: Entry) -> None:
     v.causality = "local"
     assert v.alias is not None
     v.description = f"{v.description or ''} (another name of {v.alias.name})".strip()
+
+
+# -------------------------------------------------------------------- structural parameters of FMI 3.0
+
+
+def restructure(entries: Sequence[Entry], given: Mapping[str, Any], name: str) -> None:
+    """Give structural parameters other values, in place: the description is as if it had been written so.
+
+    The FMU itself is given them in its configuration mode (`binding.fmi3`). Lists of start values of arrays that change
+    their size go.
+
+    Args:
+        entries: the variables as they are written.
+        given: values by name.
+        name: the FMU as the user knows it, for messages.
+
+    Raises:
+        FmuFileError: there is no such parameter, or it cannot have the value.
+    """
+    own = {entry.name: entry for entry in entries if entry.causality == "structuralParameter"}
+    if not own and given:
+        raise FmuFileError(f"{name} is built already; it takes no build arguments {sorted(given)}")
+    for key, value in given.items():
+        if key not in own:
+            near = suggestion(key, own) or f"there are {', '.join(own)}"
+            raise FmuFileError(f"{name} has no structural parameter {key!r}; {near}")
+        own[key].start = _written(own[key], value, name)
+    changed = {str(own[key].reference) for key in given}
+    for entry in entries:
+        entry.resized = any(size in changed for size in entry.sizes)
+
+
+def _written(entry: Entry, value: Any, name: str) -> str:
+    """A value as a description has it."""
+    what = f"{name}: the structural parameter {entry.name!r} takes"
+    is_number = isinstance(value, int | float) and not isinstance(value, bool)
+    if _WHOLE.fullmatch(entry.type):
+        if not is_number or value != int(value):
+            raise FmuFileError(f"{what} a whole number, not {value!r}")
+        value = int(value)
+    elif _REAL.fullmatch(entry.type):
+        if not is_number:
+            raise FmuFileError(f"{what} a number, not {value!r}")
+    elif entry.type == "Boolean":
+        if not isinstance(value, bool):
+            raise FmuFileError(f"{what} true or false, not {value!r}")
+        return str(value).lower()
+    elif not isinstance(value, str):
+        raise FmuFileError(f"{what} text, not {value!r}")
+    for limit, wrong in ((entry.min, value.__lt__), (entry.max, value.__gt__)):
+        if is_number and limit is not None and wrong(type(value)(limit)):
+            raise FmuFileError(f"{what} {entry.min or 'any number'} to {entry.max or 'any number'}, not {value!r}")
+    return str(value)

@@ -13,7 +13,7 @@ from ..names import SignalName
 from ..problems import Problem, suggestion
 from ..system import ACTIONS, Event, System
 from ..times import digits
-from ..wiring import Wiring, bounded
+from ..wiring import Wiring, as_text, bounded
 from .algorithms import ALGORITHMS
 
 
@@ -89,8 +89,7 @@ def _wrong_value(event: Event, variable: Variable) -> Iterator[Problem]:
 def _typed(value: Any, variable: Variable) -> None:
     """Raise ScenarioError unless a variable can take this value."""
     if variable.type == "String":
-        if not isinstance(value, str):
-            raise ScenarioError(f"takes a text, not {value!r}")
+        as_text(value, variable)
     elif variable.type == "Boolean":
         if not isinstance(value, bool):
             raise ScenarioError(f"takes true or false, not {value!r}")

@@ -16,6 +16,7 @@ from ..fmi import Variable
 from ..names import SignalName
 from ..system import Event
 from ..times import slack
+from ..wiring import as_text
 from .exchange import Change, Exchange
 
 
@@ -257,7 +258,7 @@ def _first(event: Event, start: float) -> int | None:
 def given(value: Any, variable: Variable) -> float | int | str:
     """An event's value as the FMU takes it; an item of an enumeration may be named."""
     if variable.type == "String":
-        return str(value)
+        return as_text(value, variable)
     if variable.type == "Real":
         return float(value)
     return int(dict(variable.choices).get(value, value))

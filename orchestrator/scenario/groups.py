@@ -231,12 +231,9 @@ def expand_group(group: Group, problems: list[Problem]) -> list[tuple[Instance, 
             start[name] = entry
         options = {**group.options, **one.options}
         model, swapped = one.model or group.model, group.swapped if one.swapped is None else one.swapped
-        build = {**group.build, **one.build}
-        if build and is_fmu_name(model):  # what a swap left behind is nobody's mistake
-            if not swapped:
-                finished = f"'{model}' is a finished FMU and takes no build arguments"
-                problems.append(Problem(one.origin or group.origin, finished))
-            build = {}
+        build, built_by = {**group.build, **one.build}, {**group.built_by, **one.built_by}
+        if swapped and is_fmu_name(model):  # what a swap left behind is nobody's mistake
+            build = {name: value for name, value in build.items() if built_by.get(name, "").startswith("--")}
         instance = Instance(
             member(group.name, index),
             model,
@@ -250,7 +247,6 @@ def expand_group(group: Group, problems: list[Problem]) -> list[tuple[Instance, 
         )
         origins = {f"instances.{instance.name}.{key}": entry.origin for key, entry in options.items()}
         origins |= {f"{instance.name}.{name}": entry.origin for name, entry in start.items()}
-        built_by = {**group.built_by, **one.built_by}
         origins |= {f"instances.{instance.name}.build.{name}": origin for name, origin in built_by.items()}
         members.append((instance, origins))
     return members

@@ -17,6 +17,8 @@ _AS_IT_IS: dict[Type, tuple[Type, ...]] = {
 }
 """For an input's type, the output types it may follow without losing anything."""
 _AS_NUMBER: dict[Type, str] = {"Boolean": "false as 0, true as 1", "Enumeration": "the number of its item"}
+_ANY_BYTES = "application/octet-stream"
+"""The MIME type of Binary variables of which the FMU does not say it."""
 _A: dict[Type, str] = {kind: f"a{'n' * (kind[0] in 'EI')} {kind}" for kind in _AS_IT_IS}
 _MAKES: dict[Type, str] = {"Boolean": "threshold = 0.5 makes it true above 0.5"}
 _ROUNDS = "threshold = 0.5 takes the nearest whole number"
@@ -35,7 +37,8 @@ class Conversion:
 def fit(a: Variable, of_a: Interface, b: Variable, of_b: Interface, connection: Connection) -> Conversion:
     """How output ``a`` feeds input ``b``; the connection's scale and offset apply after the conversion of units."""
     scale, offset = 1.0 if connection.scale is None else connection.scale, connection.offset
-    if problem := _misfit(a.type, b.type, connection, is_changed=(scale, offset) != (1.0, 0.0)):
+    problem = _misfit(a.type, b.type, connection, is_changed=(scale, offset) != (1.0, 0.0)) or _other_bytes(a, b)
+    if problem:
         return Conversion(problem=problem)
     found = relate(a, of_a, b, of_b)
     if connection.scale is not None or offset:  # whoever gives a scale has taken care; an offset leaves its doubt
@@ -45,7 +48,7 @@ def fit(a: Variable, of_a: Interface, b: Variable, of_b: Interface, connection: 
             doubt="" if connection.scale is not None else found.doubt,
             note=told if found.refused else found.note,
         )
-    note = found.doubt or found.note or _told(a.type, b.type, connection.threshold)
+    note = found.doubt or found.note or _told(a.type, b.type, connection.threshold) or _told_of_bytes(a, b)
     note = "; ".join(filter(None, (note, _twice(found, scale, offset, a, b))))
     return Conversion(found.scale * scale, found.offset * scale + offset, found.refused, note)
 
@@ -80,6 +83,29 @@ def _misfit(a: Type, b: Type, connection: Connection, *, is_changed: bool) -> st
     if threshold is not None and b in ("Integer", "Enumeration") and not 0.0 <= threshold < 1.0:
         return f"for {_A[b]} input the threshold is the fraction above which it is rounded up: from 0 to below 1"
     return ""
+
+
+def _other_bytes(a: Variable, b: Variable) -> str:
+    """Why bytes and texts, or bytes of two MIME types, do not go together."""
+    if a.is_binary != b.is_binary:
+        kinds = [f"{'a Binary' if one.is_binary else _A[one.type]}" for one in (a, b)]
+        return f"{kinds[0]} output cannot feed {kinds[1]} input"
+    given, taken = ("".join(one.media.lower().split()).partition(";")[0] for one in (a, b))
+    if given != taken and _ANY_BYTES not in (given or _ANY_BYTES, taken or _ANY_BYTES):
+        return f"the output is {a.media!r}, the input takes {b.media!r}"
+    return ""
+
+
+def _told_of_bytes(a: Variable, b: Variable) -> str:
+    """What a user should know of bytes that may not be what the input takes."""
+    given, taken = ("".join(one.media.lower().split()) for one in (a, b))
+    notes = []
+    if given != taken:
+        notes.append(f"the output is {a.media or _ANY_BYTES!r}, the input takes {b.media or _ANY_BYTES!r}")
+    if b.longest is not None and (a.longest is None or a.longest > b.longest):
+        most = "any number of" if a.longest is None else a.longest
+        notes.append(f"the output may have {most} bytes, the input takes {b.longest}; more would stop the run")
+    return "; ".join(notes)
 
 
 def _told(a: Type, b: Type, threshold: float | None) -> str:

@@ -102,6 +102,8 @@ def _elements(
         ScenarioError: what is wrong with it.
     """
     fixed = next((interface.variables[s] for s in scalars if not interface.variables[s].settable), None)
+    if fixed is not None and fixed.causality == "structuralParameter":
+        raise ScenarioError(f"it is a structural parameter: give it in build = {{ {name} = ... }}")
     if fixed is not None and fixed.variability == "constant":
         raise ScenarioError("it is a constant of the model and cannot be set")
     if fixed is not None:
@@ -136,9 +138,7 @@ def _flatten(given: Any) -> list[Any]:
 def _typed(given: Any, variable: Variable, instance: Instance) -> Any:
     """A start value as the variable's type; text is an expression of ``i`` and ``count``, but for a text variable."""
     if variable.type == "String":
-        if not isinstance(given, str):
-            raise ScenarioError(f"takes text, not {given!r}")
-        return given
+        return as_text(given, variable)
     choices = dict(variable.choices)
     if isinstance(given, str) and given in choices:
         return choices[given]
@@ -152,6 +152,25 @@ def _typed(given: Any, variable: Variable, instance: Instance) -> Any:
     if is_truth or not isinstance(given, float | int | np.floating | np.integer):
         raise ScenarioError(f"takes a number, not {given!r}")
     return bounded(given, variable)
+
+
+def as_text(given: Any, variable: Variable) -> str:
+    """A text that a variable can take; of a Binary one its bytes, two hexadecimal digits each.
+
+    Raises:
+        ScenarioError: what is wrong with it.
+    """
+    if not isinstance(given, str):
+        raise ScenarioError(f"takes text, not {given!r}")
+    if not variable.is_binary:
+        return given
+    try:
+        content = bytes.fromhex(given)
+    except ValueError:
+        raise ScenarioError(f'takes bytes as hexadecimal digits, as in "00ff7a", not {given!r}') from None
+    if variable.longest is not None and len(content) > variable.longest:
+        raise ScenarioError(f"takes up to {variable.longest} bytes, not {len(content)}")
+    return content.hex()
 
 
 @lru_cache(maxsize=4096)

@@ -293,6 +293,21 @@ def arrays(compile_c, tmp_path):
 
 
 @pytest.fixture
+def shaped(compile_c, tmp_path):
+    """The FMU of shaped3.c, with parts of its description replaced."""
+
+    def pack(*changes, name="shaped.fmu"):
+        text = (FOREIGN / "shaped3.xml").read_text(encoding="utf-8")
+        for old, new in changes:
+            assert old in text
+            text = text.replace(old, new)
+        library = f"binaries/{fmpy.platform_tuple}/Shaped{fmpy.sharedLibraryExtension}"
+        return write_archive(tmp_path / name, {"modelDescription.xml": text, library: compile_c("shaped3.c")})
+
+    return pack
+
+
+@pytest.fixture
 def odd(odd_fmu, tmp_path):
     """The FMU of odd.c: y depends directly on v."""
     return odd_fmu(tmp_path)
@@ -334,8 +349,8 @@ def alone(workspace):
     """An instance of an FMU file, not yet initialized; given back at the end."""
     made = []
 
-    def make(path, name="it"):
-        made.append(load_fmu(Path(path), workspace).instantiate(name))
+    def make(path, name="it", structure=None):
+        made.append(load_fmu(Path(path), workspace, structure=structure or {}).instantiate(name))
         return made[-1]
 
     yield make

@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from typing import Any
 
 from ..interface import Interface
 from ..slave import Channel
+from .binary import BinaryChannel
 from .channel import FmuChannel, Owner
-
-_NOTHING: Mapping[str, Any] = {"Real": 0.0, "Integer": 0, "Enumeration": 0, "Boolean": False, "String": ""}
 
 
 def prepared(slave: Owner, kind: str, names: Sequence[str], given: dict[str, Any]) -> Channel:
@@ -21,10 +20,11 @@ def prepared(slave: Owner, kind: str, names: Sequence[str], given: dict[str, Any
         names: the variables, in any order.
         given: what was given to elements of arrays last, by name; the same for all channels of an instance.
     """
+    make = BinaryChannel if kind == "Binary" else FmuChannel
     if not any(slave.interface.variables[name].element for name in names):
-        return FmuChannel(slave, kind, names)
+        return make(slave, kind, names)
     whole = whole_arrays(names, slave.interface)
-    return ElementsChannel(FmuChannel(slave, kind, whole), whole, names, given, slave.interface)
+    return ElementsChannel(make(slave, kind, whole), whole, names, given, slave.interface)
 
 
 def whole_arrays(names: Sequence[str], interface: Interface) -> list[str]:
@@ -39,7 +39,8 @@ def whole_arrays(names: Sequence[str], interface: Interface) -> list[str]:
 class ElementsChannel:
     """Some variables of which one at least is an element of an array.
 
-    Of an array that is set in part, the other elements keep what they were given last, at first their start values.
+    Of an array that is set in part, the other elements keep what they were given last, at first their start values, or
+    what the FMU has in them where these are not known.
 
     Args:
         channel: of `whole_arrays`. whole: its variables. names: those that are wanted.
@@ -54,12 +55,15 @@ class ElementsChannel:
         rank = {name: k for k, name in enumerate(whole)}
         self._places = [rank[name] for name in names]
         variables = (interface.variables[name] for name in whole)
-        self._starts = {v.name: _NOTHING[v.type] if v.start is None else v.start for v in variables}
+        self._starts = {v.name: v.start for v in variables}
 
     def set(self, values: Sequence[Any]) -> None:
         """Set all of them."""
         self._given.update(zip(self._names, values, strict=True))
-        self._channel.set([self._given.get(name, start) for name, start in self._starts.items()])
+        every = [self._given.get(name, start) for name, start in self._starts.items()]
+        if None in every:
+            every = [own if value is None else value for value, own in zip(every, self._channel.get(), strict=True)]
+        self._channel.set(every)
 
     def get(self) -> list[Any]:
         """Read all of them."""

@@ -30,6 +30,9 @@ class Owner(Protocol):
     def function(self, name: str) -> Any:
         """A function of the library."""
 
+    def call(self, name: str, *arguments: Any) -> None:
+        """Make a call that has to succeed."""
+
     def check(self, call: str, status: int) -> None:
         """Raise unless the status of a call is ok or warning."""
 

@@ -94,6 +94,9 @@ class Fmi1Slave(LoadedSlave):
     def exit_initialization(self) -> None:
         """Nothing is left to be done."""
 
+    def _configure(self) -> None:
+        pass  # the standard has no structural parameters
+
     def _announce(self) -> None:
         pass  # the call that initializes it says it all
 

@@ -97,6 +97,9 @@ class FmuSlave(LoadedSlave):
         """Leave initialization mode."""
         self.call_once("fmi2ExitInitializationMode")
 
+    def _configure(self) -> None:
+        pass  # the standard has no structural parameters
+
     def _announce(self) -> None:
         self.call_once("fmi2SetupExperiment", 0, 0.0, self._span[0], *self._end())
 

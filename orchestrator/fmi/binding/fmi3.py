@@ -1,4 +1,4 @@
-"""An FMI 3.0 co-simulation FMU behind the face of an instance: numbers, booleans and texts."""
+"""An FMI 3.0 co-simulation FMU behind the face of an instance."""
 
 from __future__ import annotations
 
@@ -45,6 +45,8 @@ _SIGNATURES: Signatures = {
         fmi3.fmi3LogMessageCallback, c_void_p
     ),
     "fmi3FreeInstance": (None, c_void_p),
+    "fmi3EnterConfigurationMode": (c_int, c_void_p),
+    "fmi3ExitConfigurationMode": (c_int, c_void_p),
     "fmi3EnterInitializationMode": (c_int, c_void_p, c_bool, c_double, c_double, c_bool, c_double),
     "fmi3ExitInitializationMode": (c_int, c_void_p),
     "fmi3Terminate": (c_int, c_void_p),
@@ -58,6 +60,10 @@ _SIGNATURES: Signatures = {
         f"fmi3{verb}{suffix}": (c_int, c_void_p, c_void_p, c_size_t, c_void_p, c_size_t)
         for verb in ("Set", "Get")
         for suffix in (*_NUMBERS, "Boolean", "String")
+    },
+    **{
+        f"fmi3{verb}Binary": (c_int, c_void_p, c_void_p, c_size_t, c_void_p, c_void_p, c_size_t)
+        for verb in ("Set", "Get")
     },
     "fmi3GetFMUState": (c_int, c_void_p, c_void_p),
     "fmi3SetFMUState": (c_int, c_void_p, c_void_p),
@@ -74,6 +80,7 @@ _TYPES: dict[str, tuple[str, Any]] = {
     "Enumeration": ("Int64", ctypes.c_int64),
     "Boolean": ("Boolean", c_uint8),  # a byte, of which any bit is true
     "String": ("String", c_char_p),
+    "Binary": ("Binary", c_void_p),
 }
 
 
@@ -101,12 +108,21 @@ class Fmi3Slave(LoadedSlave):
         resources = folder / "resources"
         place = f"{resources}{os.sep}".encode() if resources.is_dir() else None
         name, token = self.name.encode(), self.interface.guid.encode()
-        # Visible, logging, event mode, early return: at an event, of an FMU that can take the rest of the step.
-        options = (False, self._talks, self._events, self._events and self.interface.variable_step)
+        # Visible, logging, event mode, early return: of an FMU that can take the rest of the step afterwards.
+        options = (False, self._talks, self._events, self.interface.variable_step)
         found: int | None = self.function("fmi3InstantiateCoSimulation")(
             name, token, place, *options, None, 0, id(self), _LOGGER, None
         )
         return found
+
+    def _configure(self) -> None:
+        given = self.interface.structure
+        if not given:
+            return
+        self.call_once("fmi3EnterConfigurationMode")
+        for name, value in given.items():
+            self.channel(self.interface.variables[name].type, [name]).set([value])
+        self.call_once("fmi3ExitConfigurationMode")
 
     def enter_initialization(self) -> None:
         """Enter initialization mode; what the last step of another run told is no more."""

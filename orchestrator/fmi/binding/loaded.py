@@ -95,6 +95,7 @@ class LoadedSlave(Stepping):
                 raise RuntimeError("it gives no instance" + ("" if self.log else _NO_INSTANCE))
             introduce(self.pointer, self, interface.model)
             self._do_step = self.function(self.DO_STEP)
+            self._configure()
         except Exception as error:
             self._release()
             what = without_head(error).replace(f"{folder}{os.sep}", "")
@@ -108,6 +109,10 @@ class LoadedSlave(Stepping):
     @abstractmethod
     def _instantiate(self, folder: Path) -> int | None:
         """The address of a new instance."""
+
+    @abstractmethod
+    def _configure(self) -> None:
+        """Give a new instance, or one that was reset, its structural parameters."""
 
     # ---------------------------------------------------------------- calls and what they say
 
@@ -327,6 +332,7 @@ class LoadedSlave(Stepping):
         self.log.clear()
         self._given.clear()
         self.call_once(self.RESET)
+        self._configure()
 
     def free(self) -> None:
         """Give the instance and its library back; after a fatal status neither, as FMI 2.0 (2.1.3) has it.

@@ -377,7 +377,6 @@ def test_describe_reads_a_class_in_a_file_and_an_fmu_alike(tmp_path: Path) -> No
         (["describe", "text.fmu"], "error: text.fmu is not a usable FMU"),
         (["describe", "Gust", "--with", "a"], "error: --with a: write NAME=VALUE, as in --with carriages=8"),
         (["describe", "Schedule", "--with", f"points={'9' * 5000}"], "takes a whole number of at least 1, not '9999"),
-        (["describe", "text.fmu", "--with", "a=1"], "error: text.fmu is built already; it takes no --with a"),
         (["describe", "Schedule", "--with", "ponts=3"], "Schedule has no 'ponts'; did you mean 'points'?"),
         (["check", "nope"], "there is no shipped scenario 'nope'"),
         (["check", "comfort_cruise", "--set", "cruise.alhpa=1"], "did you mean 'alpha'?"),

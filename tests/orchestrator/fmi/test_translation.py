@@ -4,6 +4,7 @@ from types import SimpleNamespace
 
 import pytest
 from lxml import etree
+from railcosim.orchestrator.errors import FmuFileError
 from railcosim.orchestrator.fmi import entries as entries_module
 from railcosim.orchestrator.fmi import translation
 
@@ -141,9 +142,13 @@ def test_types_of_fmi_3_and_what_is_left_out():
         '<Boolean name="row[2]" valueReference="8"/>'
         '<Binary name="blob" valueReference="9"><Start value="00"/></Binary>'
         '<Clock name="tick" valueReference="10" intervalVariability="triggered"/>'
-        '<Float64 name="sampled" valueReference="11" clocks="10"/>'
+        '<Float64 name="sampled" valueReference="11" clocks="10 99"/>'
+        '<Binary name="note" valueReference="12" declaredType="Note" maxSize="9"/>'
     )
-    simulation = '<CoSimulation providesDirectionalDerivatives="true"/>'
+    simulation = (
+        '<CoSimulation providesDirectionalDerivatives="true"/>'
+        '<TypeDefinitions><BinaryType name="Note" mimeType="text/plain" maxSize="5"/></TypeDefinitions>'
+    )
     by_name, beside, able = translated(written, "3.0", simulation)
     assert {name: (v.type, v.fmi_type) for name, v in by_name.items()} == {
         "x": ("Real", "Float32"),
@@ -151,18 +156,23 @@ def test_types_of_fmi_3_and_what_is_left_out():
         "on": ("Boolean", "Boolean"),
         "k": ("Integer", "Int8"),
         "row[2]": ("Boolean", "Boolean"),
+        "blob": ("String", "Binary"),
+        "note": ("String", "Binary"),
         "twin": ("Real", "Float32"),
     }
     assert beside.left_out == {
         "vast": "an array of 1000000000000 elements",
         "none": "an array of 0 elements",
         "row": "an array, and its elements' names are those of others",
-        "blob": "binary",
         "tick": "a clock",
-        "sampled": "clocked",
+        "sampled": "clocked by tick, 99",
     }
     assert (by_name["n"].min, by_name["n"].max) == ("1", "18446744073709551615")
     assert by_name["k"].initial is None
+    assert [(by_name[name].media, by_name[name].longest) for name in ("blob", "note")] == [
+        (None, None),
+        ("text/plain", "9"),
+    ], "of a type what the variable does not say itself"
     assert (by_name["twin"].causality, by_name["twin"].description) == ("local", "again (another name of x)")
     assert able.providesDirectionalDerivative is True
     assert able.canInterpolateInputs is False
@@ -180,3 +190,50 @@ def test_of_what_is_left_out_ten_are_named(count, ends):
     assert warning.startswith("f.fmu: variables of kinds that are not supported are left out: v0 (an array)")
     assert warning.endswith(ends)
     assert list(translation.Beside().warnings("f.fmu")) == []
+
+
+STRUCTURED = """<x>
+  <UInt64 name="n" valueReference="1" causality="structuralParameter" start="3" min="1" max="9"/>
+  <Float64 name="width" valueReference="2" causality="structuralParameter" start="0.5"/>
+  <Boolean name="on" valueReference="3" causality="structuralParameter" start="false"/>
+  <String name="kind" valueReference="4" causality="structuralParameter"><Start value="a"/></String>
+  <Float64 name="row" valueReference="5" start="1 2 3"><Dimension valueReference="1"/></Float64>
+  <Float64 name="pair" valueReference="6" start="1 2"><Dimension start="2"/></Float64>
+</x>"""
+
+
+def structured():
+    return [entries_module.read_entry(element, "3.0", entries_module.Texts()) for element in root(STRUCTURED)]
+
+
+def test_structural_parameters_are_as_if_they_stood_in_the_file():
+    found = structured()
+    translation.restructure(found, {"n": 5.0, "width": 0.25, "on": True, "kind": "b"}, "it.fmu")
+    of = {entry.name: entry for entry in found}
+    assert [of[name].start for name in ("n", "width", "on", "kind")] == ["5", "0.25", "true", "b"]
+    assert (of["row"].resized, of["pair"].resized) == (True, False)
+
+
+def test_no_structural_parameter_is_given():
+    found = structured()
+    translation.restructure(found, {}, "it.fmu")
+    assert not any(entry.resized for entry in found)
+
+
+@pytest.mark.parametrize(
+    ("given", "wrong"),
+    [
+        ({"n": 0}, "it.fmu: the structural parameter 'n' takes 1 to 9, not 0"),
+        ({"n": 10}, "it.fmu: the structural parameter 'n' takes 1 to 9, not 10"),
+        ({"n": 1.5}, "it.fmu: the structural parameter 'n' takes a whole number, not 1.5"),
+        ({"n": True}, "it.fmu: the structural parameter 'n' takes a whole number, not True"),
+        ({"width": "x"}, "it.fmu: the structural parameter 'width' takes a number, not 'x'"),
+        ({"on": 1}, "it.fmu: the structural parameter 'on' takes true or false, not 1"),
+        ({"kind": 1}, "it.fmu: the structural parameter 'kind' takes text, not 1"),
+        ({"pair": 1}, "it.fmu has no structural parameter 'pair'; there are n, width, on, kind"),
+    ],
+)
+def test_what_structural_parameters_cannot_be(given, wrong):
+    with pytest.raises(FmuFileError) as caught:
+        translation.restructure(structured(), given, "it.fmu")
+    assert str(caught.value) == wrong

@@ -113,7 +113,7 @@ WRONG = [
     (("source.k", "bias", 1.0, 1.0), "'bias' is for Real variables, not for Integer"),
     (("source.on", "ramp", 1.0, None, 1.0), "'ramp' is for Real variables, not for Boolean"),
     (("source.on", "override", 1.0, 1), "takes true or false, not 1"),
-    (("source.word", "override", 1.0, 1), "takes a text, not 1"),
+    (("source.word", "override", 1.0, 1), "takes text, not 1"),
     (("source.row", "override", 1.0, "a"), "takes a finite number, not 'a'"),
     (("source.x", "bias", 1.0, math.inf), "value takes a finite number, not inf"),
     (("source.x", "bias", 1.0), "value takes a finite number, not None"),

@@ -122,7 +122,7 @@ def test_start_values_are_checked_against_types(by_hand):
         "it.ui16: takes a whole number from 0 to 65535, not -1",
         "it.ui8: 201 is above the limit 200",
         "it.i8: takes a whole number from -128 to 127, not 128",
-        "it.size: it is computed (causality structuralParameter) and cannot be set",
+        "it.size: it is a structural parameter: give it in build = { size = ... }",
     ]
 
 
@@ -195,7 +195,7 @@ def test_a_bad_description_of_the_sources_is_no_reason(xml, tmp_path, workspace)
 def test_notes_name_what_is_left_out(by_hand, workspace):
     system = System(stop_time=1.0, step=0.25)
     system.add("it", str(by_hand(3)))
-    assert any("are left out: blob (binary)" in note for note in check(system, workspace).notes)
+    assert any("are left out: tick (a clock)" in note for note in check(system, workspace).notes)
 
 
 @pytest.mark.parametrize("derivatives", [True, False])
@@ -231,7 +231,7 @@ def test_validate(by_hand, version):
     assert found["schema"] == ("pass", f"modelDescription.xml keeps the schema of FMI {version}.0")
     assert (
         found[PROBES["simulate"]][1]
-        == f"20 steps of {0.1 if version == 1 else 0.25} s, {8 if version == 1 else 14} outputs finite"
+        == f"20 steps of {0.1 if version == 1 else 0.25} s, {8 if version == 1 else 15} outputs finite"
     )
     assert found[PROBES["instances"]][0] == "pass"
     assert found[PROBES["state"]][0] == ("skipped" if version == 1 else "pass")
@@ -244,7 +244,7 @@ def test_validate_gives_an_fmu_its_event_mode(by_hand):
     report = validate(path)
     found = {finding.check: (finding.verdict, finding.detail) for finding in report.findings}
     assert report.passed, found
-    assert found[PROBES["simulate"]] == ("pass", "20 steps of 0.25 s, 14 outputs finite")
+    assert found[PROBES["simulate"]] == ("pass", "20 steps of 0.25 s, 15 outputs finite")
     assert [found[PROBES[probe]][0] for probe in ("instances", "state", "steps")] == ["pass"] * 3
 
 
