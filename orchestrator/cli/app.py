@@ -90,6 +90,7 @@ app.command("list")(answering(scenarios.list_all, "list"))
 for command in (
     scenarios.check,
     runs.plot,
+    runs.convert,
     runs.reproduce,
     reports.report,
     models.describe,

@@ -1,7 +1,8 @@
-"""The commands of ``orchestrate`` that run a scenario, or draw what a run has left: run, reproduce, plot."""
+"""The commands of ``orchestrate`` that run a scenario, or draw what a run has left: run, reproduce, plot, convert."""
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -11,6 +12,7 @@ from .. import world
 from ..errors import ScenarioError
 from . import completing
 from .documents import Answer, written
+from .lines import tell
 from .options import (
     FAILED,
     OK,
@@ -34,7 +36,7 @@ from .options import (
 )
 
 if TYPE_CHECKING:
-    from ..run import Run, StepCheck
+    from ..run import Results, Run, StepCheck
     from .documents import CaseDocument
 
 
@@ -86,6 +88,14 @@ def run(
     output: Annotated[
         Path | None, typer.Option("--output", "-o", help="Directory for the results; results/<scenario> by default.")
     ] = None,
+    save: Annotated[
+        list[Path] | None,
+        typer.Option(
+            metavar="FILE",
+            help="Write the results for other tools as well, by the ending: .parquet, .h5 (MTSF), .mat (Dymola), .csv; "
+            "repeatable.",
+        ),
+    ] = None,
     no_figures: Annotated[bool, typer.Option("--no-figures", help="Draw nothing.")] = False,
     report: Report = False,
     live: Annotated[
@@ -105,7 +115,7 @@ def run(
     once, also where an FMU does not return.
     """
     from ..isolation import isolate
-    from ..run import add_step_check, check_step, execute, go_on, read_checkpoint
+    from ..run import add_step_check, check_ending, check_step, execute, go_on, read_checkpoint
     from ..scenario import load
     from .documents import run_document
     from .printing import show_page, show_progress, show_run
@@ -116,6 +126,8 @@ def run(
         from ..report import check_drawable, check_live
 
         check_drawable()
+    for file in save or ():
+        check_ending(file)
     how: Any = {"figures": not no_figures, "threads": threads, "checkpoint_every": checkpoint_every}
     if resume_from is not None:
         given = (preset, settings or None, builds or None, step, algorithm, isolated or None, output)
@@ -145,6 +157,7 @@ def run(
         with show_progress(system.provenance.name, quiet, system.stepping.start_time) as progress:
             writing = progress and progress.writing
             outcome = execute(system, kind=kind.value, output=directory, progress=progress, writing=writing, **how)
+    _save(outcome.results, (save or ()) if outcome.results.points else ())
     second = _at_half_the_step(outcome, kind, quiet) if verify_step else None
     verdict = None
     if second is not None and second.status == "completed":
@@ -264,3 +277,32 @@ def plot(
     world.mkdir(directory, parents=True, exist_ok=True)
     drawn = draw(written_as(figures, figure_format and figure_format.value, dpi), loaded, directory)
     return written([*recovered, *drawn], quiet)
+
+
+def convert(
+    results: Annotated[
+        Path, typer.Argument(help="The directory of a run, finished or not, or a result file of any tool.")
+    ],
+    files: Annotated[
+        list[Path],
+        typer.Argument(
+            metavar="FILE...", help="What to write, by its ending: .csv, .parquet, .h5 (MTSF), .mat (Dymola)."
+        ),
+    ],
+    quiet: Quiet = False,
+) -> Answer:
+    """Write results as files for other tools.
+
+    Numbers keep every digit. MAT and HDF5 files have the parameters as well, and no place for signals of texts.
+    """
+    from ..run import Results
+
+    _save(Results.load(results), files)
+    return written(files, quiet)
+
+
+def _save(results: Results, files: Sequence[Path]) -> None:
+    for file in files:
+        without = results.save(file)
+        if without:
+            tell(f"{file} has no place for the texts of {', '.join(without)}")

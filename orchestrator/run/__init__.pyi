@@ -7,7 +7,7 @@ from .execution import at_half_the_step, execute, go_on, resume, run
 from .outcome import Run, Status
 from .record import add_step_check, read_metrics
 from .record import read as read_record
-from .recording import CSV_FILE, RESULT_ENDINGS, ROWS_FILE, Results, Telling, read_json, recover_rows
+from .recording import CSV_FILE, RESULT_ENDINGS, ROWS_FILE, Results, Telling, check_ending, read_json, recover_rows
 from .repeating import Flown, Repeater, listening
 from .revision import Revision
 from .session import Progress
@@ -37,6 +37,7 @@ __all__ = [
     "assembled",
     "at_half_the_step",
     "check",
+    "check_ending",
     "check_step",
     "conclude",
     "describe_stepping",

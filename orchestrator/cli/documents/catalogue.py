@@ -18,6 +18,7 @@ DOCUMENTS: dict[str, Any] = {
     "list": ListDocument,
     "check": CheckDocument,
     "plot": FilesDocument,
+    "convert": FilesDocument,
     "reproduce": ReproduceDocument,
     "report": FilesDocument,
     "describe": ModelDocument | ScenarioDocument,

@@ -1,5 +1,6 @@
 from .binary import remove_rows
 from .formats import ENDINGS as RESULT_ENDINGS
+from .formats import check_ending
 from .recorder import ROWS_FILE, SEEN_FILE, Due, Recorder
 from .recording import Recording, check_stored
 from .results import Results
@@ -17,6 +18,7 @@ __all__ = [
     "Recording",
     "Results",
     "Telling",
+    "check_ending",
     "check_size",
     "check_stored",
     "finish_rows",

@@ -16,7 +16,7 @@ from ...figures import plot
 from ...markup import escaped, number, table
 from ...times import digits
 from .columns import Columns, InMemory
-from .formats import ENDINGS, read_file
+from .formats import ENDINGS, read_file, write_file
 from .missing import missing_signal, shortened
 from .stored import read_stored
 from .told import read_json
@@ -159,6 +159,21 @@ class Results(Mapping[str, NDArray[Any]]):
         made = pandas.DataFrame({name: self[name] for name in self}, index=pandas.Index(self.time, name=_TIME))
         made.attrs["units"] = {name: self.units[name] for name in self if name in self.units}
         return made
+
+    def save(self, path: str | Path) -> list[str]:
+        """Write a file that other tools read, in the format of its ending: CSV, Parquet, HDF5 (MTSF) or MAT (Dymola).
+
+        Args:
+            path: of the file, ``run.csv``, ``run.parquet``, ``run.h5`` or ``run.mat``.
+
+        Returns:
+            Signals that were left out because they hold texts, for which HDF5 and MAT have no place.
+
+        Raises:
+            ScenarioError: another ending, or no points. RailcosimError: a library is missing. OSError: it cannot be
+                written.
+        """
+        return write_file(Path(path), self)
 
     @classmethod
     def load(cls, directory: str | Path) -> Results:

@@ -1,8 +1,10 @@
-from .endings import ENDINGS, read_file
+from .endings import ENDINGS, check_ending, read_file, write_file
 from .table import Table
 
 __all__ = [
     "ENDINGS",
     "Table",
+    "check_ending",
     "read_file",
+    "write_file",
 ]

@@ -6,7 +6,7 @@ import csv
 import io
 import math
 import re
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -14,7 +14,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .... import world
-from .table import Table, refused
+from ....evaluation import Signals
+from ..text import write_csv
+from ..words import Words
+from .table import TIME, Table, blocks_of, refused, texts_among
 
 _TRUTH = {"true": 1.0, "false": 0.0}
 
@@ -46,6 +49,24 @@ def read_delimited(path: Path) -> Table:
         if name:  # some tools end each line with a delimiter
             found[name.strip()] = column
     return Table(found)
+
+
+def write_delimited(path: Path, signals: Signals) -> None:
+    """A CSV file as a run leaves it: the shortest digits that give the same numbers, parted by commas.
+
+    Args:
+        path: of the file.
+        signals: what it is to hold.
+    """
+    names = [TIME, *signals.names()]
+    words = Words(names.index(name) for name in texts_among(signals))
+
+    def rows() -> Iterator[NDArray[np.float64]]:
+        for columns in blocks_of(signals, names):
+            yield words.encode(list(zip(*columns, strict=True))) if words.columns else np.column_stack(columns)
+
+    with world.open(path, "wb") as stream:
+        write_csv(stream, names, (), words, rows())
 
 
 def _numbers(text: str, head: str, width: int, delimiter: str) -> list[NDArray[np.float64]] | None:

@@ -5,14 +5,18 @@ Source: Pfeiffer, Bausch-Gall, Otter: Proposal for a Standard Time Series File F
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from .table import Table, needing, refused, time_among
+from ....evaluation import Signals
+from .table import ROWS, TIME, Table, blocks_of, needing, numbers_among, refused, time_among
 
 _VARIABLES = "ModelDescription/Variables"
+_PARAMETER, _OUTPUT, _LOCAL, _FIXED, _CONTINUOUS = 1, 3, 4, 2, 5
+"""Causalities and variabilities, as the proposal numbers them."""
 
 
 def read_hdf5(path: Path) -> Table:
@@ -78,3 +82,62 @@ def _plain(file: Any, path: Path) -> Table:
     if time is None:
         raise refused(path, "it is no MTSF, and none of its datasets is called time")
     return Table({name: column for name, column in found.items() if len(column) == len(found[time])})
+
+
+def write_hdf5(path: Path, signals: Signals) -> None:
+    """An MTSF: the signals as one series over time, the parameters as another of one row. Texts find no place in it.
+
+    Args:
+        path: of the file.
+        signals: what it is to hold.
+
+    Raises:
+        RailcosimError: h5py is not installed.
+    """
+    with needing(path, "h5py"):
+        import h5py
+    names = numbers_among(signals)
+    fixed = {name: float(value) for name, value in signals.parameters.items() if not isinstance(value, str)}
+    with h5py.File(path, "w") as file:
+        file.attrs["mtsfVersion"] = "0.3"
+        file.create_group("ModelDescription").attrs["generationTool"] = "railcosim"
+        shape = (signals.points, len(names))
+        rows = file.create_dataset(
+            "Results/Outputs/H5T_NATIVE_DOUBLE", shape, "f8", chunks=(min(ROWS // 16, signals.points), 1)
+        )
+        rows.parent.attrs.update({"interpolationMethod": "linear", "independentVariableRow": 0})
+        done = 0
+        for columns in blocks_of(signals, names):
+            rows[done : done + len(columns[0])] = np.column_stack(columns)
+            done += len(columns[0])
+        kept = file.create_dataset("Results/Parameters/H5T_NATIVE_DOUBLE", data=np.array([[*fixed.values()]]))
+        kept.parent.attrs.update({"interpolationMethod": "constant", "independentVariableRow": -1})
+        units = {TIME: "s", **signals.units}
+        known = list(dict.fromkeys(units.get(name, "") for name in [*names, *fixed]))
+        told = [(name, rows.ref, k, _OUTPUT if k else _LOCAL, _CONTINUOUS) for k, name in enumerate(names)]
+        told += [(name, kept.ref, k, _PARAMETER, _FIXED) for k, name in enumerate(fixed)]
+        kinds = [
+            ("name", f"S{max(len(name.encode()) for name, *_ in told)}"),
+            *(("simpleTypeRow", "u4"), ("causality", "u1"), ("variability", "u1"), ("description", "S1")),
+            *(("objectId", h5py.ref_dtype), ("column", "u4"), ("negated", "u1")),
+        ]
+        variables = [
+            (name.encode(), known.index(units.get(name, "")), causality, variability, b"", of, column, 0)
+            for name, of, column, causality, variability in told
+        ]
+        file[_VARIABLES] = np.array(variables, kinds).reshape(-1, 1)
+        _write_units(file, known)
+
+
+def _write_units(file: Any, known: Sequence[str]) -> None:
+    """One simple type for each unit."""
+    width = max(1, *(len(unit.encode()) for unit in known))
+    kinds = [
+        *(("name", f"S{width + 5}"), ("dataType", "u1"), ("quantity", "S1"), ("relativeQuantity", "u1")),
+        *(("description", "S1"), ("unitOrEnumerationRow", "i4")),
+    ]
+    types = [(f"Real {unit}".encode(), 1, b"", 0, b"", k if unit else -1) for k, unit in enumerate(known)]
+    file["ModelDescription/SimpleTypes"] = np.array(types, kinds).reshape(-1, 1)
+    units = [(unit.encode(), 1.0, 0.0, 0) for unit in known]
+    kinds = [("name", f"S{width}"), ("factor", "f8"), ("offset", "f8"), ("mode", "u1")]
+    file["ModelDescription/Units"] = np.array(units, kinds).reshape(-1, 1)
