@@ -30,7 +30,7 @@ from pathlib import Path
 ROOT = Path(__file__).parents[1]
 DATA = ROOT / "build" / "coverage"
 GRANTED = ROOT / "tests" / "uncovered.txt"
-KERNEL = [ROOT / "orchestrator" / "master" / "native" / name for name in ("kernel.c", "stepping.c", "team.c")]
+KERNEL = [ROOT / "orchestrator" / "master" / "native" / name for name in ("kernel.c", "plan.c", "stepping.c", "team.c")]
 RUNTIME = sorted((ROOT / "fmus" / "runtime").glob("*.c"))
 LOOP_TESTS = [
     *(f"tests/orchestrator/master/{name}.py" for name in ("test_compiled", "test_compiled_blocks", "test_kernel")),

@@ -4,7 +4,7 @@ from .checking import check_coupling, check_threads, describe_coupling
 from .event_check import check_events
 from .initialization import settle
 from .loop import Master
-from .observer import Rows
+from .observer import Rows, Table
 from .settings import Settings
 
 __all__ = [
@@ -14,6 +14,7 @@ __all__ = [
     "Operation",
     "Rows",
     "Settings",
+    "Table",
     "check_coupling",
     "check_events",
     "check_threads",

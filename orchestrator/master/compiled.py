@@ -18,7 +18,7 @@ from ..fmi.guard import GUARD, NOTE_SIZE, NOTES, own_note, said
 from .algorithms import Explicit, Operation
 from .coupling import Coupling
 from .exchange import Change
-from .observer import Observer
+from .observer import Observer, Table
 
 try:
     from . import kernel
@@ -59,7 +59,7 @@ _OPERATION = np.dtype([(name, "i4") for name in ("kind", "index", "period", "pha
 _PLACE = np.dtype([(name, "i8") for name in ("begin", "failed", "status")])
 
 _OWN = [each.itemsize for each in (_OPERATION, _CHANNEL, _INSTANCE, _ENTRY, _CHANGES, _PLACE)]
-_SIZES = (_OWN[0], 8, *_OWN[1:4], 4, _OWN[4], 8, 8, 8, _OWN[5], 8)
+_SIZES = (_OWN[0], 8, *_OWN[1:4], 4, _OWN[4], 8, 8, 8, 8, _OWN[5], 8)
 """Of what the kernel's buffers hold, in bytes, in the order in which it takes them."""
 
 
@@ -95,7 +95,7 @@ class CompiledLoop:
     def __init__(self, coupling: Coupling, algorithm: Explicit) -> None:
         self._coupling = coupling
         self._exchange = coupling.exchange
-        self._under_way: tuple[NDArray[np.float64], Observer, float, float] | None = None
+        self._under_way: tuple[Table, Observer, float, float] | None = None
         self._note = 0
         self._channels: list[tuple[int, int, int, int, int]] = []
         self._entries: list[_Entry] = []
@@ -192,7 +192,16 @@ class CompiledLoop:
         self._add_operation(Operation.STEP, len(self._instances), (slave, "fmi2DoStep"), (rate, 0))
         self._instances.append(slave.addresses("fmi2DoStep"))
 
-    def run(self, start_time: float, step: float, points: tuple[int, int, int], every: int, observe: Observer) -> bool:
+    def run(
+        self,
+        start_time: float,
+        step: float,
+        points: tuple[int, int, int],
+        every: int,
+        observe: Observer,
+        *,
+        table: Table | None = None,
+    ) -> bool:
         """Take communication steps in blocks; True unless the observer stopped the run.
 
         Args:
@@ -201,6 +210,7 @@ class CompiledLoop:
             points: numbers of the communication points to begin at, to stop at, and of the run's last.
             every: a row is due after every so many steps, and after the last.
             observe: given the rows.
+            table: where they are kept; without one they may go when they were observed.
 
         Raises:
             FmuError: a model failed, or a value is not finite.
@@ -220,14 +230,17 @@ class CompiledLoop:
             ],
             dtype=_CHANGES,
         )
-        width, goes_on, block = len(values) + 1, True, 1
+        goes_on, block = True, 1
+        most = max(1, _MOST_VALUES // (len(values if table is None else table.kept) + 1)) * every
         while done < stop and goes_on:
-            block = min(block, stop - done, max(1, _MOST_VALUES // width) * every)
-            rows = np.empty((_rows_due(done, block, every, count), width))
-            self._under_way = rows, observe, start_time, step
+            block = min(block, stop - done, most)
+            due = _rows_due(done, block, every, count)
+            into = Table(range(len(values)), due) if table is None else table
+            cells = into.room(due)
+            self._under_way = into, observe, start_time, step
             begin = world.perf_counter()
             taken, written, newest = kernel.run(
-                *(*self._plan, changes, values, history, newest, rows, places, disturbed),
+                *(*self._plan, changes, into.kept, values, history, newest, cells, into.count, places, disturbed),
                 *(every, start_time, step, done, block, count),
             )
             seconds = world.perf_counter() - begin
@@ -240,7 +253,7 @@ class CompiledLoop:
                 exchange.values[place] = int(exchange.values[place])
             if taken:
                 self._roll(history, newest)
-                goes_on = observe(done, rows[:written])
+                goes_on = observe(done, into.filled(written))
             if goes_on:
                 self._go_on(places, start_time + done * step, step)
             block = max(1, int(taken * min(_BLOCK_SECONDS / max(seconds, 1e-9), _GROWTH)))
@@ -252,13 +265,15 @@ class CompiledLoop:
         """Tell the observer of the rows that the block under way has written, which does not return any more."""
         if self._under_way is None:
             return
-        rows, observe, start_time, step = self._under_way
+        table, observe, start_time, step = self._under_way
         written = int(NOTES.note(self._note)[3])
         if written:
-            time, *values = rows[written - 1].tolist()
+            rows = table.filled(written)
+            time, *values = rows[-1].tolist()
             self._coupling.steps, self._coupling.time = round((time - start_time) / step), time
-            self._exchange.values[:] = values
-            observe(self._coupling.steps, rows[:written])
+            for place, value in zip(table.kept.tolist(), values, strict=True):
+                self._exchange.values[place] = value
+            observe(self._coupling.steps, rows)
 
     def _tell_disturbers(self, disturbed: NDArray[np.int64], done: int, places: NDArray[np.void]) -> None:
         """Note who did it, in a step that was left up to what failed first: without threads there is nothing after."""

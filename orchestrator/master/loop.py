@@ -23,7 +23,7 @@ from .coupling import Coupling
 from .events import Schedule
 from .exchange import types_of
 from .initialization import settle
-from .observer import Observer, Rows
+from .observer import Observer, Rows, Table
 from .settings import DEFAULT, Settings
 
 
@@ -168,6 +168,7 @@ class Master:
         *,
         first: int = 0,
         until: int | None = None,
+        table: Table | None = None,
     ) -> bool:
         """Take communication steps; True unless the observer stopped the run.
 
@@ -182,6 +183,7 @@ class Master:
             observe: given the rows.
             first: number of the communication point to begin at.
             until: number of the one to end at now; ``count`` by default.
+            table: where the compiled kernel keeps rows, if it takes the steps: those that are observed are there then.
 
         Raises:
             FmuError: a model failed, or a value is not finite; instance, variable and time are named.
@@ -189,14 +191,21 @@ class Master:
         """
         end = count if until is None else until
         if not self._watch.is_needed:
-            return self._run(start_time, step, (first, end, count), every, observe)
+            return self._run(start_time, step, (first, end, count), every, observe, table=table)
         try:
-            return self._run(start_time, step, (first, end, count), every, self._watching(observe))
+            return self._run(start_time, step, (first, end, count), every, self._watching(observe), table=table)
         finally:
             self._watch.look(at_once=True)
 
     def _run(
-        self, start_time: float, step: float, points: tuple[int, int, int], every: float, observe: Observer
+        self,
+        start_time: float,
+        step: float,
+        points: tuple[int, int, int],
+        every: float,
+        observe: Observer,
+        *,
+        table: Table | None,
     ) -> bool:
         first, end, count = points
         if isinstance(self.algorithm, VariableStep):
@@ -206,8 +215,10 @@ class Master:
             stop = end
             if self._schedule is not None:
                 stop = int(min(end, self._schedule.next_point(start_time, step, self.steps)))
-            take = self._run_in_python if self._compiled is None else self._compiled.run
-            if not take(start_time, step, (self.steps, stop, count), int(every), self._eventful(step, stop, observe)):
+            take = self._run_in_python if self._compiled is None else partial(self._compiled.run, table=table)
+            kept = None if self._compiled is None or table is None else table.kept.tolist()
+            observed = self._eventful(step, stop, observe, kept)
+            if not take(start_time, step, (self.steps, stop, count), int(every), observed):
                 return False
         return True
 
@@ -220,8 +231,15 @@ class Master:
 
         return see
 
-    def _eventful(self, step: float, stop: int, observe: Observer) -> Observer:
-        """An observer before whom the events at the last point happen, so that the row of that point shows them."""
+    def _eventful(self, step: float, stop: int, observe: Observer, kept: Sequence[int] | None) -> Observer:
+        """An observer before whom the events at the last point happen, so that the row of that point shows them.
+
+        Args:
+            step: in s.
+            stop: the number of that point.
+            observe: whom to tell.
+            kept: places of the values that rows have; None for all.
+        """
         schedule = self._schedule
         if schedule is None:
             return observe
@@ -230,7 +248,7 @@ class Master:
             if steps == stop and self._let_happen(slack(step, self.time), lambda: observe(steps, rows)):
                 self.exchange.remember()
                 if len(rows) and rows[-1][0] == self.time:
-                    rows[-1][1:] = self.values  # type: ignore[index]
+                    rows[-1][1:] = self.values if kept is None else [self.values[k] for k in kept]  # type: ignore[index]
             return observe(steps, rows)
 
         return see

@@ -212,6 +212,7 @@ class Session:
             directory,
             identity=identity,
             before=self._before,
+            expected=0 if ALGORITHMS[system.stepping.algorithm].varies_step else self._count + 1,
             only=None if crew is None else crew.only,
         )
         if begin is None or directory is None:
@@ -222,6 +223,12 @@ class Session:
         else:
             recording.go_on(directory, record_file.read(directory), begin.marks)
         self._recording = recording
+
+    @property
+    def _count(self) -> int:
+        """Communication steps of the system's length."""
+        stepping = self.system.stepping
+        return round((stepping.stop_time - stepping.start_time) / stepping.step)
 
     @property
     def _row_every(self) -> float:
@@ -242,13 +249,14 @@ class Session:
 
     def _step(self, master: Master) -> bool:
         """The communication steps, with checkpoints between them; True unless they were interrupted."""
-        system, every = self.system, self.job.checkpoint_every
-        count = round((system.stepping.stop_time - system.stepping.start_time) / system.stepping.step)
+        system, every, count = self.system, self.job.checkpoint_every, self._count
         varies, row_every = ALGORITHMS[system.stepping.algorithm].varies_step, self._row_every
         stride = count if every is None else max(1, round(every / system.stepping.step))
         # Every point is watched; of steps of one length those that are recorded are picked out of all.
         told_every, kept_every = (row_every, 1) if varies else (1, int(row_every))
         observe = self._observer(master, Due(kept_every, count), -1 if varies else count)
+        assert self._recording is not None
+        table = None if varies else self._recording.lend()
         begin, before = world.perf_counter(), master.steps
         try:
             while True:
@@ -256,9 +264,8 @@ class Session:
                 passed = math.floor((master.time - system.stepping.start_time + late) / system.stepping.step)
                 until = min(count, (passed // stride + 1) * stride)
                 points = {"first": master.steps, "until": until}
-                if not master.run(
-                    system.stepping.start_time, system.stepping.step, count, told_every, observe, **points
-                ):
+                times = system.stepping.start_time, system.stepping.step
+                if not master.run(*times, count, told_every, observe, **points, table=table):
                     return False
                 if until == count:
                     return True

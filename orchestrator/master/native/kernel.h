@@ -145,8 +145,11 @@ typedef struct {
     long long every;
     long long last; /* number of the step that is recorded whatever `every` says */
     Place *places;  /* of the parts of the first step, which may have been left; then of the one that is left */
-    double *rows;
-    size_t capacity;
+    double *rows; /* where the first one begins: the time, and in the columns behind it */
+    size_t stride; /* from one column to the next */
+    size_t capacity; /* of rows */
+    const int64_t *kept; /* places of the values that a row has */
+    size_t kept_count;
 } Block;
 
 /* How far a block got: steps done, and rows written. */

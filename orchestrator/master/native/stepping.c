@@ -278,9 +278,12 @@ void finish_step(Plan *plan, const Block *block, const Advance *it, Outcome *out
     }
     remember(plan);
     if (it->is_due) {
-        double *row = block->rows + outcome->written * (plan->value_count + 1);
-        row[0] = block->start + (double)(it->number + 1) * block->step;
-        memcpy(row + 1, plan->values, plan->value_count * sizeof(double));
+        double *to = block->rows + outcome->written;
+        *to = block->start + (double)(it->number + 1) * block->step;
+        for (size_t k = 0; k < block->kept_count; k++) {
+            to += block->stride;
+            *to = plan->values[block->kept[k]];
+        }
         plan->note->rows = ++outcome->written;
     }
 }

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from ... import world
 from ...errors import RecordError
-from ...master import Rows
+from ...master import Rows, Table
 from .binary import RowsFile, RowsWriter
 from .columns import Columns, InFile, InMemory
 from .words import Words
@@ -25,6 +25,8 @@ _FLUSH_SECONDS, _FLUSH_BYTES = 1.0, 1 << 22
 _SMALL = 1 << 24
 """Bytes of results that are read from their file into memory when it is complete."""
 _FLOAT = np.dtype("<f8")
+_SINGLE = 512
+"""Rows that are held back as they came: as Python's objects they are four times as large."""
 
 
 @dataclass(frozen=True)
@@ -61,18 +63,29 @@ class Recorder:
         names: of the signals.
         kinds: their FMI types.
         path: of the file, if there is one.
+        places: of the signals among the values of the master.
+        expected: how many rows there will be, as far as that is known.
         there: how many rows of this run the file has, if the run goes on; they stay until there are as many new ones.
         identity: of the run.
 
     Attributes:
         count: how many rows there are. checksum: of those that were brought to the file.
+        table: where rows are kept in memory; None with a file.
 
     Raises:
         RecordError: here and in all methods: the file cannot be written.
     """
 
     def __init__(
-        self, names: Sequence[str], kinds: Sequence[str], path: Path | None, *, there: int = 0, identity: str = ""
+        self,
+        names: Sequence[str],
+        kinds: Sequence[str],
+        path: Path | None,
+        *,
+        places: Sequence[int] | None = None,
+        expected: int = 0,
+        there: int = 0,
+        identity: str = "",
     ) -> None:
         self._columns = ["time", *names]
         self._whole = [k for k, kind in enumerate(kinds, 1) if kind not in ("Real", "String")]
@@ -81,6 +94,8 @@ class Recorder:
         self._rows: list[Sequence[object]] = []
         self._flushed, self._held = world.monotonic(), 0
         self._path = path
+        kept = range(len(names)) if places is None else places
+        self.table = Table(kept, expected) if path is None else None
         self._writer: RowsWriter | None = None
         self.count = self.checksum = 0
         if path is not None:
@@ -88,18 +103,28 @@ class Recorder:
                 self._writer = RowsWriter(path, self._columns, self._whole, self._words, there=there, identity=identity)
 
     def extend(self, rows: Rows) -> None:
-        """Append rows of time and values; an array is kept, not copied."""
+        """Append rows of time and values; with a file, an array is kept until it is there."""
         self.count += len(rows)
-        if isinstance(rows, np.ndarray):
-            self._seal()
-            if len(rows):
-                self._blocks.append(rows)
-        else:
+        if not isinstance(rows, np.ndarray):
             self._rows.extend(rows)
+            if self.table is not None and len(self._rows) > _SINGLE:
+                self._seal()
+        elif len(rows):
+            self._seal()
+            self._keep(rows)
         if self._writer is not None:
             self._held += len(rows) * len(self._columns) * _FLOAT.itemsize
             if self._held > _FLUSH_BYTES or world.monotonic() - self._flushed > _FLUSH_SECONDS:
                 self.flush()
+
+    def lend(self) -> Table | None:
+        """The table, for somebody who writes rows there and says so by `grown`."""
+        self._seal()
+        return self.table
+
+    def grown(self, rows: int) -> None:
+        """So many rows were written into the table."""
+        self.count += rows
 
     def go_on(self, blocks: Iterable[NDArray[np.float64]], words: Words, rows: int) -> None:
         """Begin with rows of the same run that were recorded before.
@@ -128,7 +153,7 @@ class Recorder:
         blocks, self._blocks, self._held = self._blocks, [], 0
         self._flushed = world.monotonic()
         with self._telling():
-            for block in blocks:
+            for block in map(np.ascontiguousarray, blocks):
                 before = self._writer.rows
                 try:
                     self._writer.append(block)
@@ -155,21 +180,23 @@ class Recorder:
 
     def columns(self) -> Columns:
         """What was recorded, the time among it: out of memory, or of the closed file."""
-        if self._path is None or not self.count:  # in its place may be rows of before
-            self._seal()
-            table = np.empty((len(self._columns), self.count))
-            begin = 0
-            for block in self._blocks:
-                table[:, begin : begin + len(block)] = block.T
-                begin += len(block)
-            return InMemory(zip(self._columns, self._words.table(table.T), strict=True))
-        return columns_of(RowsFile(self._path))
+        if self._path is not None and self.count:  # else in its place may be rows of before
+            return columns_of(RowsFile(self._path))
+        self._seal()
+        table = np.empty((len(self._columns), 0)) if self.table is None else self.table.columns()
+        return InMemory((name, self._words.decode(k, table[k])) for k, name in enumerate(self._columns))
 
     def _seal(self) -> None:
         """Make one block of the single rows."""
         if self._rows:
-            self._blocks.append(self._words.encode(self._rows))
-            self._rows = []
+            block, self._rows = self._words.encode(self._rows), []
+            self._keep(block)
+
+    def _keep(self, block: NDArray[np.float64]) -> None:
+        if self.table is None:
+            self._blocks.append(block)
+        else:
+            self.table.append(block)
 
     @contextmanager
     def _telling(self) -> Iterator[None]:

@@ -10,7 +10,7 @@ import numpy as np
 
 from ...errors import ScenarioError
 from ...evaluation import Signals
-from ...master import Rows
+from ...master import Rows, Table
 from .columns import Columns
 from .recorder import ROWS_FILE, SEEN_FILE, Recorder, checksum_of
 from .results import Results
@@ -31,6 +31,7 @@ class Recording:
         only: signals that are kept at all; None for every one.
         identity: of the run.
         before: how many rows the run's files have, if it goes on, in the order of the files.
+        expected: how many points there will be, as far as that is known.
     """
 
     def __init__(
@@ -42,6 +43,7 @@ class Recording:
         *,
         identity: str = "",
         before: Sequence[int] = (0, 0),
+        expected: int = 0,
         only: Collection[str] | None = None,
     ) -> None:
         paths = (None, None) if directory is None else tuple(directory / name for name in _FILES)
@@ -50,13 +52,36 @@ class Recording:
         for k, chosen in enumerate((only,) if judged is None else (only, judged)):
             picked = [n for n, name in enumerate(names) if chosen is None or name in chosen]
             columns, of = [names[n] for n in picked], [kinds[n] for n in picked]
-            self._recorders.append(Recorder(columns, of, paths[k], there=before[k], identity=identity))
+            every = judged is None or k == 1  # point is there
+            recorder = Recorder(
+                columns,
+                of,
+                paths[k],
+                places=picked,
+                expected=expected if every else 0,
+                there=before[k],
+                identity=identity,
+            )
+            self._recorders.append(recorder)
             self._picks.append(None if chosen is None else [0, *(n + 1 for n in picked)])
+        self._is_lent = False
+
+    def lend(self) -> Table | None:
+        """Where every point can be written at once, if one place does: then arrays that are seen are of there."""
+        alike = all(places == self._picks[0] for places in self._picks)
+        table = self._recorders[-1].lend() if alike else None
+        self._is_lent = table is not None
+        return table
 
     def see(self, points: Rows, results: Rows) -> None:
         """Take in points, and those of them that are results."""
         for recorder, places, rows in zip(self._recorders, self._picks, (results, points), strict=False):
-            if places is None:
+            if self._is_lent and isinstance(rows, np.ndarray):
+                if recorder is self._recorders[-1]:
+                    recorder.grown(len(rows))
+                else:
+                    recorder.extend(rows)
+            elif places is None:
                 recorder.extend(rows)
             elif isinstance(rows, np.ndarray):
                 recorder.extend(rows.take(places, axis=1))

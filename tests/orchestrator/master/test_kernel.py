@@ -35,8 +35,8 @@ def test_a_guard_is_an_address():
 
 
 NAMES = (
-    "operations parts channels instances entries references changes values history newest rows places disturbed every "
-    "start step first count last"
+    "operations parts channels instances entries references changes kept values history newest table row places "
+    "disturbed every start step first count last"
 )
 
 
@@ -47,10 +47,11 @@ def arguments(workspace, odd, ring, instantiated):
     plan = [array.copy() for array in CompiledLoop(master.coupling, master.algorithm)._plan]
     values = np.array(master.values)
     changes = np.zeros(1, compiled._CHANGES)
-    rows = np.empty((8, len(values) + 1))
+    table, kept = np.empty((len(values) + 1, 8)), np.arange(len(values))
     places = np.array([(0, -1, 0)], compiled._PLACE)
     disturbed = np.zeros(len(plan[0]), np.int64)
-    given = [*plan, changes, values, np.tile(values, (2, 1)), 1, rows, places, disturbed, 1, 0.0, 0.25, 0, 4, 4]
+    state = values, np.tile(values, (2, 1)), 1, table, 0, places, disturbed
+    given = [*plan, changes, kept, *state, 1, 0.0, 0.25, 0, 4, 4]
     yield dict(zip(NAMES.split(), given, strict=True))
     for slave in master.slaves.values():
         slave.free()
@@ -62,19 +63,28 @@ def call(arguments, **changed):
 
 def test_a_sound_plan(arguments):
     assert call(arguments) == (4, 4, 1)
-    assert list(arguments["rows"][:4, 0]) == [0.25, 0.5, 0.75, 1.0]
+    assert list(arguments["table"][0, :4]) == [0.25, 0.5, 0.75, 1.0]
+    assert list(arguments["table"][1:, 3]) == list(arguments["values"])
     assert arguments["places"].tolist() == [(0, -1, 0)]
     assert call(arguments, count=0) == (0, 0, 1)
 
 
 def test_a_block_ends_where_there_is_no_room_for_a_row(arguments):
-    assert call(arguments, rows=arguments["rows"][:2])[:2] == (2, 2)
-    assert call(arguments, rows=arguments["rows"][:0])[:2] == (0, 0)
-    assert call(arguments, rows=arguments["rows"][:1], every=3, last=100)[:2] == (4, 1)
-    assert call(arguments, rows=arguments["rows"][:1], every=3, last=100, count=9)[:2] == (5, 1)
-    assert call(arguments, rows=arguments["rows"][:0], every=100, last=100)[:2] == (4, 0)
+    assert call(arguments, row=6)[:2] == (2, 2)
+    assert list(arguments["table"][0, 6:]) == [0.25, 0.5]
+    assert call(arguments, row=8)[:2] == (0, 0)
+    assert call(arguments, row=7, every=3, last=100)[:2] == (4, 1)
+    assert call(arguments, row=7, every=3, last=100, count=9)[:2] == (5, 1)
+    assert call(arguments, row=8, every=100, last=100)[:2] == (4, 0)
     assert call(arguments, every=3)[:2] == (4, 2), "the last one, too"
-    assert list(arguments["rows"][:2, 0]) == [0.75, 1.0]
+    assert list(arguments["table"][0, :2]) == [0.75, 1.0]
+
+
+def test_only_what_is_kept_is_written(arguments):
+    table = np.full((3, 5), -1.0)
+    assert call(arguments, kept=np.array([2, 0]), table=table, row=1)[:2] == (4, 4)
+    assert list(table[0]) == [-1.0, 0.25, 0.5, 0.75, 1.0]
+    assert list(table[1:, 4]) == [arguments["values"][2], arguments["values"][0]]
 
 
 def changed(array, field, value, at=0):
@@ -131,6 +141,10 @@ WRONG = {
     "an unknown instance": lambda a: {"operations": changed(changed(a["operations"], "kind", 1), "index", 10**6)},
     "an unknown channel": lambda a: {"operations": changed(a["operations"], "index", 10**6)},
     "a negative channel": lambda a: {"operations": changed(a["operations"], "index", -1)},
+    "a table with half a column": lambda a: {"table": a["table"].ravel()[:-1]},
+    "a row before the table": lambda a: {"row": -1},
+    "a row behind the table": lambda a: {"row": 9},
+    "a value that is not there is kept": lambda a: {"kept": a["kept"] + 1},
     "fewer references than entries": lambda a: {"references": a["references"][:-1]},
     "half an entry": lambda a: {"entries": np.frombuffer(a["entries"].tobytes()[:-8], np.uint8)},
     "values that are not aligned": lambda a: {"values": np.zeros(801, np.uint8)[1:]},
@@ -182,8 +196,9 @@ def test_memory_and_threads_that_cannot_be_had(tmp_path, odd, ring, instantiated
         master.coupling.settings = Settings(threads=threads)
         values = np.array(master.values)
         plan = CompiledLoop(master.coupling, master.algorithm)._plan
-        rows, places = np.empty((4, len(values) + 1)), np.array([(0, -1, 0)] * threads, compiled._PLACE)
-        state = np.zeros(0, compiled._CHANGES), values, np.tile(values, (2, 1)), 1, rows, places
+        table, places = np.empty((len(values) + 1, 4)), np.array([(0, -1, 0)] * threads, compiled._PLACE)
+        kept, history = np.arange(len(values)), np.tile(values, (2, 1))
+        state = np.zeros(0, compiled._CHANGES), kept, values, history, 1, table, 0, places
         for left.value in range(20):
             try:
                 found = kernel.run(*plan, *state, np.zeros(len(plan[0]), np.int64), 1, 0.0, 0.25, 0, 4, 4)
@@ -210,7 +225,7 @@ def test_a_kernel_of_another_version_is_refused():
 
 def compile_kernel(target, *flags):
     command = [GCC, "-Wall", "-Wextra", "-Wconversion", "-Wshadow", "-Werror", "-ffp-contract=off", "-shared", "-fPIC"]
-    sources = [MASTER / "native" / name for name in ("kernel.c", "stepping.c", "team.c")]
+    sources = [MASTER / "native" / name for name in ("kernel.c", "plan.c", "stepping.c", "team.c")]
     command += [f"-I{sysconfig.get_paths()['include']}", *flags, *sources, "-o", target]
     subprocess.run(command, check=True)
     return target

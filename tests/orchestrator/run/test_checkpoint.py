@@ -260,7 +260,7 @@ def test_the_kernel_steps_resumed_runs_too(mine, tmp_path, monkeypatch):
     monkeypatch.setattr(
         compiled.CompiledLoop,
         "run",
-        lambda self, start, step, points, *rest: steps.append(points) or take(self, start, step, points, *rest),
+        lambda self, *given, table: steps.append(given[2]) or take(self, *given, table=table),
     )
     resume(tmp_path)
     assert steps == [(20, 30, 30)]

@@ -7,11 +7,13 @@ import sys
 
 import numpy as np
 import pytest
-from railcosim.orchestrator import Results, System, world
+from railcosim.orchestrator import Batch, Results, System, world
 from railcosim.orchestrator.cli import app as cli
 from railcosim.orchestrator.errors import RecordError
+from railcosim.orchestrator.master import compiled
 from railcosim.orchestrator.run.execution import execute, resume, run
 from railcosim.orchestrator.run.recording import recorder
+from railcosim.orchestrator.system import Event
 
 
 def swinging(mine, **how):
@@ -58,6 +60,32 @@ def test_every_point_of_steps_of_varying_length_is_judged(mine):
     assert len(rare.time) == 5
     points = {outcome.requirements[-1].points for outcome in (whole, rare)}
     assert min(points) > 20
+
+
+@pytest.mark.parametrize("every", [None, 0.3])
+@pytest.mark.parametrize("seen", ["once", "more often"])
+def test_what_a_batch_keeps_is_what_a_run_records(mine, monkeypatch, every, seen):
+    """Also of the point at which an event strikes; whoever takes the steps, and in blocks of any length."""
+    events = [Event("lag.x", "bias", at=0.6, value=2.0)]
+    system = swinging(mine, record=every, stop_time=1.5, events=events)
+    system.judged.requirements.clear()
+    system.judged.metrics.clear()
+    whole = run(system, kind="native")
+    if seen == "more often":
+        monkeypatch.setattr(compiled, "_BLOCK_SECONDS", 0.0)
+    with Batch(system, kind="native", record=["lag.x"]) as batch:
+        for row in batch.run_all([{}, {}]).rows:
+            assert row.series is not None
+            assert row.series["time"].tobytes() == whole.time.tobytes()
+            assert row.series["lag.x"].tobytes() == whole["lag.x"].tobytes()
+
+
+def test_what_is_in_memory_is_there_once(mine):
+    """The columns stand where the steps were written."""
+    outcome = run(swinging(mine), kind="native")
+    bases = [outcome[name].base for name in outcome]
+    assert all(base is outcome.time.base for base in bases)
+    assert all(outcome[name].flags.c_contiguous for name in outcome)
 
 
 @pytest.fixture
