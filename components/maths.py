@@ -7,11 +7,15 @@ that follows dependencies, or one that records an expression) and is asked to ap
 
 from __future__ import annotations
 
+import itertools
 import math
 from collections.abc import Callable, Sequence
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
+
+from .lookup.cells import Cells, is_plain
 
 pi = math.pi
 
@@ -47,9 +51,14 @@ def elementwise(function: Callable[..., Any], *arguments: Any) -> Any:
     plain = all(isinstance(r, bool | int | float | np.generic) for r in results)
     if plain:
         return np.array(results).reshape(arrays[0].shape)
-    cells = np.empty(len(results), dtype=object)
-    cells[:] = results
-    return cells.reshape(arrays[0].shape).view(SymbolArray)
+    return symbols(results, arrays[0].shape)
+
+
+def symbols(cells: Sequence[Any], shape: tuple[int, ...]) -> SymbolArray:
+    """An array of symbols, among which there may be numbers."""
+    array = np.empty(len(cells), dtype=object)
+    array[:] = cells
+    return array.reshape(shape).view(SymbolArray)
 
 
 def _unary(name: str, function: Callable[[Any], float], doc: str) -> Callable[[Any], Any]:
@@ -131,6 +140,23 @@ def total(x: Any) -> Any:
     return result
 
 
+def product(matrix: NDArray[np.float64], vector: Any) -> Any:
+    """A matrix of plain numbers times a vector: each sum from first to last, where ``@`` may add in any order.
+
+    Args:
+        matrix: shape (m, n).
+        vector: shape (n,).
+    """
+    cells = np.asarray(vector, dtype=object)
+    for cell in cells:
+        if not is_plain(cell):
+            return symbols(cell.product(matrix, cells.tolist()), (len(matrix),))
+    result = np.zeros(len(matrix))
+    for column, cell in zip(matrix.T, cells, strict=True):
+        result = result + column * float(cell)
+    return result
+
+
 def piecewise_constant(x: Any, breakpoints: Sequence[Any] | np.ndarray, values: Sequence[Any] | np.ndarray) -> Any:
     """The value of the last breakpoint not above ``x``; ``values[0]`` before the first one.
 
@@ -139,8 +165,12 @@ def piecewise_constant(x: Any, breakpoints: Sequence[Any] | np.ndarray, values: 
         breakpoints: rising positions, shape (n,).
         values: value from each breakpoint on, shape (n,).
     """
+    if isinstance(x, np.ndarray):
+        return elementwise(lambda place: piecewise_constant(place, breakpoints, values), x)
+    if _is_table(x, breakpoints, values):
+        return Cells([breakpoints], [[value] for value in values]).find(x)[0]
     result = values[0]
-    # The first breakpoint too, though it changes no number: the result takes the shape of x.
+    # The first breakpoint too, though it changes no number: where a symbol is looked up the result is one.
     for position, value in zip(breakpoints, values, strict=True):
         result = where(x >= position, value, result)
     return result
@@ -154,6 +184,14 @@ def piecewise_linear(x: Any, breakpoints: Sequence[Any] | np.ndarray, values: Se
         breakpoints: strictly rising positions, shape (n,).
         values: value at each breakpoint, shape (n,).
     """
+    if isinstance(x, np.ndarray):
+        return elementwise(lambda place: piecewise_linear(place, breakpoints, values), x)
+    if len(breakpoints) > 1 and _is_table(x, breakpoints, values):
+        starts = breakpoints[:-1]
+        widths = [b - a or 1.0 for a, b in itertools.pairwise(breakpoints)]
+        rows = np.transpose([starts, widths, values[:-1], np.diff(values)])
+        begin, width, value, change = Cells([starts], rows).find(x)
+        return value + clip((x - begin) / width, 0.0, 1.0) * change
     result = where(x >= breakpoints[0], values[0], values[0])
     for k in range(len(breakpoints) - 1):
         width = breakpoints[k + 1] - breakpoints[k]
@@ -161,6 +199,13 @@ def piecewise_linear(x: Any, breakpoints: Sequence[Any] | np.ndarray, values: Se
         fraction = clip((x - breakpoints[k]) / width, 0.0, 1.0)
         result = where(x >= breakpoints[k], values[k] + fraction * (values[k + 1] - values[k]), result)
     return result
+
+
+def _is_table(x: Any, breakpoints: Sequence[Any] | np.ndarray, values: Sequence[Any] | np.ndarray) -> bool:
+    """Whether a symbol is looked up among plain numbers in order."""
+    if is_plain(x) or not is_plain([*breakpoints, *values]):
+        return False
+    return all(a <= b for a, b in itertools.pairwise(breakpoints))
 
 
 def repeat(step: Callable[[Any, Any], Any], times: int, values: Any, given: Any) -> Any:

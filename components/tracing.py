@@ -6,13 +6,16 @@ To trace is to run the equations on stand-ins for numbers: here on names, in `fm
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from .component import Component, Method, evaluated
 from .declarations import Input, Memory, Output, Parameter, State, Tape
 from .errors import ComponentError
+from .lookup.cells import Cells
 from .maths import SymbolArray, elementwise
 from .returned import check_returned, due, line_of
 
@@ -54,6 +57,14 @@ class Sourced:
     def where(self, then: Any, otherwise: Any) -> Any:
         """The result of a choice on this value."""
         return self._join(then, otherwise)
+
+    def cells(self, table: Cells, places: Sequence[Any]) -> list[Any]:
+        """The constants of a cell: each depends on all that says which cell it is."""
+        return [self._join(*places)] * table.constants.shape[-1]
+
+    def product(self, matrix: NDArray[np.float64], vector: Sequence[Any]) -> list[Any]:
+        """A matrix times a vector."""
+        return [self._join(*vector)] * len(matrix)
 
     def _refuse(self, *_: Any) -> Any:
         raise TracingError(

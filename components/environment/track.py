@@ -3,14 +3,18 @@
 from __future__ import annotations
 
 import itertools
+import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Any, NamedTuple
 
-from ..maths import clip, logical_and, logical_or, maximum, piecewise_constant, where
+from ..lookup.cells import Cells, is_plain, just_above
+from ..maths import clip, logical_and, maximum, where
 from ..supervision.speed_limit import STEPS, SpeedLimit
 from ..tables import Column, Table
 from .curve import GRAVITY, LAWS, Transition, arc, transitions
+from .under import changes, under
 
 _TUNNEL = 0.00013
 """1/m: a tunnel of length L resists with 0.00013 L newtons per kilonewton of weight (TB/T 1407)."""
@@ -123,9 +127,7 @@ class Track:
 
     def resistance(self, position: Any) -> tuple[Any, Any]:
         """Of a train that is a point, in N/kg: all of it for a train that runs forwards, and what opposes motion."""
-        whole, opposing = (
-            piecewise_constant(position, self.positions, values) for values in (self.resistances, self.opposing)
-        )
+        whole, opposing = self._by_section.find(position)
         for curve in self.transitions:
             inside = logical_and(position >= curve.begin, position < curve.end)
             further = where(inside, curve.at(clip(position, curve.begin, curve.end)), 0.0)
@@ -145,9 +147,12 @@ class Track:
     def mean(self, values: Sequence[float], position: Any, length: Any) -> Any:
         """Mean of a value by section over the train, whose front is at the position: each begin counts by its share."""
         result: Any = values[0]
-        for begin, (before, value) in zip(self.positions[1:], itertools.pairwise(values), strict=True):
-            if value != before:
-                result = result + (value - before) * clip((position - begin) / length, 0.0, 1.0)
+        if is_plain(length):
+            result, steps = under(tuple(self.positions), tuple(values), length).at(position)
+        else:
+            steps = changes(self.positions, values)
+        for begin, change in steps:
+            result = result + change * clip((position - begin) / length, 0.0, 1.0)
         return result
 
     def mean_altitude(self, position: Any, length: Any) -> Any:
@@ -164,17 +169,26 @@ class Track:
 
     def next_stop(self, position: Any) -> Any:
         """Where the first stop is that the front has not passed, in m; far away after the last."""
-        result: Any = _NEVER
-        for stop in reversed(self.stops):
-            result = where(position <= stop.position, stop.position, result)
-        return result
+        return self._by_stop.find(position)[0]
 
     def is_neutral(self, position: Any, length: Any) -> Any:
         """Whether any part of the train is in a neutral section."""
-        result: Any = False
-        for begin, end in self.neutral:
-            result = logical_or(result, logical_and(position >= begin, position - length < end))
-        return result
+        return position - length < self._by_neutral.find(position)[0]
+
+    @cached_property
+    def _by_section(self) -> Cells:
+        return Cells([self.positions], list(zip(self.resistances, self.opposing, strict=True)))
+
+    @cached_property
+    def _by_stop(self) -> Cells:
+        stops = [stop.position for stop in self.stops]
+        return Cells([[-math.inf, *map(just_above, stops)]], [[stop] for stop in (*stops, _NEVER)])
+
+    @cached_property
+    def _by_neutral(self) -> Cells:
+        """The end of the neutral sections that have begun."""
+        begins, ends = zip((-math.inf, -math.inf), *self.neutral, strict=True)
+        return Cells([begins], [[end] for end in itertools.accumulate(ends, max)])
 
 
 def _line(  # noqa: PLR0917, as many as a line has keys

@@ -4,9 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Any
 
-from ..maths import logical_and, minimum, where
+from ..lookup.cells import Cells, just_above
 from ..tables import FASTEST, Column, Table
 
 _ROUNDING = 1e-6
@@ -27,18 +28,26 @@ class SpeedLimit:
 
     def at(self, place: Any) -> Any:
         """The limit in m/s at a time or position; ahead of the first step that of the first."""
-        result: Any = self.steps[0][1]
-        for begin, speed in self.steps:
-            result = where(place > begin + _ROUNDING, speed, result)
-        return result
+        return self._by_step.find(place)[0]
 
     def lowest(self, rear: Any, front: Any) -> Any:
         """The lowest limit in m/s between two places, the rear one's included."""
-        result = self.at(rear)
-        for begin, speed in self.steps:
-            entered = logical_and(front > begin + _ROUNDING, rear <= begin + _ROUNDING)
-            result = where(entered, minimum(result, speed), result)
-        return result
+        return self._by_steps.find(rear, front)[0]
+
+    @cached_property
+    def _starts(self) -> list[float]:
+        return [just_above(begin + _ROUNDING) for begin, _ in self.steps]
+
+    @cached_property
+    def _by_step(self) -> Cells:
+        return Cells([self._starts], [[speed] for _, speed in self.steps])
+
+    @cached_property
+    def _by_steps(self) -> Cells:
+        """From the step of the rear to that of the front."""
+        speeds, count = [speed for _, speed in self.steps], range(len(self.steps))
+        rows = [[[min(speeds[r : max(r, f) + 1])] for f in count] for r in count]
+        return Cells([self._starts, self._starts], rows)
 
 
 STEPS = Table(

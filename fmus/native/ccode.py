@@ -9,7 +9,9 @@ from __future__ import annotations
 import hashlib
 import math
 import re
+from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterator, Mapping, Sequence
+from types import MappingProxyType
 from typing import Any, NamedTuple
 
 import casadi as ca
@@ -69,30 +71,76 @@ def number(value: Any) -> str:
     return repr(value)
 
 
-def function(name: str, arguments: Sequence[tuple[str, Any]], results: Sequence[Any]) -> list[str]:
+class Call(ABC):
+    """How a call of one of CasADi's functions is written."""
+
+    @abstractmethod
+    def read(self, arguments: tuple[int, ...]) -> tuple[int, ...]:
+        """Those of the arguments, all of them one after the other, that are read."""
+
+    @abstractmethod
+    def code(self, k: int, arguments: Sequence[str], results: int) -> str:
+        """Statements, the last without its semicolon, whose variables have the number ``k``; or nothing.
+
+        Args:
+            k: number of the call.
+            arguments: the C of those that are read.
+            results: how many there are.
+        """
+
+    @abstractmethod
+    def result(self, k: int, place: int) -> str:
+        """The C of one of the results."""
+
+
+class _Defined(Call):
+    """Of a function that is written from CasADi's own."""
+
+    def __init__(self, name: str) -> None:
+        self.name = name
+
+    def read(self, arguments: tuple[int, ...]) -> tuple[int, ...]:
+        return arguments
+
+    def code(self, k: int, arguments: Sequence[str], results: int) -> str:
+        return f"const double v{k}[] = {{{', '.join(arguments)}}}; double r{k}[{results}]; {self.name}(v{k}, r{k})"
+
+    def result(self, k: int, place: int) -> str:
+        return f"r{k}[{place}]"
+
+
+def function(
+    name: str,
+    arguments: Sequence[tuple[str, Any]],
+    results: Sequence[Any],
+    known: Mapping[str, Call] = MappingProxyType({}),
+) -> list[str]:
     """A C function of arrays, after those that it calls: a function of one content has one name.
 
     Args:
         name: of the function.
         arguments: name and CasADi vector of each.
         results: scalar expressions, written to the array ``result`` in this order.
+        known: how calls are written of functions that need no definition, by their names.
     """
     symbols = [symbol for _, symbol in arguments]
     compiled = ca.Function("f", symbols, [ca.densify(ca.vertcat(*results))], {"cse": True})
     names = [argument for argument, _ in arguments]
-    called, lines, steps = _body(compiled, lambda k, place: f"{names[k]}[{place}]", f"{name.rpartition('_')[0]}_step")
+    called, lines, steps = _body(
+        compiled, lambda k, place: f"{names[k]}[{place}]", f"{name.rpartition('_')[0]}_step", known
+    )
     used = "".join(lines)
     unused = [f"    (void){argument};" for argument in names if f"{argument}[" not in used]
     kept_in_place = "ALWAYS_INLINE" if steps <= _SHORT else "static inline"
     return [*called, _definition(f"{kept_in_place} void {name}", names, [*unused, *lines])]
 
 
-def _called(compiled: Any, name: str) -> tuple[str, list[str]]:
+def _called(compiled: Any, name: str, known: Mapping[str, Call]) -> tuple[str, list[str]]:
     """The name in C of a function that is called, and what defines it: its arguments stand in one array."""
     firsts = [0]
     for k in range(compiled.n_in()):
         firsts.append(firsts[-1] + compiled.nnz_in(k))
-    called, lines, _ = _body(compiled, lambda k, place: f"values[{firsts[k] + place}]", name)
+    called, lines, _ = _body(compiled, lambda k, place: f"values[{firsts[k] + place}]", name, known)
     name = f"{name}_{hashlib.sha256(''.join(lines).encode()).hexdigest()[:12]}"
     return name, [*called, _definition(f"static void {name}", ["values"], lines)]
 
@@ -102,16 +150,21 @@ def _definition(head: str, arguments: Sequence[str], lines: Sequence[str]) -> st
     return f"{head}({signature}, double *result)\n{{\n" + "\n".join(lines) + "\n}\n"
 
 
-def _body(compiled: Any, value: Callable[[int, int], str], name: str) -> tuple[list[str], list[str], int]:
+def _body(
+    compiled: Any, value: Callable[[int, int], str], name: str, known: Mapping[str, Call]
+) -> tuple[list[str], list[str], int]:
     """Of a CasADi function: definitions of those it calls, its own lines, the number of its operations.
 
     Args:
         compiled: the function.
         value: the C of one value of one argument.
         name: beginning of the names of those it calls.
+        known: how calls are written of functions that need no definition.
     """
-    called = {each: _called(compiled.get_function(each), name) for each in compiled.get_function()}
-    calls = iter([called[each][0] for each in _CALL.findall(compiled.str(True))])
+    unknown = [each for each in compiled.get_function() if each not in known]
+    called = {each: _called(compiled.get_function(each), name, known) for each in unknown}
+    written = {**known, **{each: _Defined(defined) for each, (defined, _) in called.items()}}
+    calls = iter([written[each] for each in _CALL.findall(compiled.str(True))])
     steps = _steps(compiled, value, calls)
     inside: dict[Path, list[int]] = {}
     asked_for = {n for step in steps for n in step.read}
@@ -135,7 +188,7 @@ class _Step(NamedTuple):
         return self.operation in _TRUTHS or self.operation in _OF_TRUTHS
 
 
-def _steps(compiled: Any, value: Callable[[int, int], str], calls: Iterator[str]) -> list[_Step]:
+def _steps(compiled: Any, value: Callable[[int, int], str], calls: Iterator[Call]) -> list[_Step]:
     """The operations of a CasADi function in order; the value of step k is the variable ``a<k>``."""
     steps: list[_Step] = []
     holds: dict[int, int] = {}  # the step whose value a place of CasADi's work memory holds
@@ -159,12 +212,11 @@ def _steps(compiled: Any, value: Callable[[int, int], str], calls: Iterator[str]
     return steps
 
 
-def _call(name: str, read: tuple[int, ...], results: int, steps: Sequence[_Step]) -> list[_Step]:
+def _call(call: Call, arguments: tuple[int, ...], results: int, steps: Sequence[_Step]) -> list[_Step]:
     """A call of a function, and its results."""
-    k = len(steps)
-    values = f"const double v{k}[] = {{{', '.join(_numbers(read, steps))}}}"
-    call = _Step(ca.OP_CALL, read, f"{values}; double r{k}[{results}]; {name}(v{k}, r{k})")
-    return [call, *(_Step(ca.OP_ASSIGN, (k,), f"r{k}[{place}]") for place in range(results))]
+    k, read = len(steps), call.read(arguments)
+    code = call.code(k, _numbers(read, steps), results)
+    return [_Step(ca.OP_CALL, read, code), *(_Step(ca.OP_ASSIGN, (k,), call.result(k, n)) for n in range(results))]
 
 
 def _numbers(read: Sequence[int], steps: Sequence[_Step]) -> list[str]:
@@ -219,7 +271,7 @@ def _lines(here: Path, inside: Mapping[Path, Sequence[int]], steps: Sequence[_St
     for k in inside[here]:
         operation, read, code = steps[k]
         if operation in _STATEMENTS:
-            yield f"{indent}{code};"
+            yield from [f"{indent}{code};"] if code else []
         elif (*here, k) in inside:
             yield f"{indent}double a{k} = 0.0;"
             yield f"{indent}if ({code.partition(' ? ')[0]}) {{"

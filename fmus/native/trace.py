@@ -7,9 +7,7 @@ tapes, then those of the random numbers. Time and the length of a sample are the
 from __future__ import annotations
 
 import contextlib
-import functools
-import itertools
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, NoReturn
@@ -20,135 +18,16 @@ import numpy as np
 from ...components.component import Component, Method, Slot, evaluated
 from ...components.declarations import Memory, Output, State, Tape
 from ...components.errors import ComponentError
-from ...components.maths import SymbolArray, elementwise
 from ...components.returned import check_returned, due, line_of
 from ...components.tracing import TracingError
 from ..variables import scalar_variables
+from . import calls
 from .ccode import function
+from .symbol import Symbol, Text, arranged, expression
 
-_FUNCTIONS = {
-    "sqrt": ca.sqrt,
-    "exp": ca.exp,
-    "log": ca.log,
-    "sin": ca.sin,
-    "cos": ca.cos,
-    "tan": ca.tan,
-    "tanh": ca.tanh,
-    "floor": ca.floor,
-    "abs": ca.fabs,
-}
 _REMEDY = "on values use operators, slices, reshaping and railcosim.components.maths, nothing else"
-_NUMBERS = itertools.count()
-"""CasADi tells functions apart by name."""
 _NOT_THE_AUTHORS = (Path(__file__).parent, Path(__file__).parents[1])
 """Folders whose files are never to blame."""
-
-
-class Symbol:
-    """A scalar expression that stands in for a number in the equations and refuses to be taken for one.
-
-    Bare CasADi symbols would fail silently: ``math.tanh`` of one is NaN, an array times one is a matrix.
-    """
-
-    __slots__ = ("sx",)
-    __array_priority__ = 1000.0
-    __hash__ = None  # type: ignore[assignment]
-
-    def __init__(self, sx: Any) -> None:
-        self.sx = sx
-
-    def apply(self, function: str) -> Symbol:
-        """The result of a unary function of `maths`."""
-        return Symbol(_FUNCTIONS[function](self.sx))
-
-    def where(self, then: Any, otherwise: Any) -> Symbol:
-        """The result of a choice on this condition."""
-        return Symbol(ca.if_else(self.sx, _expression(then), _expression(otherwise)))
-
-    def repeated(self, step: Callable[[Any, Any], Any], times: int, values: Any, given: Any) -> Any:
-        """The result of a `maths.repeat` on symbols: calls of one function."""
-        known = [ca.SX.sym(name, len(cells)) for name, cells in (("values", values), ("given", given))]
-        cells = step(*(_arranged([Symbol(x) for x in ca.vertsplit(column)], column.shape[:1]) for column in known))
-        options = {"cse": True, "never_inline": True}
-        once = ca.Function(f"step{next(_NUMBERS)}", known, [ca.vertcat(*map(_expression, cells))], options)
-        column, fixed = (ca.vertcat(*map(_expression, cells)) for cells in (values, given))
-        for _ in range(times):
-            column = once(column, fixed)
-        return _arranged([Symbol(x) for x in ca.vertsplit(column)], column.shape[:1])
-
-    def _refuse(self, *_: Any) -> Any:
-        raise TracingError(
-            "a value was asked for its truth or turned into a plain number: use railcosim.components.maths "
-            "(where, tanh, clip, logical_and, ...) instead of if, and, or, float() or the math module"
-        )
-
-    def _refuse_division(self, *_: Any) -> Any:
-        raise TracingError("// and % cannot be traced: Python and C round them differently; use maths.floor")
-
-    __bool__ = __float__ = __int__ = __index__ = __complex__ = _refuse
-    __floordiv__ = __rfloordiv__ = __mod__ = __rmod__ = _refuse_division
-
-    def __neg__(self) -> Symbol:
-        return Symbol(-self.sx)
-
-    def __pos__(self) -> Symbol:
-        return self
-
-    def __abs__(self) -> Symbol:
-        return Symbol(ca.fabs(self.sx))
-
-
-def _binary(operation: Callable[[Any, Any], Any], swapped: bool = False) -> Callable[[Symbol, Any], Any]:
-    def method(self: Symbol, other: Any) -> Any:
-        # NumPy leaves an operation of an array with a symbol to the symbol, whichever side it stands on.
-        if isinstance(other, np.ndarray):
-            return elementwise(functools.partial(method, self), other)
-        a, b = self.sx, _expression(other)
-        return Symbol(operation(b, a) if swapped else operation(a, b))
-
-    return method
-
-
-def _expression(value: Any) -> Any:
-    """A value as a CasADi scalar; truth values are 0 and 1, as in C."""
-    if isinstance(value, Symbol):
-        return value.sx
-    if isinstance(value, bool | int | float | np.bool_ | np.integer | np.floating):
-        return ca.SX(float(value))
-    raise TracingError(f"{value!r} is neither a number nor an expression")
-
-
-for _name, _operation in {
-    "add": lambda a, b: a + b,
-    "sub": lambda a, b: a - b,
-    "mul": lambda a, b: a * b,
-    "truediv": lambda a, b: a / b,
-    "pow": lambda a, b: a**b,
-}.items():
-    setattr(Symbol, f"__{_name}__", _binary(_operation))
-    setattr(Symbol, f"__r{_name}__", _binary(_operation, swapped=True))
-for _name, _operation in {
-    "lt": lambda a, b: a < b,
-    "le": lambda a, b: a <= b,
-    "gt": lambda a, b: a > b,
-    "ge": lambda a, b: a >= b,
-    "eq": lambda a, b: a == b,
-    "ne": lambda a, b: a != b,
-}.items():
-    setattr(Symbol, f"__{_name}__", _binary(_operation))
-
-
-class Text:
-    """Stands in for a text: a native FMU carries texts, but its equations cannot read them."""
-
-    __hash__ = None  # type: ignore[assignment]
-
-    def _refuse(self, *_: Any) -> Any:
-        raise TracingError("a text is read, which only a Python FMU can: use a boolean or an integer to choose")
-
-    __eq__ = __ne__ = __lt__ = __le__ = __gt__ = __ge__ = _refuse
-    __add__ = __radd__ = __mul__ = __rmul__ = __mod__ = __getitem__ = __contains__ = __iter__ = __getattr__ = _refuse
-    __bool__ = __len__ = __str__ = __repr__ = __format__ = __int__ = __float__ = _refuse
 
 
 @dataclass(frozen=True)
@@ -260,12 +139,12 @@ def _code(found: Expressions, prefix: str) -> Traced:
     arguments = [("clock", found.clock), ("values", found.values)]
     code: dict[str, None] = {}  # what several of them call stands there once
     for name, column in functions.items():
-        code |= dict.fromkeys(function(f"{prefix}_{name}", arguments, column) if column else [])
+        code |= dict.fromkeys(function(f"{prefix}_{name}", arguments, column, calls.KNOWN) if column else [])
     along = {"directional": [*found.outputs, *found.derivatives], "initial_directional": found.initial}
     for name, column in along.items():
         if column:
             code |= dict.fromkeys(_directional(f"{prefix}_{name}", arguments, column))
-    return Traced("\n".join(code), found.layout, found.started, found.reinitialised)
+    return Traced("\n".join([*calls.tables("".join(code)), *code]), found.layout, found.started, found.reinitialised)
 
 
 def _directional(name: str, arguments: list[tuple[str, Any]], column: list[Any]) -> list[str]:
@@ -276,7 +155,7 @@ def _directional(name: str, arguments: list[tuple[str, Any]], column: list[Any])
     with simplification(True):
         derivative = ca.densify(ca.jtimes(ca.vertcat(*column), values, seed))
         results = [derivative[k] for k in range(len(column))]
-        return function(name, [*arguments, ("seed", seed)], results)
+        return function(name, [*arguments, ("seed", seed)], results, calls.KNOWN)
 
 
 @contextlib.contextmanager
@@ -304,7 +183,7 @@ class _Tracer:
         references = {v.name: v.reference for v in scalar_variables(self.probe)}
         for slot in self.probe.slots.values():
             if slot.type is str:
-                place[slot.name] = _arranged([Text() for _ in slot.scalars], slot.shape)
+                place[slot.name] = arranged([Text() for _ in slot.scalars], slot.shape)
             elif slot.scalars and slot.scalars[0] in references:
                 place[slot.name] = self._cells([references[name] for name in slot.scalars], slot.shape)
         at = self.layout.tape[0]
@@ -319,7 +198,7 @@ class _Tracer:
         place["time"] = Symbol(self.clock[0])
 
     def _cells(self, references: Iterable[int], shape: tuple[int, ...]) -> Any:
-        return _arranged([Symbol(self.values[k]) for k in references], shape)
+        return arranged([Symbol(self.values[k]) for k in references], shape)
 
     def expressions(self) -> Expressions:
         outputs = self._results("outputs", [*self.probe.of(Output)])
@@ -334,7 +213,7 @@ class _Tracer:
         del self.probe.present_values["step"]
         again = [slot for slot in self.probe.of(State) if slot.name in updated]
         update = self._flat(updated, [*remembered, *again], "update")
-        keep = [_expression(self._call("keep"))]
+        keep = [expression(self._call("keep"))]
         return Expressions(
             self.layout,
             self.clock,
@@ -379,7 +258,7 @@ class _Tracer:
                 raise TracingError(f"{self.name}.{slot.name} is a computed text; only a Python FMU can have one")
             try:
                 array = np.asarray(returned[slot.name], dtype=object)
-                expressions = [_expression(cell) for cell in array.flat]
+                expressions = [expression(cell) for cell in array.flat]
             except ValueError as error:  # a text, or something else that is no number; TracingError is one
                 raise TracingError(f"{self.name}.{method}: {slot.name!r}: {error}") from None
             if array.shape != slot.shape:
@@ -388,13 +267,3 @@ class _Tracer:
                 )
             cells += expressions
         return cells
-
-
-def _arranged(cells: list[Any], shape: tuple[int, ...]) -> Any:
-    """Cells in the shape of their slot."""
-    if not shape:
-        return cells[0]
-    array = np.empty(len(cells), dtype=object)
-    for k, cell in enumerate(cells):  # one by one: NumPy would look for numbers inside each of a list
-        array[k] = cell
-    return array.reshape(shape).view(SymbolArray)

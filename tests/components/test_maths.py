@@ -77,6 +77,11 @@ def test_total_adds_from_first_to_last():
     assert maths.total(np.array([[1.0, 2.0], [3.0, 4.0]])) == 10.0
 
 
+def test_a_product_adds_from_first_to_last():
+    assert maths.product(np.array([[1.0, 1.0, 1.0], [0.0, 2.0, 3.0]]), [1.0, 1e16, -1e16]).tolist() == [0.0, -1e16]
+    assert maths.product(np.array([[2.0]]), np.array([True])).tolist() == [2.0]
+
+
 @given(st.floats(-50.0, 50.0))
 def test_piecewise_linear_against_numpy(x):
     """Reference: `numpy.interp`."""

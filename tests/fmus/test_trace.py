@@ -4,11 +4,13 @@ import itertools
 import math
 
 import casadi as ca
+import numpy as np
 import pytest
 from railcosim.components import Component, ComponentError, Input, Memory, Output, Parameter, Size, State, maths
 from railcosim.components.tracing import TracingError
 from railcosim.fmus.native.ccode import function, number
-from railcosim.fmus.native.trace import Symbol, layout, trace
+from railcosim.fmus.native.symbol import Symbol
+from railcosim.fmus.native.trace import layout, trace
 from railcosim.fmus.variables import scalar_variables
 
 
@@ -215,3 +217,19 @@ def test_a_computed_text_is_refused():
 
 def test_a_refusal_is_an_error_of_the_family():
     assert issubclass(TracingError, ComponentError)
+
+
+def test_the_same_table_is_written_once_however_often_it_is_traced():
+    class Looking(Component):
+        """Looks up and multiplies."""
+
+        u = Input("1")
+        y = Output("1", shape=(3,))
+
+        def outputs(self):
+            looked = maths.piecewise_constant(self.u, [0.0, 1.0], [2.0, 3.0])
+            return {"y": [*maths.product(np.eye(2), [self.u, 1.0]), looked]}
+
+    first, second = trace(Looking(), "Looking").code, trace(Looking(), "Looking").code
+    assert first == second
+    assert first.count("static const double") == 3  # starts and constants of the cells, and a matrix

@@ -4,6 +4,7 @@ import pytest
 from railcosim.components import ComponentError, Line
 from railcosim.components.environment.curve import arc
 from railcosim.components.environment.track import NO_LIMIT, read_line
+from railcosim.components.tracing import Sourced
 from scipy.integrate import quad
 
 SECTIONS = [
@@ -149,3 +150,9 @@ def test_a_transition_curve_may_end_at_the_last_stop():
     ends = [{"position": 0.0}, {"position": 50.0}]
     line = read_line({"sections": [{"position": 0.0, "end_radius": 600.0}], "stops": ends})
     assert line.resistance(25.0)[0] == pytest.approx(9.81 * 0.5e-3, rel=1e-12)
+
+
+def test_a_train_whose_length_is_a_parameter_has_all_steps():
+    position, length = Sourced(frozenset({"position"})), Sourced(frozenset({"length"}))
+    whole, _ = read_line(WHOLE).mean_resistance(position, length)
+    assert whole.names == {"position", "length"}

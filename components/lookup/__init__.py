@@ -1,0 +1,1 @@
+"""Tables and networks: what equations know by numbers, not by a formula."""
