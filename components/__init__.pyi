@@ -28,6 +28,8 @@ from .environment.schedule import Schedule
 from .environment.sensor import Sensor
 from .environment.sinusoid import Sinusoid
 from .errors import ComponentError
+from .lookup.network import Network
+from .lookup.table import Lookup
 from .simulate import Simulation, simulate
 from .supervision.etcs import EtcsSupervision
 from .supervision.etcs_driver import EtcsDriver
@@ -79,8 +81,10 @@ __all__ = [
     "Line",
     "LineTimetable",
     "LineTrain",
+    "Lookup",
     "Memory",
     "MovingBlock",
+    "Network",
     "Noise",
     "Output",
     "Parameter",

@@ -10,6 +10,7 @@ from railcosim.components import (
     ComponentError,
     Gust,
     Input,
+    Lookup,
     Memory,
     Output,
     Parameter,
@@ -281,3 +282,23 @@ def test_an_input_is_used_whichever_method_reads_it():
 def test_a_port_has_inputs_that_a_law_does_without():
     every = {name for slot in ComfortCruise().of(Input) for name in slot.scalars}
     assert every - used_inputs(ComfortCruise()) == {"leader_position"}
+
+
+def test_what_is_looked_up_depends_on_all_that_says_where():
+    surface = Lookup([[0.0, 1.0], [0.0, 1.0]], [[1.0, 2.0], [3.0, 4.0]])
+
+    class Looking(Probe):
+        def outputs(self):
+            return {"y": surface(self.a, self.p)}
+
+    class Multiplying(Probe):
+        def outputs(self):
+            return {"y": maths.product(np.ones((1, 2)), [1.0, self.b])[0]}
+
+    class Stepping(Probe):
+        def outputs(self):
+            return {"y": maths.piecewise_constant(self.m, [0.0, 1.0], [2.0, 3.0])}
+
+    assert dependencies(Looking())["y"] == {"a", "p"}
+    assert dependencies(Multiplying())["y"] == {"b"}
+    assert dependencies(Stepping())["y"] == {"m"}

@@ -1,6 +1,22 @@
 """Components for tests of native FMUs: every declaration at once (no computed text), and every function of maths."""
 
-from railcosim.components import Component, Input, Memory, Noise, Output, Parameter, Size, State, Tape, maths
+import numpy as np
+from railcosim.components import (
+    Component,
+    Data,
+    Input,
+    Lookup,
+    Memory,
+    Network,
+    Noise,
+    Output,
+    Parameter,
+    Size,
+    State,
+    Tape,
+    maths,
+)
+from railcosim.components.lookup.network import ACTIVATIONS
 
 
 class Mixed(Component):
@@ -133,4 +149,50 @@ class Functions(Component):
                 maths.logical_not(self.flag),
             ],
             "integer": maths.where(self.flag, self.whole, 2 * self.whole),
+        }
+
+
+_RANDOM = np.random.default_rng(5)
+_LAYERS = [
+    {"weights": _RANDOM.normal(size=(4, 2)).tolist(), "bias": _RANDOM.normal(size=4).tolist(), "activation": "tanh"},
+    {"weights": _RANDOM.normal(size=(len(ACTIVATIONS), 4)).tolist()},
+]
+
+
+class Tables(Component):
+    """Look-up tables and a network, alone and inside choices, with every activation."""
+
+    line = Data({"breakpoints": [-1, 0, 2], "values": [1, 3, -2]}, convert=Lookup.read, description="straight")
+    curve = Data(
+        {"breakpoints": [-1, 0, 2, 3], "values": [1, 3, 3.5, 0], "method": "cubic"},
+        convert=Lookup.read,
+        description="smooth",
+    )
+    surface = Data(
+        {"breakpoints": [[-1, 0, 2], [0, 1]], "values": [[1, 2], [0, -1], [4, 9]], "method": "cubic"},
+        convert=Lookup.read,
+        description="over two variables",
+    )
+    network = Data({"layers": _LAYERS}, convert=Network.read, description="dense layers")
+
+    u = Input("1", 0.3, minimum=-3.0, maximum=4.0, description="any number")
+    w = Input("1", [0.5, -0.25], shape=(2,), minimum=-3.0, maximum=3.0, description="an array")
+    tables = Output("1", shape=(10,), description="what is looked up")
+    activations = Output("1", shape=(len(ACTIVATIONS),), description="of what the network gives")
+
+    def outputs(self):
+        rows = self.network(self.w)
+        return {
+            "tables": [
+                self.line(self.u),
+                self.curve(self.u),
+                self.surface(self.u, self.w[0]),
+                self.surface(0.5, self.w[1]),
+                maths.where(self.u > 0.0, self.curve(self.w[0]) * self.u, self.line(self.w[1])),
+                maths.piecewise_constant(self.u, [0.0, 1.0, 1.5], [-0.5, 2.0, 1.0]),
+                *maths.piecewise_linear(self.w, [-1.0, 0.5, 2.0], [3.0, 1.0, 1.5]),
+                maths.piecewise_linear(self.u, [0.0, 1.0, 1.0, 1.5, 1.5], [0.0, 0.0, 5.0, 7.0, 6.0]),
+                maths.piecewise_constant(self.u, [1.0, 0.0], [2.0, 4.0]),
+            ],
+            "activations": [ACTIVATIONS[name](row) for name, row in zip(ACTIVATIONS, rows, strict=True)],
         }
