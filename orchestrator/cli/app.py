@@ -102,6 +102,7 @@ for command in (
     analysis.linearize,
     searches.falsify,
     searches.optimize,
+    searches.drive,
     studies.study,
     studies.replay,
 ):

@@ -13,9 +13,10 @@ if TYPE_CHECKING:
 
 
 def list_all() -> Answer:
-    """List the shipped scenarios, components and master algorithms."""
+    """List the shipped scenarios, cases of driving, components and master algorithms."""
     from ...components import CATALOGUE
     from ...fmus.references import summary
+    from ..driving import listed_cases
     from ..master import ALGORITHMS
     from ..scenario import listed
     from .documents import list_document
@@ -24,7 +25,7 @@ def list_all() -> Answer:
     scenarios = listed()
     components = {name: summary(component) for name, component in CATALOGUE.items()}
     algorithms = {name: algorithm.summary() for name, algorithm in ALGORITHMS.items()}
-    found = (scenarios, components, algorithms)
+    found = (scenarios, listed_cases(), components, algorithms)
     return Answer(lambda: list_document(*found), lambda: show_list(*found))
 
 

@@ -1,4 +1,4 @@
-"""Commands of ``orchestrate`` that search: for the run that breaks a requirement, for the best parameters."""
+"""Commands of ``orchestrate`` that search: for a run that breaks a requirement, for the best parameters or driving."""
 
 from __future__ import annotations
 
@@ -44,6 +44,13 @@ class MethodName(StrEnum):
     tpe = "tpe"
     random = "random"
     gradient = "gradient"
+
+
+class ObjectiveName(StrEnum):
+    """`driving.OBJECTIVES`, as the command line needs them."""
+
+    energy = "energy"
+    time = "time"
 
 
 Vary = Annotated[
@@ -231,3 +238,41 @@ def _only_requirement(system: System) -> str:
 
 def _directory(command: str, system: System, preset: str | None, *more: str) -> Path:
     return Path("results") / "-".join(filter(None, (command, system.provenance.name, preset, *more)))
+
+
+def drive(
+    case: Annotated[
+        str,
+        typer.Argument(
+            metavar="CASE",
+            help="A shipped case (see 'orchestrate list'), or a .toml file with a table [drive].",
+            autocompletion=completing.cases,
+        ),
+    ],
+    *,
+    time: Annotated[float | None, typer.Option(help="Running time in s; as the case says by default.")] = None,
+    minimize: Annotated[ObjectiveName | None, typer.Option(help="What is to be least.")] = None,
+    settings: Annotated[
+        list[str] | None, typer.Option("--set", help="Set a key of the case: jerk=0.5, train.mass=4e5; repeatable.")
+    ] = None,
+    output: Annotated[
+        Path | None, typer.Option("--output", "-o", help="Directory; results/<case>-drive by default.")
+    ] = None,
+    quiet: Quiet = False,
+) -> Answer:
+    """Find the driving over a line that takes the least energy in a given time, or the least time (extra 'native').
+
+    What is found is profile.csv: place, time, speed, and the forces of traction and brakes. Exit codes: 0 found; 2 the
+    input is wrong, or no driving keeps to it.
+    """
+    try:
+        from ..driving import load_case, optimise, write_profile
+    except ImportError:
+        raise ScenarioError(Problem("", "driving needs casadi", "pip install 'railcosim[native]'")) from None
+    from .documents import drive_document
+    from .printing import show_drive
+
+    changes = {"time": time, "minimize": minimize and minimize.value}
+    optimum = optimise(load_case(case, settings or (), changes))
+    path = write_profile(output or Path("results") / f"{optimum.case.name}-drive", optimum.solution)
+    return Answer(lambda: drive_document(optimum, path), lambda: show_drive(optimum, path, quiet))

@@ -1,15 +1,17 @@
 from .changes import split_assignment
 from .loading import dump, load
 from .patterns import NAME
-from .shipped import Listed, listed, presets_of, raw, shipped
-from .toml_source import parse_value
+from .shipped import MODELS, Listed, listed, presets_of, raw, shipped
+from .toml_source import Source, parse_value
 from .trust import import_notes, untrusted_code
 from .values import SEED, assignment, changed, is_structural
 
 __all__ = [
+    "MODELS",
     "NAME",
     "SEED",
     "Listed",
+    "Source",
     "assignment",
     "changed",
     "dump",

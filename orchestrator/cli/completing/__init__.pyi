@@ -2,6 +2,7 @@ from .bash import completing_bash
 from .words import (
     algorithms,
     assignments,
+    cases,
     comparable,
     components,
     designs,
@@ -22,6 +23,7 @@ from .words import (
 __all__ = [
     "algorithms",
     "assignments",
+    "cases",
     "comparable",
     "completing_bash",
     "components",

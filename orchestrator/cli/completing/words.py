@@ -30,6 +30,14 @@ def comparable(incomplete: str) -> list[tuple[str, str]]:
     return [*scenarios(incomplete), *((path, "") for path in _files(incomplete, *endings) if not path.endswith("/"))]
 
 
+def cases(incomplete: str) -> list[tuple[str, str]]:
+    """Shipped cases of driving with their titles, and files."""
+    from ...driving import listed_cases
+
+    shipped = [(case.name, case.title) for case in listed_cases()]
+    return [*shipped, *((path, "") for path in _files(incomplete, ".toml"))]
+
+
 def components(incomplete: str) -> list[str]:
     """Shipped components, and files with ones of one's own."""
     return [*_component_names(), *_files(incomplete, ".py")]

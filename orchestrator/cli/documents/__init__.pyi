@@ -1,6 +1,7 @@
 from .analysis import compare_document, linearize_document, recorded_document
 from .answer import Answer, answering, fail, failed, wants_json
 from .catalogue import DOCUMENTS
+from .driving import drive_document
 from .envelope import Document, Failure, Mistake
 from .listing import list_document
 from .models import describe_document, new_document, pack_document, validate_document
@@ -23,6 +24,7 @@ __all__ = [
     "check_document",
     "compare_document",
     "describe_document",
+    "drive_document",
     "fail",
     "failed",
     "falsify_document",

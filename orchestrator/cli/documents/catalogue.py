@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import Any
 
 from .analysis import CompareDocument, LinearizeDocument, RecordedDocument
+from .driving import DriveDocument
 from .listing import ListDocument
 from .models import ModelDocument, NewDocument, PackDocument, ValidateDocument
 from .runs import ReproduceDocument, RunDocument
@@ -28,6 +29,7 @@ DOCUMENTS: dict[str, Any] = {
     "new": NewDocument,
     "compare": CompareDocument | RecordedDocument,
     "linearize": LinearizeDocument,
+    "drive": DriveDocument,
     "falsify": FalsifyDocument,
     "optimize": OptimizeDocument,
     "study": StudyDocument,

@@ -5,20 +5,25 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 
+from ...driving import ListedCase
 from ...scenario import Listed
 
 
 @dataclass(frozen=True)
 class ListDocument:
-    """The shipped scenarios with their presets, and the components and master algorithms with what they are."""
+    """The shipped scenarios with their presets, cases of driving, and components and master algorithms, explained."""
 
     scenarios: list[Listed]
+    drives: list[ListedCase]
     components: dict[str, str]
     algorithms: dict[str, str]
 
 
 def list_document(
-    scenarios: Iterable[Listed], components: Mapping[str, str], algorithms: Mapping[str, str]
+    scenarios: Iterable[Listed],
+    drives: Iterable[ListedCase],
+    components: Mapping[str, str],
+    algorithms: Mapping[str, str],
 ) -> ListDocument:
     """The document of what there is."""
-    return ListDocument(list(scenarios), dict(components), dict(algorithms))
+    return ListDocument(list(scenarios), list(drives), dict(components), dict(algorithms))

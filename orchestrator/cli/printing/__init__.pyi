@@ -6,7 +6,7 @@ from .listing import show_list
 from .outcome import show_reproduced, show_run
 from .progress import show_cases, show_compilations, show_progress
 from .scenario import show_check, show_system
-from .searches import show_falsified, show_optimized, show_search
+from .searches import show_drive, show_falsified, show_optimized, show_search
 from .study import show_runs, show_study
 
 __all__ = [
@@ -16,6 +16,7 @@ __all__ = [
     "show_check",
     "show_comparison",
     "show_compilations",
+    "show_drive",
     "show_falsified",
     "show_findings",
     "show_interface",

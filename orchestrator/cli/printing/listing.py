@@ -13,6 +13,7 @@ from ..lines import printable
 from .console import open_console, say
 
 if TYPE_CHECKING:
+    from ...driving import ListedCase
     from ...scenario import Listed
 
 _GAP = "  "
@@ -86,14 +87,22 @@ def _line(cells: Sequence[str], widths: Sequence[int], to_right: Sequence[bool])
     return _GAP.join(padded).rstrip()
 
 
-def show_list(scenarios: Iterable[Listed], components: Mapping[str, str], algorithms: Mapping[str, str]) -> None:
-    """What there is: scenarios with their presets; components and master algorithms with what they are."""
+def show_list(
+    scenarios: Iterable[Listed],
+    drives: Iterable[ListedCase],
+    components: Mapping[str, str],
+    algorithms: Mapping[str, str],
+) -> None:
+    """What there is: scenarios with their presets; the others with what they are."""
     out = open_console()
     say(out, "Scenarios (orchestrate run NAME)", "bold")
     for scenario in scenarios:
         say(out, f"  {scenario.name}: {scenario.title}")
         for preset, what in scenario.presets.items():
             say(out, f"      --preset {preset}" + (f": {what}" if what else ""), "dim")
+    say(out, "Driving (orchestrate drive NAME)", "bold")
+    for case in drives:
+        say(out, f"  {case.name}: {case.title}")
     say(out, "Components (orchestrate describe NAME)", "bold")
     for name, what in components.items():
         say(out, f"  {name}: {what}")

@@ -7,6 +7,7 @@ import sys
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
+from pathlib import Path
 from typing import TYPE_CHECKING
 
 from rich.console import Console
@@ -18,6 +19,7 @@ from .progress import tell_pool
 from .tables import table
 
 if TYPE_CHECKING:
+    from ...driving import Optimum
     from ...study import Pool
     from ...study.search import Falsified, Optimized
 
@@ -121,3 +123,29 @@ def _show_errors(out: Console, failed: int, errors: tuple[str, ...]) -> None:
 def _show_files(out: Console, quiet: bool, result: Falsified | Optimized, names: list[str]) -> None:
     if not quiet:
         say(out, f"Files in {result.directory}: {', '.join(names)}{and_figures(len(result.figures))}", whole=True)
+
+
+def show_drive(optimum: Optimum, profile: Path, quiet: bool) -> None:
+    """Energy and time, how well they are known, and where the profile is.
+
+    Args:
+        optimum: that was found.
+        profile: its file.
+        quiet: print energy and time alone.
+    """
+    out, found = open_console(), optimum.solution
+    least = "least time" if optimum.case.wish.minimize == "time" else "least energy"
+    if not quiet:
+        say(out, optimum.case.title, "bold")
+    say(out, f"{least}: {found.energy / 3.6e6:.4f} kWh in {found.time:.2f} s")
+    if quiet:
+        return
+    meshes = ", ".join(map(str, optimum.meshes))
+    changed = "" if optimum.change is None else f", the last of which changed it by {100.0 * optimum.change:.2g} %"
+    say(out, f"meshes of {meshes} intervals{changed}")
+    say(
+        out,
+        f"errors: {found.feasibility:.1e} of constraints, {found.optimality:.1e} of optimality, "
+        f"{optimum.mesh_error:.1e} m/s of the mesh",
+    )
+    say(out, f"Profile: {profile}", whole=True)
