@@ -1,11 +1,17 @@
+from .channel import IsolatedChannel
 from .choice import ALL, check_isolation, check_once_per_process, instantiate, is_isolated, isolate, isolation_notes
+from .lanes import HAS_LANES
 from .launch import CRASHES, end_process, end_with_parent, signal_name, starting
 from .proxy import IsolatedSlave
+from .riding import Ride, may_ride
 
 __all__ = [
     "ALL",
     "CRASHES",
+    "HAS_LANES",
+    "IsolatedChannel",
     "IsolatedSlave",
+    "Ride",
     "check_isolation",
     "check_once_per_process",
     "end_process",
@@ -14,6 +20,7 @@ __all__ = [
     "is_isolated",
     "isolate",
     "isolation_notes",
+    "may_ride",
     "signal_name",
     "starting",
 ]

@@ -24,6 +24,7 @@ from .. import world
 from . import guard, messages
 from .guard import Look
 from .messages import NOTE_BASE, NOTE_CALL, NOTE_LINE, NOTE_MEMORY, Cells, Door, note
+from .service import Service
 
 if TYPE_CHECKING:
     from ..fmi import Channel, Slave
@@ -68,6 +69,7 @@ class Host:
         self._states: dict[int, Any] = {}
         self._problem: Exception | None = None
         """What went wrong since the last answer."""
+        self._service = Service(memory, notes)
 
     def instantiate(self, make: Callable[[deque[str]], Slave]) -> None:
         """Make the instance, whose messages go where they outlive a crash, and tell how it went."""
@@ -88,7 +90,7 @@ class Host:
             messages.FORGET: self._forget,
         }
         while True:
-            kind, body = self._door.receive()
+            kind, body = self._receive()
             if kind == messages.STEP:
                 self._step(body)
             elif kind == messages.CALL:
@@ -128,15 +130,30 @@ class Host:
         except Exception as error:
             told = {"error": self._describe(error)}
         self._report(told)
+        if operation == "board" and "result" in told:
+            self._instance.time = self._service.serve()
+
+    def _receive(self) -> tuple[int, bytes]:
+        try:
+            return self._door.receive()
+        except OSError as error:
+            self._note_line(error)
+            raise
+
+    def _note_line(self, error: OSError) -> None:
+        """Tell the master why it will not hear any more, where the FMU has closed the line."""
+        if error.errno in _NO_LINE:
+            self._notes[NOTE_LINE] = 1
 
     def _do(self, operation: str, arguments: tuple[Any, ...]) -> Any:
         if not operation:
             return None
-        self._notes[NOTE_CALL] = note(operation)
+        self._notes[NOTE_CALL] = note("step" if operation == "resume" else operation)
         own: dict[str, Callable[..., Any]] = {
             "save": self._save,
             "serialize": self._serialize,
             "deserialize": self._deserialize,
+            "board": self._board,
         }
         call = own[operation] if operation in own else getattr(self._instance, operation)
         return call(*arguments)
@@ -160,8 +177,8 @@ class Host:
         try:
             self._door.send(frame)
         except OSError as error:
-            if error.errno in _NO_LINE:
-                self._notes[NOTE_CALL], self._notes[NOTE_LINE] = call, 1
+            self._notes[NOTE_CALL] = call
+            self._note_line(error)
             raise
 
     @property
@@ -216,6 +233,11 @@ class Host:
 
     def _keep_values(self, content: tuple[int, Sequence[Any]]) -> None:
         self._texts[content[0]] = content[1]
+
+    def _board(self, table: Sequence[tuple[int, int]]) -> None:
+        """Make ready for calls that come through the lane from now on."""
+        channels = [self._channels[k] if k >= 0 else (None, None) for _, k in table]
+        self._service.board(self._instance, [(*entry, *found) for entry, found in zip(table, channels, strict=True)])
 
     # ---------------------------------------------------------------- saved states
 

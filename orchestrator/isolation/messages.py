@@ -38,12 +38,15 @@ ANSWER = FRAME.pack(DONE, 0)
 
 HEAD = 64
 """Bytes before the values: notes of the host as whole numbers of 64 bits, which outlive it."""
-NOTE_CALL, NOTE_MEMORY, NOTE_BASE, NOTE_LINE = range(4)
+NOTE_CALL, NOTE_MEMORY, NOTE_BASE, NOTE_LINE, NOTE_FAILED, NOTE_STATUS, NOTE_TIME = range(7)
 """What it is doing (see `note`); the most memory it has been seen to use beyond what Python has, which is the third, in
-KiB; whether it has lost its line to the master."""
+KiB; whether it has lost its line to the master. Of calls through the lane: which one failed, counted from 1, and less
+than 0 unless that was one that reads; its status; and the time in s, a real number, that the master has got to."""
+SET_REALS, SET_INTEGERS, LANE_STEP, GET_REALS, GET_INTEGERS = range(5)
+"""What is called through the lane: see ``native/lane.h``."""
 CALLS = ("", "instantiate", "setup", "enter_initialization", "exit_initialization", "set", "step", "get", "save",
          "restore", "forget", "serialize", "deserialize", "directional_derivatives", "interpolate", "terminate",
-         "roll_back", "reset", "free")  # fmt: skip
+         "roll_back", "reset", "free", "check", "board")  # fmt: skip
 """What an FMU is asked to do, by number in `NOTE_CALL`."""
 NUMBERS = {name: number for number, name in enumerate(CALLS)}
 _FRAMES = {*range(STEP, FORGET + 1), *range(READY, REPORT + 1)}
@@ -195,6 +198,11 @@ class Door:
                     raise
                 self._wait()
 
+    @property
+    def number(self) -> int:
+        """By which the system knows the socket."""
+        return self._end.fileno()
+
     def close(self) -> None:
         """Leave."""
         self._end.close()
@@ -212,20 +220,20 @@ class Cells:
 
     def __init__(self, memory: mmap.mmap, offset: int, kind: Type, count: int) -> None:
         self._memory = memory
-        self._offset = offset
+        self.offset, self.count = offset, count
         self._layout = struct.Struct(f"={count}{'d' if kind == 'Real' else 'q'}")
 
     def write(self, values: Sequence[Any]) -> bool:
         """Put values there; False if they do not fit, and must go another way."""
         try:
-            self._layout.pack_into(self._memory, self._offset, *values)
+            self._layout.pack_into(self._memory, self.offset, *values)
         except (struct.error, OverflowError):
             return False
         return True
 
     def read(self) -> list[Any]:
         """The values that stand there."""
-        return list(self._layout.unpack_from(self._memory, self._offset))
+        return list(self._layout.unpack_from(self._memory, self.offset))
 
 
 def memory_hint(used: float, limit: float | None) -> str:

@@ -13,6 +13,7 @@ from ..errors import cut
 from ..fmi import Interface
 from ..fmi.binding import plain_interface
 from . import messages
+from .lanes import LANE_SIZE, lane, lane_offset, spin_time
 from .launch import CRASHES, GRACE, MOMENT, accept, end_process, signal_name, start_process, starting
 from .messages import NOTE_CALL, NOTE_LINE, NOTE_MEMORY, Door
 
@@ -80,10 +81,12 @@ class HostProcess:
             "interface": plain_interface(interface),
         }
         self._door: Door | None = None
+        self.lane: lane.Lane | None = None
+        self._lane_offset = lane_offset(cells)
         try:
             world.write_bytes(self._folder / "start", messages.encoded(start))
             # Zeros, not a hole: where the disk is full, whoever fills one is killed, and that may be the master.
-            world.write_bytes(self._folder / "memory", bytes(messages.HEAD + 8 * cells))
+            world.write_bytes(self._folder / "memory", bytes(lane_offset(cells) + LANE_SIZE))
             with world.open(self._folder / "memory", "r+b") as stream:
                 self.memory = world.map_memory(stream.fileno(), 0)
             self._notes: memoryview | None = memoryview(self.memory)[: messages.HEAD].cast("q")
@@ -164,6 +167,34 @@ class HostProcess:
         if min(self._left, self._last_left) <= 0.0:
             raise self._hangs()
 
+    def note(self, which: int) -> int:
+        """One of its notes, by number."""
+        return self._notes[which] if self._notes is not None else 0
+
+    # ---------------------------------------------------------------- the lane
+
+    def open_lane(self) -> lane.Lane:
+        """The way by which the compiled step loop calls it, once it is ready."""
+        if self.lane is None:
+            assert self._door is not None
+            line, spin = self._door.number, spin_time(2)
+            self.lane = lane.Lane(self.memory, self._lane_offset, line, self._moment, spin)
+        return self.lane
+
+    def await_lane(self) -> None:
+        """Wait for all that is under way there.
+
+        Raises:
+            HostLostError: it is gone, or does not come to an end; it is ended then.
+        """
+        assert self.lane is not None
+        self._left = self.patience - self._moment  # which has passed before
+        while (how := self.lane.wait(self._moment)) != lane.CAME:
+            if how == lane.CLOSED:
+                self.lane.leave()  # so that it sees that, where it only has lost its line
+                raise self._is_lost()
+            self._wait()
+
     def last_call(self) -> tuple[str, int]:
         """What it is doing, or was when it was lost: a name of `messages.CALLS`, and the channel where that matters.
 
@@ -193,6 +224,8 @@ class HostProcess:
 
     def _close(self) -> None:
         self._end.close()
+        if self.lane is not None:
+            self.lane.close()
         if self._door is not None:
             self._door.close()
         if self._notes is not None:

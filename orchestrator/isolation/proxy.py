@@ -18,8 +18,10 @@ from ..errors import FmuError, LostError
 from ..fmi import Interface, Type
 from ..fmi.binding import call_name
 from . import messages
+from .channel import IsolatedChannel
 from .messages import Cells, Report, Saved, frame
 from .process import HostLostError, HostProcess
+from .riding import Ride
 
 _SPARE_CELLS = 4096
 _CELLS_PER_VARIABLE = 4
@@ -60,6 +62,8 @@ class IsolatedSlave:
         self.time = 0.0
         self.log: list[str] = []
         self.disturbed: dict[str, None] = {}
+        self.rolls_back = False
+        self._ride: Ride | None = None
         self._room = _SPARE_CELLS + _CELLS_PER_VARIABLE * len(interface.variables)
         self._used = 0
         try:
@@ -68,7 +72,7 @@ class IsolatedSlave:
                 interface,
                 folder,
                 cells=self._room,
-                name_call=self._name_call,
+                name_call=self.name_call,
                 patience=step_timeout,
                 memory_limit=memory_limit,
                 stopped=stopped,
@@ -105,15 +109,15 @@ class IsolatedSlave:
 
     def setup(self, start_time: float, stop_time: float) -> None:
         """Announce the experiment."""
-        self._ask("setup", start_time, stop_time)
+        self.ask("setup", start_time, stop_time)
 
     def enter_initialization(self) -> None:
         """Enter initialization mode."""
-        self._ask("enter_initialization")
+        self.ask("enter_initialization")
 
     def exit_initialization(self) -> None:
         """Leave initialization mode."""
-        self._ask("exit_initialization")
+        self.ask("exit_initialization")
 
     def channel(self, kind: Type, names: Sequence[str]) -> IsolatedChannel:
         """Prepare variables of one type for being set or read together."""
@@ -127,7 +131,7 @@ class IsolatedSlave:
                 self._used += len(names)
             self._queue += frame(messages.CHANNEL, (kind, key[1], offset))
             cells = None if offset is None else Cells(self._process.memory, offset, kind, len(names))
-            self._known[key] = IsolatedChannel(self, len(self._channels), cells)
+            self._known[key] = IsolatedChannel(self, len(self._channels), kind, cells)
             self._channels.append(self._known[key])
         return self._known[key]
 
@@ -151,18 +155,19 @@ class IsolatedSlave:
 
     def roll_back(self) -> None:
         """From now on be restored after steps that it discards."""
-        self._ask("roll_back")
+        self.rolls_back = True
+        self.ask("roll_back")
 
     def save(self) -> Saved:
         """The present state: a handle of the process's."""
         self._saved += 1
-        self._ask("save", self._saved)
+        self.ask("save", self._saved)
         return Saved(self._saved, self.time)
 
     def restore(self, state: Saved) -> None:
         """Come back to a saved state; it stays saved."""
         if self._dirty or self.end is not None:
-            self._ask("")  # what was set before must not come after
+            self.ask("")  # what was set before must not come after
         self.outdate()
         self._queue += frame(messages.RESTORE, state.number)
         self.time = state.time
@@ -174,31 +179,31 @@ class IsolatedSlave:
 
     def serialize(self, state: Saved) -> bytes:
         """A saved state as bytes, as they are without isolation."""
-        return bytes(self._ask("serialize", state.number))
+        return bytes(self.ask("serialize", state.number))
 
     def deserialize(self, content: bytes) -> Saved:
         """A saved state, out of its bytes."""
         self._saved += 1
-        return Saved(self._saved, self._ask("deserialize", self._saved, content))
+        return Saved(self._saved, self.ask("deserialize", self._saved, content))
 
     def directional_derivatives(
         self, unknowns: Sequence[str], knowns: Sequence[str], seed: Sequence[float]
     ) -> list[float]:
         """How the unknowns change when the knowns change by ``seed``; all are Real variables."""
-        return list(self._ask("directional_derivatives", list(unknowns), list(knowns), list(seed)))
+        return list(self.ask("directional_derivatives", list(unknowns), list(knowns), list(seed)))
 
     def interpolate(self, names: Sequence[str], orders: Sequence[int], values: Sequence[float]) -> None:
         """Time derivatives of inputs over the coming step: one name, order (from 1) and value each."""
-        self._ask("interpolate", list(names), list(orders), list(values))
+        self.ask("interpolate", list(names), list(orders), list(values))
 
     def terminate(self) -> None:
         """End the run."""
-        self._ask("terminate")
+        self.ask("terminate")
 
     def reset(self) -> None:
         """Come back to where it was when it was instantiated: another run may follow."""
-        self._ask("reset")
-        self.log = []
+        self.ask("reset")
+        self.log, self.rolls_back = [], False
 
     def free(self) -> None:
         """Give everything back, the process included. Never raises: what goes wrong now is no more than logged."""
@@ -210,6 +215,7 @@ class IsolatedSlave:
                 if self.end is not None:
                     self.end = None
                     self._process.receive()
+                self._leave_lane()
                 self._process.send(frame(messages.CALL, (self._dirty, "free", ())))
                 self._process.receive()
                 self._process.wait()
@@ -217,6 +223,36 @@ class IsolatedSlave:
             _LOG.warning("%s: %s", self.name, lost)
         finally:
             self._process.kill()
+
+    # ---------------------------------------------------------------- for the compiled step loop
+
+    def ride(self) -> Ride:
+        """A new plan of calls through the lane, in the place of an older one."""
+        if not self._is_made:
+            self._await()
+        self._leave_lane()
+        self._ride = Ride(self, self._process)
+        return self._ride
+
+    @property
+    def has_news(self) -> bool:
+        """Whether there is anything that its process has not been told yet."""
+        return bool(self._queue or self._dirty or self.end is not None)
+
+    def _leave_lane(self) -> None:
+        if self._ride is not None:
+            self._ride.end(self.time)
+
+    def await_lane(self, end: float) -> None:
+        """Wait for a call that is under way in the lane, in or after a step to a time in s.
+
+        Raises:
+            FmuError: it is lost.
+        """
+        self.end = end
+        with self._mourning():
+            self._process.await_lane()
+        self.end = None
 
     # ---------------------------------------------------------------- for the channels
 
@@ -235,7 +271,7 @@ class IsolatedSlave:
         if self.end is not None:
             self._finish()
         if channel.index in self._dirty:
-            self._ask("")
+            self.ask("")
         self.outdate()
         if channel.cells is None or not channel.cells.write(values):
             self._queue += frame(messages.VALUES, (channel.index, list(values)))
@@ -268,7 +304,7 @@ class IsolatedSlave:
         elif report is not None:
             self._take(self._watched, self._checked(report))
 
-    def _ask(self, operation: str, *arguments: Any) -> Any:
+    def ask(self, operation: str, *arguments: Any) -> Any:
         """Let the process do something that may change every value, as all but a few do."""
         if self.end is not None:
             self._finish()
@@ -287,6 +323,7 @@ class IsolatedSlave:
         if not self._is_made:
             self._await()
         ring, self._queue, self._dirty = self._queue + ring, b"", []
+        self._leave_lane()
         with self._mourning():
             self._process.send(ring)
 
@@ -356,40 +393,8 @@ class IsolatedSlave:
                 break
             channel.moment, channel.texts = self.moment, report.texts.get(channel.index)
 
-    def _name_call(self, call: str, channel: int) -> str:
+    def name_call(self, call: str, channel: int) -> str:
+        """The function of the standard behind a name of `messages.CALLS`, called for a channel."""
         known = list(self._known)
         kind, names = known[channel] if call in ("set", "get") and 0 <= channel < len(known) else ("Real", ())
         return call_name(self.interface, call, kind, names)
-
-
-class IsolatedChannel:
-    """Some variables of one type of an isolated instance.
-
-    Attributes:
-        index: its number in the process. cells: its place in the shared memory, if it has one.
-        moment: when it was read. texts: what was read then, where that came in a message.
-        problem: when it could not be read, and why.
-    """
-
-    def __init__(self, slave: IsolatedSlave, index: int, cells: Cells | None) -> None:
-        self._slave = slave
-        self.index = index
-        self.cells = cells
-        self.moment = -1
-        self.texts: list[Any] | None = None
-        self.problem: tuple[int, FmuError] | None = None
-
-    def set(self, values: Sequence[Any]) -> None:
-        """Set all of them; what is wrong with it may be said by a later call."""
-        self._slave.set_later(self, values)
-
-    def get(self) -> list[Any]:
-        """Read all of them."""
-        slave = self._slave
-        if slave.end is not None or self.moment != slave.moment:
-            slave.refresh(self)
-        slave.reads[self] = None
-        if self.texts is None:
-            assert self.cells is not None
-            return self.cells.read()
-        return list(self.texts)

@@ -13,11 +13,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .. import world
+from ..fmi import Channel, Slave
 from ..fmi.binding import FmuChannel, FmuSlave, is_watched
 from ..fmi.guard import GUARD, NOTE_SIZE, NOTES, own_note, said
+from ..isolation import IsolatedChannel, IsolatedSlave, Ride, may_ride
 from .algorithms import Explicit, Operation
 from .coupling import Coupling
-from .exchange import Change
+from .exchange import Change, Exchange
 from .observer import Observer, Table
 
 try:
@@ -86,9 +88,7 @@ class CompiledLoop:
     @classmethod
     def of(cls, coupling: Coupling, algorithm: Explicit) -> CompiledLoop | None:
         """One that takes these steps, where the kernel is there and can do all that is asked for."""
-        able = kernel is not None and all(
-            isinstance(x, FmuSlave) and not x.rolls_back for x in coupling.slaves.values()
-        )
+        able = kernel is not None and all(_can_be_called(x, coupling.exchange) for x in coupling.slaves.values())
         held = not coupling.settings.stepping.extrapolation and coupling.loops is None and coupling.refresher is None
         return cls(coupling, algorithm) if able and held and "String" not in coupling.exchange.kinds else None
 
@@ -101,10 +101,11 @@ class CompiledLoop:
         self._entries: list[_Entry] = []
         self._references: list[int] = []
         self._operations: list[tuple[int, int, int, int]] = []
-        self._culprits: list[tuple[FmuSlave | None, str]] = []
+        self._culprits: list[tuple[FmuSlave | Ride | None, str]] = []
         self._instances: list[tuple[int, int]] = []
         self._changes: list[tuple[Change, int, bool]] = []
-        self._slaves = {name: slave for name, slave in coupling.slaves.items() if isinstance(slave, FmuSlave)}
+        self._slaves = {name: _called(slave) for name, slave in coupling.slaves.items()}
+        self._rides = [slave for slave in self._slaves.values() if isinstance(slave, Ride)]
         self._whole = [place for place, kind in enumerate(self._exchange.kinds) if kind != "Real"]
         is_shared = kernel.HAS_THREADS and algorithm.takes_threads
         self.threads = max(1, min(coupling.settings.threads, len(self._slaves))) if is_shared else 1
@@ -117,7 +118,7 @@ class CompiledLoop:
         self._plan = (
             np.array(
                 [
-                    (*operation, is_watched(slave))
+                    (*operation, isinstance(slave, FmuSlave) and is_watched(slave))
                     for operation, (slave, _) in zip(self._operations, self._culprits, strict=True)
                 ],
                 _OPERATION,
@@ -139,11 +140,13 @@ class CompiledLoop:
         """Where an operation of several that failed would stand without threads: all are set before any steps."""
         return self._operations[operation][0] != Operation.SET, operation
 
-    def _add_operation(self, kind: int, index: int, culprit: tuple[FmuSlave | None, str], due: tuple[int, int]) -> None:
+    def _add_operation(
+        self, kind: int, index: int, culprit: tuple[FmuSlave | Ride | None, str], due: tuple[int, int]
+    ) -> None:
         self._operations.append((kind, index, *due))
         self._culprits.append(culprit)
 
-    def _add_sets(self, slave: FmuSlave, rate: int) -> None:
+    def _add_sets(self, slave: FmuSlave | Ride, rate: int) -> None:
         for feed in self._exchange.feeds[slave.name]:
             entries = []
             for k, source in enumerate(feed.sources):
@@ -153,15 +156,13 @@ class CompiledLoop:
                 change = -1 if slot is None else self._add_change(slot, -1, feed.is_real)
                 place = (source, -1 if age is None else age, change)
                 entries.append((*place, feed.scales[k], feed.offsets[k], whole, threshold or 0.0))
-            assert isinstance(feed.channel, FmuChannel)
             self._add_channel(Operation.SET, slave, feed.channel, entries, feed.is_real, due=(rate, 0))
 
-    def _add_gets(self, slave: FmuSlave, rate: int) -> None:
+    def _add_gets(self, slave: FmuSlave | Ride, rate: int) -> None:
         for part in self._exchange.yields[slave.name]:
             due = (rate, 0 if part.direct else rate - 1)
             whole = _TRUE_ABOVE if part.kind == "Boolean" else _AS_IT_IS
             entries = [(place, -1, -1, 1.0, 0.0, whole, 0.0) for place in range(part.begin, part.end)]
-            assert isinstance(part.channel, FmuChannel)
             self._add_channel(Operation.GET, slave, part.channel, entries, part.is_real, due=due)
             for place, change in self._exchange.output_changes.items():
                 if part.begin <= place < part.end:
@@ -175,22 +176,28 @@ class CompiledLoop:
     def _add_channel(
         self,
         kind: int,
-        slave: FmuSlave,
-        channel: FmuChannel,
+        slave: FmuSlave | Ride,
+        channel: Channel,
         entries: list[_Entry],
         is_real: bool,
         *,
         due: tuple[int, int],
     ) -> None:
+        assert isinstance(channel, FmuChannel | IsolatedChannel)
         call = channel.calls[kind == Operation.GET]
         self._add_operation(kind, len(self._channels), (slave, call), due)
-        self._channels.append((*slave.addresses(call), len(self._entries), len(entries), int(is_real)))
+        if isinstance(slave, Ride):
+            assert isinstance(channel, IsolatedChannel)
+            addresses = slave.add(channel, is_get=kind == Operation.GET)
+        else:
+            addresses = slave.addresses(call)
+        self._channels.append((*addresses, len(self._entries), len(entries), int(is_real)))
         self._entries += entries
         self._references += channel.references
 
-    def _add_step(self, slave: FmuSlave, rate: int) -> None:
+    def _add_step(self, slave: FmuSlave | Ride, rate: int) -> None:
         self._add_operation(Operation.STEP, len(self._instances), (slave, "fmi2DoStep"), (rate, 0))
-        self._instances.append(slave.addresses("fmi2DoStep"))
+        self._instances.append(slave.add_step() if isinstance(slave, Ride) else slave.addresses("fmi2DoStep"))
 
     def run(
         self,
@@ -238,6 +245,8 @@ class CompiledLoop:
             into = Table(range(len(values)), due) if table is None else table
             cells = into.room(due)
             self._under_way = into, observe, start_time, step
+            for ride in self._rides:
+                ride.begin()
             begin = world.perf_counter()
             taken, written, newest = kernel.run(
                 *(*self._plan, changes, into.kept, values, history, newest, cells, into.count, places, disturbed),
@@ -280,7 +289,7 @@ class CompiledLoop:
         failed = min((self._rank(n) for n in places["failed"].tolist() if n >= 0), default=None)
         for operation in np.flatnonzero(disturbed).tolist():
             slave = self._culprits[operation][0]
-            if slave is not None and (
+            if isinstance(slave, FmuSlave) and (
                 disturbed[operation] <= done or (failed is not None and self._rank(operation) <= failed)
             ):
                 slave.mend()
@@ -301,25 +310,49 @@ class CompiledLoop:
         failed: list[int] = places["failed"].tolist()
         if max(failed) >= 0:
             part = min((n for n, operation in enumerate(failed) if operation >= 0), key=lambda n: self._rank(failed[n]))
-            self._recover(failed[part], int(places[part]["status"]), time, step)
-            places[part] = failed[part] + 1, -1, 0
+            again = self._recover(failed[part], int(places[part]["status"]), time, step)
+            places[part] = failed[part] + (not again), -1, 0
 
-    def _recover(self, failed: int, status: int, time: float, step: float) -> None:
-        """Go on where an FMU discarded a step that it takes in parts; raise what happens in Python otherwise."""
+    def _recover(self, failed: int, status: int, time: float, step: float) -> bool:
+        """Go on where an FMU discarded a step that it takes in parts; raise what happens in Python otherwise.
+
+        True where the operation that failed is to be done again.
+        """
         slave, call = self._culprits[failed]
         assert slave is not None
         period, phase = self._operations[failed][2:]
-        if call == "fmi2DoStep" and status == _DISCARD:
+        when = time + (period - phase) * step if call.startswith("fmi2Get") else time
+        if isinstance(slave, Ride):
+            if not 0 <= status <= 1:
+                return slave.recover(call, status, when)
+        elif call == "fmi2DoStep" and status == _DISCARD:
             slave.resume(time, period * step, status, final=True)
-            return
+            return False
+        owner = self._coupling.slaves[slave.name]
+        owner.time = when
         if call.startswith("fmi2Set") and 0 <= status <= 1:  # a number that C's int does not hold
-            slave.time = time
             self._exchange.write(slave.name, time)
-        slave.time = time + (period - phase) * step if call.startswith("fmi2Get") else time
-        if status >> 32 > 0:  # a call that was left, and how, and with which exit code
+        if status >> 32 > 0 and isinstance(slave, FmuSlave):  # a call that was left, how, and with which exit code
             raise slave.lose(said(call, status >> 32, (status & 0x7FFFFFFF) - (status & 0x80000000)))
         slave.check(call, status)
-        self._exchange.check_finite(slave)
+        self._exchange.check_finite(owner)
+        return False
+
+
+def _can_be_called(slave: Slave, exchange: Exchange) -> bool:
+    """Whether the kernel can call an instance, and set and read what is exchanged."""
+    if isinstance(slave, IsolatedSlave):
+        given = [part.channel for part in exchange.yields[slave.name]]
+        return may_ride(slave, [*(feed.channel for feed in exchange.feeds[slave.name]), *given])
+    return isinstance(slave, FmuSlave) and not slave.rolls_back
+
+
+def _called(slave: Slave) -> FmuSlave | Ride:
+    """What the kernel calls."""
+    if isinstance(slave, IsolatedSlave):
+        return slave.ride()
+    assert isinstance(slave, FmuSlave)
+    return slave
 
 
 def _rows_due(done: int, block: int, every: int, count: int) -> int:

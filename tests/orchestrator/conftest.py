@@ -360,7 +360,7 @@ def alone(workspace):
 
 @pytest.fixture
 def hostile(compile_c, tmp_path):
-    """The FMU of hostile.c; ``deed`` is what it does before it can be told."""
+    """The FMU of hostile.c; ``deed`` is what it does before it can be told; one that is ``mute`` gives no text."""
     v, discrete = variable, {"variability": "discrete"}
     shown = [
         v("u", "input", start=0.0),
@@ -380,10 +380,10 @@ def hostile(compile_c, tmp_path):
     abilities = "canGetAndSetFMUstate canSerializeFMUstate providesDirectionalDerivative canInterpolateInputs "
     abilities += "canHandleVariableCommunicationStepSize"
 
-    def pack(deed="", *, simulation="", name="hostile.fmu"):
+    def pack(deed="", *, simulation="", name="hostile.fmu", mute=False):
         able = " ".join(f'{ability}="true"' for ability in f"{abilities} {simulation}".split())
         files = {
-            "modelDescription.xml": description(shown, identifier="Hostile", simulation=able),
+            "modelDescription.xml": description(shown[: -1 if mute else None], identifier="Hostile", simulation=able),
             f"binaries/{fmpy.platform}/Hostile{fmpy.sharedLibraryExtension}": compile_c("hostile.c"),
             "resources/deed.txt": deed,
         }

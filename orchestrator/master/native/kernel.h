@@ -9,14 +9,11 @@
 #define HAS_THREADS 1
 #endif
 
+#include "../../fmi/guard/native/floats.h"
 #include "../../fmi/guard/native/guard.h"
 
-#include <fenv.h>
 #include <stddef.h>
 #include <stdint.h>
-#if defined(__SSE2__) || defined(_M_X64)
-#include <xmmintrin.h>
-#endif
 
 enum { OPERATION_SET = 0, OPERATION_STEP = 1, OPERATION_GET = 2, OPERATION_CHANGE = 3 };
 
@@ -158,26 +155,6 @@ typedef struct {
     size_t written;
     long long wait; /* steps to the next row that is due; counted, because to divide takes as long as a light FMU's step */
 } Outcome;
-
-
-/* How this thread rounds, how precisely, what it traps, and whether it takes subnormal numbers for zero: in registers that
-   cost nothing to read. */
-static inline unsigned float_control(void)
-{
-#if defined(__SSE2__) && defined(__GNUC__)
-    unsigned short x87;
-    __asm__ volatile("fnstcw %0" : "=m"(x87));
-    return (unsigned)x87 << 16 | (_mm_getcsr() & ~0x3fU); /* without the flags of what has happened */
-#elif defined(__SSE2__) || defined(_M_X64)
-    return _mm_getcsr() & ~0x3fU;
-#elif defined(__aarch64__) && defined(__GNUC__)
-    uint64_t control;
-    __asm__ volatile("mrs %0, fpcr" : "=r"(control));
-    return (unsigned)control;
-#else
-    return (unsigned)fegetround();
-#endif
-}
 
 /* Hidden, so that nothing of a name like one of theirs elsewhere in the process can stand in their place. */
 #ifdef __GNUC__

@@ -5,6 +5,7 @@ from types import SimpleNamespace
 import fmpy
 import pytest
 from railcosim.orchestrator.errors import FmuError
+from railcosim.orchestrator.isolation import instantiate
 from railcosim.orchestrator.master import compiled
 from railcosim.orchestrator.master.loop import Master
 from railcosim.orchestrator.run.checking import check
@@ -84,18 +85,22 @@ def ring():
 
 @pytest.fixture
 def instantiated(workspace):
-    """Makes the instances of a system, ready to step."""
+    """Makes the instances of a system, ready to step; given back at the end."""
+    made = []
 
     def make(system):
         checked = check(system, workspace)
-        slaves = {name: model.instantiate(name) for name, model in checked.models.items()}
+        slaves = {name: instantiate(model, system.instances[name]) for name, model in checked.models.items()}
+        made.extend(slaves.values())
         master = Master(
             slaves, checked.order.sequence, checked.wiring.links, checked.wiring.starts, system.stepping.algorithm
         )
         master.initialize(system.stepping.start_time, 1e9)
         return master
 
-    return make
+    yield make
+    for slave in made:
+        slave.free()
 
 
 @pytest.fixture

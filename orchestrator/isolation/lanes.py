@@ -1,0 +1,37 @@
+"""Whether there are lanes here, through which the compiled step loop calls isolated FMUs, and where they stand."""
+
+from __future__ import annotations
+
+import os
+
+from .messages import HEAD
+
+__all__ = ["HAS_LANES", "LANE_SIZE", "lane", "lane_offset", "spin_time"]
+
+try:
+    from . import lane
+except ImportError:  # installed without a C compiler
+    lane = None  # type: ignore[assignment]
+
+HAS_LANES = hasattr(lane, "Lane")
+"""They need a C compiler, and Linux."""
+LANE_SIZE = lane.SIZE if HAS_LANES else 0
+_SPIN = 50e-6
+"""Wall time in s for which either side watches for the other's next before it sleeps: longer than a hand-over takes."""
+_LINE = 64
+"""Bytes of a line of the cache, where a lane begins."""
+
+
+def lane_offset(cells: int) -> int:
+    """Where the lane stands in a memory with room for so many values, in bytes."""
+    return -(-(HEAD + 8 * cells) // _LINE) * _LINE
+
+
+def spin_time(processes: int) -> float:
+    """How long to watch, in s: not at all where that would keep a core from one that has something to do.
+
+    Args:
+        processes: how many may watch at the same time, the master included.
+    """
+    cores = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else 1
+    return _SPIN if processes <= cores else 0.0

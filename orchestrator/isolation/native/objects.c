@@ -1,0 +1,225 @@
+/* The master's side of a lane as objects of Python's. */
+
+#include "riding.h"
+
+#if HAS_LANES
+
+#include <stdlib.h>
+
+Lane *lane_in(const Py_buffer *memory, Py_ssize_t offset)
+{
+    if (offset < 0 || offset % 64 != 0 || memory->len < offset + (Py_ssize_t)sizeof(Lane)) {
+        PyErr_SetString(PyExc_ValueError, "lane: it does not fit into the memory");
+        return NULL;
+    }
+    return (Lane *)((char *)memory->buf + offset);
+}
+
+static PyTypeObject *lane_type, *rider_type;
+
+static PyObject *allocated(PyTypeObject *type)
+{
+    return ((allocfunc)PyType_GetSlot(type, Py_tp_alloc))(type, 0);
+}
+
+static void freed(PyObject *self)
+{
+    PyTypeObject *type = Py_TYPE(self);
+    ((freefunc)PyType_GetSlot(type, Py_tp_free))(self);
+    Py_DECREF(type);
+}
+
+static PyObject *make_lane(PyTypeObject *type, PyObject *arguments, PyObject *names)
+{
+    Py_buffer memory;
+    Py_ssize_t offset;
+    int line;
+    double moment, spin;
+    (void)names;
+    if (!PyArg_ParseTuple(arguments, "w*nidd:Lane", &memory, &offset, &line, &moment, &spin)) {
+        return NULL;
+    }
+    Lane *lane = lane_in(&memory, offset);
+    LaneObject *road = lane == NULL ? NULL : (LaneObject *)allocated(type);
+    if (road == NULL) {
+        PyBuffer_Release(&memory);
+        return NULL;
+    }
+    road->memory = memory;
+    road->lane = lane;
+    road->line = line;
+    road->moment = (int64_t)(moment * 1e9);
+    road->spin.most = road->spin.now = (int64_t)(spin * 1e9);
+    return (PyObject *)road;
+}
+
+static PyObject *close_lane(PyObject *self, PyObject *nothing)
+{
+    LaneObject *road = (LaneObject *)self;
+    (void)nothing;
+    if (road->lane != NULL) {
+        road->lane = NULL;
+        PyBuffer_Release(&road->memory);
+    }
+    Py_RETURN_NONE;
+}
+
+static void free_lane(PyObject *self)
+{
+    Py_XDECREF(close_lane(self, NULL));
+    freed(self);
+}
+
+static PyObject *wait_for_all(PyObject *self, PyObject *arguments)
+{
+    LaneObject *road = (LaneObject *)self;
+    double most;
+    int how = CLOSED;
+    if (!PyArg_ParseTuple(arguments, "d:wait", &most)) {
+        return NULL;
+    }
+    if (road->lane != NULL) {
+        Py_BEGIN_ALLOW_THREADS
+        how = await(road, atomic_load(&road->lane->posted), (int64_t)(most * 1e9));
+        Py_END_ALLOW_THREADS
+    }
+    return PyLong_FromLong(how);
+}
+
+static PyObject *leave(PyObject *self, PyObject *nothing)
+{
+    LaneObject *road = (LaneObject *)self;
+    uint32_t ticket;
+    (void)nothing;
+    return PyBool_FromLong(road->lane != NULL && post(road, (Entry){.what = LEAVE}, 1, &ticket));
+}
+
+/* Whether so many values of 64 bits stand in the memory, from an offset on; else an exception. */
+static int has_room(const LaneObject *road, Py_ssize_t offset, Py_ssize_t count)
+{
+    const Py_ssize_t size = sizeof(double);
+    int is_there = road->lane != NULL && offset >= 0 && offset % size == 0 && offset <= road->memory.len && count >= 0 &&
+                   count <= (road->memory.len - offset) / size;
+    if (!is_there) {
+        PyErr_SetString(PyExc_ValueError, "lane: what is wanted does not stand in the memory");
+    }
+    return is_there;
+}
+
+static PyObject *make_rider(PyTypeObject *type, PyObject *arguments, PyObject *names)
+{
+    LaneObject *road;
+    Py_ssize_t head;
+    unsigned number;
+    (void)names;
+    if (!PyArg_ParseTuple(arguments, "O!nI:Rider", lane_type, &road, &head, &number)) {
+        return NULL;
+    }
+    if (!has_room(road, head, 8)) {
+        return NULL;
+    }
+    RiderObject *rider = (RiderObject *)allocated(type);
+    if (rider != NULL) {
+        Py_INCREF((PyObject *)road);
+        rider->road = road;
+        rider->head = head;
+        rider->number = number;
+    }
+    return (PyObject *)rider;
+}
+
+static void free_rider(PyObject *self)
+{
+    RiderObject *rider = (RiderObject *)self;
+    for (Seat *seat = rider->seats, *next; seat != NULL; seat = next) {
+        next = seat->next;
+        free(seat);
+    }
+    Py_XDECREF((PyObject *)rider->road);
+    freed(self);
+}
+
+static PyObject *add(PyObject *self, PyObject *arguments)
+{
+    RiderObject *rider = (RiderObject *)self;
+    int kind;
+    Py_ssize_t offset, count;
+    if (!PyArg_ParseTuple(arguments, "inn:add", &kind, &offset, &count)) {
+        return NULL;
+    }
+    if (!has_room(rider->road, offset, count)) {
+        return NULL;
+    }
+    Seat *seat = calloc(1, sizeof *seat);
+    if (seat == NULL) {
+        return PyErr_NoMemory();
+    }
+    *seat = (Seat){rider, rider->operations++, atomic_load(&rider->road->lane->posted), offset,
+                   rider->seats};
+    rider->seats = seat;
+    rider->gives |= kind == GET_REALS || kind == GET_INTEGERS;
+    return PyLong_FromVoidPtr(seat);
+}
+
+static PyObject *begin(PyObject *self, PyObject *nothing)
+{
+    RiderObject *rider = (RiderObject *)self;
+    (void)nothing;
+    rider->is_read = rider->is_under_way = 0;
+    Py_RETURN_NONE;
+}
+
+static PyObject *last_step(PyObject *self, PyObject *nothing)
+{
+    RiderObject *rider = (RiderObject *)self;
+    (void)nothing;
+    return Py_BuildValue("(dd)", rider->time, rider->length);
+}
+
+static PyMethodDef lane_methods[] = {
+    {"wait", wait_for_all, METH_VARARGS, "wait(most) -> CAME, CAME_NOT or CLOSED, for all that is posted; at most so many s."},
+    {"leave", leave, METH_NOARGS, "leave() -> whether the host could be told to leave the lane."},
+    {"close", close_lane, METH_NOARGS, "close(): nothing comes this way any more."},
+    {NULL, NULL, 0, NULL},
+};
+static PyType_Slot lane_slots[] = {
+    {Py_tp_new, make_lane}, {Py_tp_dealloc, free_lane}, {Py_tp_methods, lane_methods},
+    {Py_tp_doc, "Lane(memory, offset, line, moment, spin): the master's side; the last two in s."}, {0, NULL},
+};
+static PyType_Spec lane_spec = {"railcosim.orchestrator.isolation.lane.Lane", sizeof(LaneObject), 0, Py_TPFLAGS_DEFAULT,
+                                lane_slots};
+
+static PyMethodDef rider_methods[] = {
+    {"add", add, METH_VARARGS, "add(kind, offset, count) -> what stands for the instance in calls of an operation."},
+    {"begin", begin, METH_NOARGS, "begin(): what was read before is old."},
+    {"last_step", last_step, METH_NOARGS, "last_step() -> time and length of the last step, in s."},
+    {NULL, NULL, 0, NULL},
+};
+static PyType_Slot rider_slots[] = {
+    {Py_tp_new, make_rider}, {Py_tp_dealloc, free_rider}, {Py_tp_methods, rider_methods},
+    {Py_tp_doc, "Rider(lane, head, number): an instance of the host's, with its part of the memory."}, {0, NULL},
+};
+static PyType_Spec rider_spec = {"railcosim.orchestrator.isolation.lane.Rider", sizeof(RiderObject), 0,
+                                 Py_TPFLAGS_DEFAULT, rider_slots};
+
+int add_riding(PyObject *module)
+{
+    PyObject *addresses = PyTuple_New(N_KINDS);
+    for (int kind = 0; addresses != NULL && kind < N_KINDS; kind++) {
+        PyTuple_SetItem(addresses, kind, PyLong_FromVoidPtr(lane_functions[kind]));
+    }
+    lane_type = (PyTypeObject *)PyType_FromSpec(&lane_spec);
+    rider_type = (PyTypeObject *)PyType_FromSpec(&rider_spec);
+    int is_fine = addresses != NULL && lane_type != NULL && rider_type != NULL &&
+                  PyModule_AddObjectRef(module, "FUNCTIONS", addresses) == 0 &&
+                  PyModule_AddObjectRef(module, "Lane", (PyObject *)lane_type) == 0 &&
+                  PyModule_AddObjectRef(module, "Rider", (PyObject *)rider_type) == 0 &&
+                  PyModule_AddIntConstant(module, "SILENT", SILENT) == 0 &&
+                  PyModule_AddIntConstant(module, "SIZE", (long)sizeof(Lane)) == 0 &&
+                  PyModule_AddIntConstant(module, "CAME", CAME) == 0 &&
+                  PyModule_AddIntConstant(module, "CLOSED", CLOSED) == 0;
+    Py_XDECREF(addresses);
+    return is_fine;
+}
+
+#endif

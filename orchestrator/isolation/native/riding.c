@@ -1,0 +1,172 @@
+/* The master's side of a lane: functions that the compiled step loop calls like those of an FMU.
+
+   What stands for the FMU's instance is an operation of ours. What is set or stepped is posted and not waited for; what is
+   read was read by the host after the step, in one go. So a step of an instance is one hand-over, and instances in several
+   processes step at the same time where nothing is read between. A call that failed is told by one that comes after. */
+
+#include "riding.h"
+
+#if HAS_LANES
+
+#include <poll.h>
+#include <string.h>
+
+enum { SLICE = 10 * 1000 * 1000 }; /* ns between two looks at the line to the process */
+
+static int is_done(const Lane *lane, uint32_t ticket, uint32_t *seen)
+{
+    *seen = atomic_load_explicit(&((Lane *)lane)->done, memory_order_acquire);
+    return (int32_t)(*seen - ticket) >= 0;
+}
+
+int await(LaneObject *road, uint32_t ticket, int64_t most)
+{
+    uint32_t seen;
+    if (!is_done(road->lane, ticket, &seen)) { /* it may have been posted without waking the host */
+        lane_count(&road->lane->posted, atomic_load(&road->lane->posted), &road->lane->host_sleeps);
+    }
+    while (!is_done(road->lane, ticket, &seen)) {
+        int64_t slice = most < SLICE ? most : SLICE;
+        if (lane_wait(&road->lane->done, seen, &road->lane->master_sleeps, &road->spin, slice)) {
+            continue;
+        }
+        struct pollfd line = {.fd = road->line};
+        if (poll(&line, 1, 0) > 0 && !is_done(road->lane, ticket, &seen)) {
+            return CLOSED;
+        }
+        most -= slice;
+        if (most <= 0) {
+            return CAME_NOT;
+        }
+    }
+    return CAME;
+}
+
+int post(LaneObject *road, Entry entry, int wakes, uint32_t *ticket)
+{
+    Lane *lane = road->lane;
+    uint32_t count = atomic_load_explicit(&lane->posted, memory_order_relaxed);
+    if (await(road, count - (RING - 1), road->moment) != CAME) {
+        return 0;
+    }
+    lane->entries[count % RING] = entry;
+    *ticket = count + 1;
+    if (wakes) {
+        lane_count(&lane->posted, count + 1, &lane->host_sleeps);
+    } else {
+        atomic_store_explicit(&lane->posted, count + 1, memory_order_release);
+    }
+    return 1;
+}
+
+static int64_t note_of(const RiderObject *rider, int which)
+{
+    const int64_t *notes = (const int64_t *)((char *)rider->road->memory.buf + rider->head);
+    return __atomic_load_n(notes + which, __ATOMIC_RELAXED);
+}
+
+static char *values_of(const Seat *seat)
+{
+    return (char *)seat->rider->road->memory.buf + seat->offset;
+}
+
+/* The status of what is done: that of what failed, unless that was only read after this. */
+static int status_of(const Seat *seat)
+{
+    int64_t failed = note_of(seat->rider, NOTE_FAILED);
+    return failed == 0 || failed > (int64_t)seat->number + 1 ? 0 : (int)note_of(seat->rider, NOTE_STATUS);
+}
+
+static int set(void *component, const void *values, size_t size)
+{
+    Seat *seat = component;
+    RiderObject *rider = seat->rider;
+    LaneObject *road = rider->road;
+    if (road->lane == NULL || await(road, seat->posted, road->moment) != CAME) { /* the host may still be reading there */
+        return SILENT;
+    }
+    memcpy(values_of(seat), values, size);
+    rider->is_read = 0;
+    return post(road, (Entry){.instance = rider->number, .what = seat->number}, 0, &seat->posted) ? 0 : SILENT;
+}
+
+static int set_reals(void *component, const unsigned *references, size_t count, const double *values)
+{
+    (void)references;
+    return set(component, values, count * sizeof *values);
+}
+
+static int set_integers(void *component, const unsigned *references, size_t count, const int *values)
+{
+    (void)references;
+    return set(component, values, count * sizeof *values);
+}
+
+static int step(void *component, double time, double length, int is_final)
+{
+    Seat *seat = component;
+    RiderObject *rider = seat->rider;
+    LaneObject *road = rider->road;
+    (void)is_final;
+    if (road->lane == NULL) {
+        return SILENT;
+    }
+    if (!rider->is_under_way) {
+        Entry entry = {.instance = rider->number, .what = seat->number, .time = time, .length = length};
+        if (!post(road, entry, 1, &seat->posted)) {
+            return SILENT;
+        }
+        rider->time = time;
+        rider->length = length;
+        rider->wanted = seat->posted;
+        rider->is_read = 1;
+    }
+    if (rider->gives) {
+        return 0;
+    }
+    rider->is_under_way = await(road, seat->posted, road->moment) != CAME;
+    return rider->is_under_way ? SILENT : status_of(seat);
+}
+
+static int get(void *component, void *values, size_t size)
+{
+    Seat *seat = component;
+    RiderObject *rider = seat->rider;
+    LaneObject *road = rider->road;
+    if (road->lane == NULL) {
+        return SILENT;
+    }
+    if (!rider->is_read) {
+        if (!post(road, (Entry){.instance = rider->number, .what = READ}, 1, &rider->wanted)) {
+            return SILENT;
+        }
+        rider->is_read = 1;
+    }
+    if (await(road, rider->wanted, road->moment) != CAME) {
+        return SILENT;
+    }
+    int status = status_of(seat);
+    if (status == 0) {
+        memcpy(values, values_of(seat), size);
+    }
+    return status;
+}
+
+static int get_reals(void *component, const unsigned *references, size_t count, double *values)
+{
+    (void)references;
+    return get(component, values, count * sizeof *values);
+}
+
+static int get_integers(void *component, const unsigned *references, size_t count, int *values)
+{
+    (void)references;
+    return get(component, values, count * sizeof *values);
+}
+
+void *const lane_functions[N_KINDS] = {
+    [SET_REALS] = (void *)set_reals, [SET_INTEGERS] = (void *)set_integers, [STEP] = (void *)step,
+    [GET_REALS] = (void *)get_reals, [GET_INTEGERS] = (void *)get_integers,
+};
+
+#endif

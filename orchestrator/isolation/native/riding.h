@@ -1,0 +1,75 @@
+/* The two sides of the lane as Python has them. */
+
+#ifndef RIDING_H
+#define RIDING_H
+
+#define PY_SSIZE_T_CLEAN
+#define Py_LIMITED_API 0x030B0000
+#include <Python.h>
+
+#include "lane.h"
+
+#if HAS_LANES
+
+/* Hidden, so that nothing of a name like one of theirs elsewhere in the process can stand in their place. */
+#pragma GCC visibility push(hidden)
+
+/* What a call returns that was waited for in vain: a status that the standard has not. */
+enum { SILENT = 1000 };
+enum { CAME, CAME_NOT, CLOSED };
+
+typedef struct {
+    PyObject_HEAD
+    Py_buffer memory;
+    Lane *lane; /* NULL once it is closed */
+    int line;   /* the socket, whose end tells of that of the process */
+    int64_t moment;
+    Spin spin;
+} LaneObject;
+
+typedef struct {
+    PyObject_HEAD
+    LaneObject *road;
+    Py_ssize_t head; /* of its part of the memory */
+    uint32_t number;
+    uint32_t operations;
+    uint32_t wanted; /* how many entries must be done for what is read to be there */
+    int is_read;     /* whether they read it: nothing was set since */
+    int gives;       /* whether there is anything to read */
+    int is_under_way; /* whether a step was waited for in vain */
+    double time;     /* of the last step, s */
+    double length;
+    struct Seat *seats;
+} RiderObject;
+
+/* An operation, in the place of an FMU's instance. */
+typedef struct Seat {
+    RiderObject *rider;
+    uint32_t number;
+    uint32_t posted;   /* how many entries must be done for the last of this to be done */
+    Py_ssize_t offset; /* of its values in the memory */
+    struct Seat *next;
+} Seat;
+
+/* Functions in the place of those of an FMU, by kind of operation. */
+extern void *const lane_functions[N_KINDS];
+
+/* Wait for so many entries to be done, for so many ns at most. */
+int await(LaneObject *road, uint32_t ticket, int64_t most);
+
+/* Post an entry; 0 if there is no room for it in time. */
+int post(LaneObject *road, Entry entry, int wakes, uint32_t *ticket);
+
+/* Where a lane stands in memory; NULL with an exception if it does not fit there. */
+Lane *lane_in(const Py_buffer *memory, Py_ssize_t offset);
+
+/* The types of the master's side, and its functions for the compiled step loop, are put into the module; 0 if not. */
+int add_riding(PyObject *module);
+
+/* serve(memory, offset, instances, spin): the host's side. */
+PyObject *serve(PyObject *module, PyObject *arguments);
+
+#pragma GCC visibility pop
+
+#endif
+#endif

@@ -1,0 +1,214 @@
+"""Isolated instances in the compiled step loop: the same bits, and the same errors, as without isolation."""
+
+import re
+import shutil
+import sys
+from dataclasses import replace
+from types import SimpleNamespace
+
+import fmpy
+import pytest
+from railcosim.orchestrator.errors import FmuError
+from railcosim.orchestrator.isolation import HAS_LANES, isolate, lanes, process, proxy
+from railcosim.orchestrator.isolation.lanes import lane
+from railcosim.orchestrator.master import compiled
+from railcosim.orchestrator.run.execution import run
+from railcosim.orchestrator.system import Event, System
+
+pytestmark = [
+    pytest.mark.skipif(compiled.kernel is None, reason="installed without the compiled step loop"),
+    pytest.mark.skipif(not HAS_LANES, reason="there are no lanes here"),
+    pytest.mark.skipif(not sys.platform.startswith("linux"), reason="FMUs by hand are compiled for Linux here"),
+    pytest.mark.skipif(shutil.which("gcc") is None, reason="FMUs by hand need gcc"),
+    pytest.mark.usefixtures("in_time", "nothing_left"),
+]
+ALGORITHMS = pytest.mark.parametrize("algorithm", ["gauss-seidel", "jacobi"])
+
+
+@pytest.fixture
+def apart(used, contents):
+    """Run a system with some instances isolated, compiled, and without isolation; gives the first result."""
+
+    def go(system, *names):
+        found, known = attempt(isolate(system, names)), attempt(system)
+        assert len(used) >= 2
+        assert contents(found) == contents(known)
+        assert described(found.error) == described(known.error)
+        return found
+
+    return go
+
+
+def attempt(system):
+    try:
+        return run(system)
+    except FmuError as error:
+        return error.run
+
+
+def described(error):
+    return error and (str(error), error.instance, error.time, error.status, error.log)
+
+
+@pytest.fixture
+def hurried(monkeypatch):
+    """Nobody waits long for a call in the loop: most come to be waited for outside."""
+    made = process.lane.Lane
+    changed = SimpleNamespace(**vars(process.lane))
+    changed.Lane = lambda memory, offset, line, moment, spin: made(memory, offset, line, 2e-6, spin)
+    monkeypatch.setattr(process, "lane", changed)
+
+
+# -------------------------------------------------------------------- the same bits
+
+
+@ALGORITHMS
+def test_every_type_with_delays_events_and_steps_of_its_own(apart, odd, ring, algorithm):
+    system = ring(odd, 3, algorithm=algorithm)
+    system.instances["odd[2]"].step = 0.5
+    system.events = [Event("odd[1].on", "override", 2.0, value=True, duration=3.0)]
+    result = apart(system, "all")
+    assert result["odd[2].n"][-1] >= 10
+    assert set(result["odd[1].off"]) == {0.0, 1.0}
+
+
+@ALGORITHMS
+def test_whoever_is_not_waited_for_in_the_loop_is_waited_for_outside(apart, odd, ring, algorithm, hurried):
+    assert apart(ring(odd, 2, algorithm=algorithm), "all").status == "completed"
+
+
+def test_an_fmu_that_gives_nothing(apart, compile_c, xml, tmp_path, hurried):
+    """Nothing is read of it that would wait for its steps."""
+    files = {
+        "modelDescription.xml": xml["description"]([], identifier="Odd"),
+        f"binaries/{fmpy.platform}/Odd{fmpy.sharedLibraryExtension}": compile_c("odd.c"),
+    }
+    system = System(stop_time=9.0, step=0.25)
+    system.add("mute", str(xml["write_archive"](tmp_path / "mute.fmu", files)))
+    assert len(apart(system, "mute").time) == 37
+
+
+def test_a_state_is_saved_between_two_blocks(hostile, instantiated):
+    """Then the process takes messages, at the time that the loop has got to; and calls through the lane again."""
+    system = System(stop_time=4.0, step=0.25)
+    system.add("it", hostile(mute=True), u=1.0)
+    system.connect("it.x", "it.v")
+    master = instantiated(isolate(system, ["it"]))
+    rows = []
+
+    def see(steps, found):
+        rows.extend(list(row) for row in found)
+        return True
+
+    assert master.run(0.0, 0.25, 16, 1, see, until=8)
+    states = {name: slave.save() for name, slave in master.slaves.items()}
+    assert {slave.time for slave in master.slaves.values()} == {2.0}
+    kept = master.save()
+    assert master.run(0.0, 0.25, 16, 1, see, first=8)
+    first = rows[8:]
+    for name, slave in master.slaves.items():
+        slave.restore(states[name])
+    master.restore(kept)
+    del rows[8:]
+    assert master.run(0.0, 0.25, 16, 1, see, first=8)
+    assert rows[8:] == first
+
+
+def test_without_room_for_its_values_it_is_called_by_messages(used, odd, ring, monkeypatch):
+    monkeypatch.setattr(proxy, "_CELLS_PER_VARIABLE", 0)
+    monkeypatch.setattr(proxy, "_SPARE_CELLS", 1)
+    assert run(isolate(ring(odd, 2, 1.0), ["all"])).status == "completed"
+    assert not used
+
+
+# -------------------------------------------------------------------- failures
+
+
+@pytest.mark.parametrize(
+    ("mode", "algorithm"),
+    [
+        *((mode, "gauss-seidel") for mode in (3, 23, 33, 1, 10, 41)),
+        *(
+            pytest.param(mode, algorithm, marks=pytest.mark.long)
+            for mode, algorithm in [
+                *((mode, "gauss-seidel") for mode in (4, 63, 73, 40, 42, 44)),
+                *((mode, "jacobi") for mode in (3, 4, 23, 33, 1, 10, 40, 41, 42, 44)),
+            ]
+        ),
+    ],
+)
+def test_whatever_it_does_is_told_as_without_isolation(apart, odd_fmu, ring, tmp_path, *, algorithm, mode):
+    """A status of a step, of reading, of setting; what is not finite; discarded steps; how numbers are rounded."""
+    system = ring(odd_fmu(tmp_path, "canHandleVariableCommunicationStepSize"), 3, algorithm=algorithm)
+    system.instances["odd[1]"].start["mode"] = mode
+    assert len(apart(system, "odd[1]").time) == (41 if mode in (1, 40, 41, 44) else 20 if mode in (10, 23) else 21)
+
+
+@pytest.mark.parametrize("scale", [1e9, -1e9])
+def test_a_number_that_no_whole_one_holds(apart, odd, mine, scale):
+    system = System(stop_time=4.0, step=0.25)
+    system.add("a", odd, u=1.0, v=1.0)
+    system.add("b", odd)
+    system.connect("a.x", "b.m", scale=scale * 10.0, threshold=0.5)
+    result = apart(system, "b")
+    assert "its type Integer holds -2147483648 to 2147483647" in str(result.error)
+
+
+ENDS = {
+    "null": r"its process crashed in {} \(SIGSEGV\)",
+    "exit": r"its process ended in {} \(exit code 7\)",
+    "kill": r"its process was killed in {} \(SIGKILL\), most likely by the system, for lack of memory",
+    "hang": r"did not return from {} within 1 s; its process was ended; set step_timeout to allow more wall time",
+    "close_all": r"its process lost its line to the master .* or before: the FMU closes descriptors that are not its",
+}
+
+
+@pytest.mark.parametrize(
+    ("where", "what"),
+    [("step", what) for what in ENDS] + [("get", "null"), ("set", "null"), ("get", "hang"), ("set", "hang")],
+)
+def test_a_process_that_is_lost(used, hostile, where, what):
+    system = System(stop_time=4.0, step=0.5)
+    system.add("it", hostile(mute=True), deed=f"{where} {what} 1")
+    system.instances["it"] = replace(system.instances["it"], isolate=True, step_timeout=1.0)
+    system.add("other", hostile(mute=True))
+    system.connect("other.x", "it.u")
+    result = attempt(system)
+    assert used
+    call = {"step": "DoStep", "get": "GetReal", "set": "SetReal"}[where]
+    assert result.error.instance == "it"
+    assert re.match(rf"it, t = [0-9.]+ s: {ENDS[what].format(f'fmi2{call}')}", str(result.error))
+
+
+def test_slow_is_not_hanging_and_what_was_forked_does_not_go_on(hostile):
+    for deed in ("slow", "come_back"):
+        system = System(stop_time=1.0, step=0.25)
+        system.add("it", hostile(mute=True), deed=f"step {deed} 0.5")
+        system = isolate(system, ["it"])
+        assert run(system)["it.calls"][-1] == 4.0
+
+
+# -------------------------------------------------------------------- the lane
+
+
+def test_what_does_not_fit_the_memory_is_refused():
+    memory = bytearray(lane.SIZE + 128)
+    with pytest.raises(ValueError, match="it does not fit into the memory"):
+        lane.Lane(memory, 192, 0, 1.0, 0.0)
+    road = lane.Lane(memory, 128, 0, 1.0, 0.0)
+    for wrong in (lambda: lane.Rider(road, -8, 0), lambda: lane.Rider(road, 0, 0).add(0, 64, 1 << 60)):
+        with pytest.raises(ValueError, match="does not stand in the memory"):
+            wrong()
+    with pytest.raises(ValueError, match="it does not fit into the memory"):
+        lane.serve(memory, 64 * 99, [], 0.0)
+    for operations in (b"1", bytes(56)):
+        with pytest.raises(ValueError, match="do not fit its memory"):
+            lane.serve(memory, 128, [(0, operations)], 0.0)
+    road.close()
+    assert road.wait(0.0) == lane.CLOSED
+    assert not road.leave()
+
+
+def test_it_is_watched_for_only_where_a_core_is_left():
+    assert lanes.spin_time(1) > 0.0
+    assert lanes.spin_time(10_000) == 0.0
