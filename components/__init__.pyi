@@ -14,6 +14,7 @@ from .cruise.fixed_distance import FixedDistanceCruise
 from .cruise.guarded import GuardedCruise
 from .cruise.monitors import IntermediateEstimator, StateFaultObserver
 from .cruise.port import CruiseController
+from .cruise.predictive.distributed import DistributedMpc
 from .cruise.range_potential import RangePotentialCruise
 from .cruise.time_headway import TimeHeadwayCruise
 from .cruise.tunable_potential import TunablePotentialCruise
@@ -64,6 +65,7 @@ __all__ = [
     "CruiseController",
     "Data",
     "DavisResistance",
+    "DistributedMpc",
     "Drive",
     "EtcsDriver",
     "EtcsSupervision",

@@ -14,6 +14,7 @@ from .cruise.comfort import ComfortCruise
 from .cruise.fault_tolerant import BacksteppingCruise, FaultTolerantCruise, FaultTolerantCruiseIntermediate
 from .cruise.fixed_distance import FixedDistanceCruise
 from .cruise.monitors import IntermediateEstimator, StateFaultObserver
+from .cruise.predictive.distributed import DistributedMpc
 from .cruise.range_potential import RangePotentialCruise
 from .cruise.time_headway import TimeHeadwayCruise
 from .cruise.tunable_potential import TunablePotentialCruise
@@ -50,6 +51,7 @@ CATALOGUE: dict[str, type[Component]] = {
         FixedDistanceCruise,
         RangePotentialCruise,
         TimeHeadwayCruise,
+        DistributedMpc,
         Schedule,
         Gust,
         Sinusoid,

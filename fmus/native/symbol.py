@@ -64,11 +64,12 @@ class Symbol:
         """The result of a `maths.repeat` on symbols: calls of one function."""
         known = [ca.SX.sym(name, len(cells)) for name, cells in (("values", values), ("given", given))]
         cells = step(*(arranged([Symbol(x) for x in ca.vertsplit(column)], column.shape[:1]) for column in known))
-        options = {"cse": True, "never_inline": True}
-        once = ca.Function(f"step{next(_NUMBERS)}", known, [ca.vertcat(*map(expression, cells))], options)
+        once = _kept(known, ca.vertcat(*map(expression, cells)))
         column, fixed = (ca.vertcat(*map(expression, cells)) for cells in (values, given))
-        for _ in range(times):
-            column = once(column, fixed)
+        while times:  # by its binary digits: each call takes a line of C for each value
+            column = once(column, fixed) if times & 1 else column
+            times >>= 1
+            once = _kept(known, once(once(*known), known[1])) if times else once
         return arranged([Symbol(x) for x in ca.vertsplit(column)], column.shape[:1])
 
     def _refuse(self, *_: Any) -> Any:
@@ -91,6 +92,11 @@ class Symbol:
 
     def __abs__(self) -> Symbol:
         return Symbol(ca.fabs(self.sx))
+
+
+def _kept(arguments: list[Any], result: Any) -> Any:
+    """A function that stays one where it is called."""
+    return ca.Function(f"step{next(_NUMBERS)}", arguments, [result], {"cse": True, "never_inline": True})
 
 
 def _binary(operation: Callable[[Any, Any], Any], swapped: bool = False) -> Callable[[Symbol, Any], Any]:
