@@ -25,7 +25,7 @@ from ..components.tracing import TracingError
 from . import native_fmu, python_fmu, toolchain
 from .description import write
 from .identity import source_digest
-from .kinds import FmuKind, PackagingKind
+from .kinds import FmuKind, PackagingKind, Profile
 from .references import build_with, resolve
 from .toolchain import CompilerError
 
@@ -57,6 +57,7 @@ def build(
     kind: FmuKind = "python",
     platforms: Sequence[str] = (),
     folder: Path | None = None,
+    profile: Profile = "standard",
 ) -> Path:
     """The FMU of a component, built if the cache does not have it.
 
@@ -66,6 +67,7 @@ def build(
         kind: ``"native"`` (compiled C) or ``"python"``.
         platforms: of a native FMU, keys of `toolchain.PLATFORMS`; this machine's by default.
         folder: where a relative file path starts.
+        profile: of a native FMU, what its C may do.
 
     Returns:
         Path of the FMU in the user's cache; copy it to keep it.
@@ -74,17 +76,19 @@ def build(
         ComponentError: the component or its arguments are unusable, cannot be traced, or do not compile.
     """
     component = build_with(resolve(reference, folder), arguments)
-    return build_component(component, kind, platforms)
+    return build_component(component, kind, platforms, profile)
 
 
-def build_component(component: Component, kind: FmuKind = "python", platforms: Sequence[str] = ()) -> Path:
+def build_component(
+    component: Component, kind: FmuKind = "python", platforms: Sequence[str] = (), profile: Profile = "standard"
+) -> Path:
     """The same for a component at hand; its values become the FMU's start values."""
-    name, digest = type(component).__name__, source_digest(component, kind)
+    name, digest = type(component).__name__, source_digest(component, kind, profile)
     if kind == "python":
         return _keep(digest, name, lambda: python_fmu.contents(component, digest))
     chosen = toolchain.chosen(platforms)
     identity = hashlib.sha256(f"{digest} {toolchain.identity(chosen)}".encode()).hexdigest()
-    return _keep(identity, name, lambda: native_fmu.contents(component, digest, chosen, _zig_cache()))
+    return _keep(identity, name, lambda: native_fmu.contents(component, digest, chosen, _zig_cache(), profile))
 
 
 def _zig_cache() -> Path:
@@ -172,10 +176,11 @@ def package(
     arguments: Mapping[str, Any],
     kind: PackagingKind = "auto",
     platforms: Sequence[str] = (),
+    profile: Profile = "standard",
 ) -> tuple[Path, FmuKind, str]:
     """The FMU of a component in the cache, its kind, and why it is not native if that was left open."""
     if kind != "auto":
-        return build(reference, arguments, kind=kind, platforms=platforms), kind, ""
+        return build(reference, arguments, kind=kind, platforms=platforms, profile=profile), kind, ""
     component = resolve(reference)
     problem = native_problem(component)
     if platforms and not component.requires:

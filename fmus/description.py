@@ -25,7 +25,7 @@ from ..components.tracing import (
 )
 from .annotation import TOOL, Annotation
 from .annotation import write as write_annotation
-from .kinds import NOTE_OF_KIND, FmuKind
+from .kinds import NOTE_OF_KIND, FmuKind, Profile
 from .references import summary
 from .units import BASE, parse
 from .variables import ScalarVariable, scalar_variables
@@ -81,13 +81,14 @@ def _used(component: Component) -> Names | None:
         return None
 
 
-def write(component: Component, kind: FmuKind, digest: str) -> bytes:
+def write(component: Component, kind: FmuKind, digest: str, profile: Profile = "standard") -> bytes:
     """The model description of a component's FMU.
 
     Args:
         component: built with its arguments; its values are the start values.
         kind: how it is packaged.
         digest: hash of everything in the FMU; it becomes the GUID.
+        profile: of a native FMU; a real-time one saves no states.
 
     Raises:
         ComponentError: a name that FMI does not allow, build arguments that are not JSON, or equations that cannot be
@@ -119,8 +120,8 @@ def write(component: Component, kind: FmuKind, digest: str) -> bytes:
         needsExecutionTool="true" if kind == "python" else "false",
         canHandleVariableCommunicationStepSize="true",
         canNotUseMemoryManagementFunctions="true",
-        canGetAndSetFMUstate="true",
-        canSerializeFMUstate="true",
+        canGetAndSetFMUstate="true" if profile == "standard" else "false",
+        canSerializeFMUstate="true" if profile == "standard" else "false",
     )
     rates = _rates(variables) if kind == "native" else ()
     if kind == "native":

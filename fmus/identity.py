@@ -16,14 +16,17 @@ from ..components.errors import ComponentError
 from .annotation import TOOL
 from .description import arguments
 from .embed import embedded_files
-from .kinds import FmuKind
+from .kinds import FmuKind, Profile
 
 _FOLDER = Path(__file__).parent
 _MAKERS: dict[FmuKind, tuple[str, ...]] = {"python": (TOOL, "pythonfmu"), "native": (TOOL, "casadi")}
-_MADE_BY = ("*.py", "documentation/*.py", "native/*.py", "resources/*.png", "resources/*.txt", "runtime/*.[ch]")
+_MADE_BY = (
+    *("*.py", "documentation/*.py", "host/*.py", "native/*.py"),
+    *("host/*.c", "host/*.txt", "host/*.xml", "resources/*.png", "resources/*.txt", "runtime/*.[ch]"),
+)
 
 
-def source_digest(component: Component, kind: FmuKind) -> str:
+def source_digest(component: Component, kind: FmuKind, profile: Profile = "standard") -> str:
     """Hash of what an FMU is made from, without making it: sources, values, and everything that packages them.
 
     Raises:
@@ -31,7 +34,8 @@ def source_digest(component: Component, kind: FmuKind) -> str:
     """
     files, module = embedded_files(type(component))
     parts = {name: text.encode() for name, text in files.items()}
-    parts["/"] = f"{kind} {module} {type(component).__qualname__} {given_values(component)}".encode()
+    how = kind if profile == "standard" else f"{kind} {profile}"
+    parts["/"] = f"{how} {module} {type(component).__qualname__} {given_values(component)}".encode()
     parts["/packaging"] = _packaging(kind)
     return digest_of(parts)
 

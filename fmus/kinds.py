@@ -10,6 +10,8 @@ PackagingKind = Literal["auto", "native", "python"]
 """What a user asks for where an FMU is to be made: ``"auto"`` is native where that is possible."""
 Kind = Literal["auto", "native", "python", "plain"]
 """What a user asks for where a system is to run: ``"plain"`` is Python objects without packaging."""
+Profile = Literal["standard", "real-time"]
+"""What a native FMU's C may do: ``"real-time"`` is no file, no memory taken after instantiation, no printf."""
 ModelKind = Literal["fmu", "native", "python", "plain"]
 """What a model is: ``"fmu"`` a file that the user gave, the others made here of a component."""
 

@@ -11,7 +11,8 @@ from typing import Any
 from ..components import ComponentError
 from . import toolchain
 from .build import package, write_whole
-from .kinds import PackagingKind
+from .host import has_counter, step_cost
+from .kinds import PackagingKind, Profile
 from .references import resolve
 
 CHECKSUMS = "SHA256SUMS"
@@ -24,6 +25,7 @@ def release(
     *,
     kind: PackagingKind = "auto",
     platforms: Sequence[str] = (),
+    profile: Profile = "standard",
     checksums: bool = False,
     tell: Callable[[str], None] = lambda line: None,
 ) -> list[Path]:
@@ -35,6 +37,7 @@ def release(
         directory: made if it is not there.
         kind: ``"auto"`` is native where that is possible, and tells why where it is not.
         platforms: of native FMUs, keys of `toolchain.PLATFORMS` or ``all``; this machine's by default.
+        profile: ``"real-time"`` makes native FMUs, and counts the instructions of a step where valgrind is there.
         checksums: whether to write `CHECKSUMS`, which ``sha256sum -c`` checks.
         tell: takes a line on each FMU's progress.
 
@@ -45,7 +48,9 @@ def release(
         ComponentError: two components of one name, or platforms asked of a Python FMU.
         ComponentError: a component cannot be built; what was built before it stays.
     """
-    _check(references, kind, platforms)
+    if profile == "real-time":
+        kind = "native" if kind == "auto" else kind  # what cannot be compiled is an error, no reason for another kind
+    _check(references, kind, platforms, profile)
     chosen = toolchain.chosen(platforms)
     directory.mkdir(parents=True, exist_ok=True)
     listing = directory / CHECKSUMS
@@ -54,7 +59,7 @@ def release(
     written: list[Path] = []
     for count, reference in enumerate(references, start=1):
         begin = time.perf_counter()
-        source, made, problem = package(reference, arguments, kind, platforms)
+        source, made, problem = package(reference, arguments, kind, platforms, profile)
         target = directory / source.name
         write_whole(source.read_bytes(), target)
         written.append(target)
@@ -62,6 +67,8 @@ def release(
         what = f"native, {' '.join(chosen)}" if made == "native" else f"a Python FMU{note}"
         cost = f"{time.perf_counter() - begin:.1f} s, {target.stat().st_size / 1000:.0f} kB"
         tell(f"[{count}/{len(references)}] {target.stem}: {what} ({cost})")
+        if profile == "real-time":
+            tell(f"    {_step_cost(target)}")
     if checksums:
         lines = (f"{hashlib.sha256(path.read_bytes()).hexdigest()}  {path.name}\n" for path in sorted(written))
         listing.write_text("".join(lines), encoding="utf-8", newline="\n")
@@ -75,7 +82,19 @@ def default_directory() -> Path:
     return Path("fmus/dist") if checkout else Path()
 
 
-def _check(references: Sequence[str], kind: PackagingKind, platforms: Sequence[str]) -> None:
+def _step_cost(fmu: Path) -> str:
+    """What the costliest step took, in words."""
+    if not has_counter():
+        return "instructions of a step: not counted, for valgrind is not installed"
+    found = step_cost(fmu)
+    if found is None:
+        return "instructions of a step: not counted, for there are no reference signals"
+    return f"instructions of a step: at most {found.most} in {found.steps} steps over its reference signals (callgrind)"
+
+
+def _check(references: Sequence[str], kind: PackagingKind, platforms: Sequence[str], profile: Profile) -> None:
+    if kind == "python" and profile == "real-time":
+        raise ComponentError("--profile real-time is for native FMUs; a Python FMU has no bounds on time or memory")
     if kind == "python" and platforms:
         raise ComponentError("--platforms is for native FMUs; a Python FMU always carries linux64 and win64")
     names: dict[str, str] = {}

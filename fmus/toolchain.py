@@ -181,6 +181,26 @@ def compile_library(source: Path, target: Path, name: str, *, only: bool, cache:
         os.replace(made, target)
 
 
+def compile_program(sources: list[Path], target: Path, options: tuple[str, ...] = ()) -> Path:
+    """Compile sources of FMUs, and what calls them, to a program for this machine; the functions of FMI have no prefix.
+
+    Args:
+        sources: C files, each a translation unit.
+        target: the program to write.
+        options: for the compiler, beside `FLAGS`.
+
+    Raises:
+        CompilerError: there is no compiler but Microsoft's, or it failed.
+    """
+    compiler = system_compiler()
+    if (compiler is None and not has_zig()) or (compiler and Path(compiler).stem.lower() == "cl"):
+        raise CompilerError("there is no C compiler for a program; install cc, gcc or clang, or railcosim[cross]")
+    command = [compiler] if compiler else [sys.executable, "-m", "ziglang", "cc"]
+    shared = [*FLAGS, "-DFMI2_OVERRIDE_FUNCTION_PREFIX", "-I", str(_HEADERS), *options]
+    _run([*command, *shared, *map(str, sources), "-o", str(target), "-lm"], target.parent)
+    return target
+
+
 class _Mark:
     """A file that says that a cache of ziglang's has a platform's C library: what follows takes under a second."""
 

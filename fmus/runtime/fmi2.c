@@ -55,6 +55,42 @@ static void refuse_instance(const fmi2CallbackFunctions *functions, fmi2String n
     }
 }
 
+#if defined(MAX_INSTANCES)
+/* A host without a heap says at compile time how many instances there are at once; one thread makes and frees them. */
+#define NO_INSTANCE "all instances are taken; compile with a larger MAX_INSTANCES"
+static Instance instances[MAX_INSTANCES];
+static bool taken_instances[MAX_INSTANCES];
+
+static Instance *take_instance(void)
+{
+    for (int n = 0; n < MAX_INSTANCES; n++) {
+        if (!taken_instances[n]) {
+            taken_instances[n] = true;
+            memset(&instances[n], 0, sizeof instances[n]);
+            return &instances[n];
+        }
+    }
+    return NULL;
+}
+
+static void leave_instance(Instance *s)
+{
+    taken_instances[s - instances] = false;
+}
+#else
+#define NO_INSTANCE "out of memory"
+
+static Instance *take_instance(void)
+{
+    return (Instance *)calloc(1, sizeof(Instance));
+}
+
+static void leave_instance(Instance *s)
+{
+    free(s);
+}
+#endif
+
 fmi2Component fmi2Instantiate(fmi2String instanceName, fmi2Type fmuType, fmi2String fmuGUID,
                               fmi2String fmuResourceLocation, const fmi2CallbackFunctions *functions,
                               fmi2Boolean visible, fmi2Boolean loggingOn)
@@ -74,9 +110,9 @@ fmi2Component fmi2Instantiate(fmi2String instanceName, fmi2Type fmuType, fmi2Str
                         MODEL_NAME ": the GUID is not " MODEL_GUID ": model description and binary differ");
         return NULL;
     }
-    Instance *s = (Instance *)calloc(1, sizeof *s);
+    Instance *s = take_instance();
     if (s == NULL) {
-        refuse_instance(functions, instanceName, MODEL_NAME ": out of memory");
+        refuse_instance(functions, instanceName, MODEL_NAME ": " NO_INSTANCE);
         return NULL;
     }
     strncpy(s->name, instanceName, sizeof s->name - 1);
@@ -96,8 +132,10 @@ void fmi2FreeInstance(fmi2Component c)
     if (s == NULL) {
         return;
     }
+#if !REAL_TIME
     free(s->tape.committed);
-    free(s);
+#endif
+    leave_instance(s);
 }
 
 fmi2Status fmi2SetDebugLogging(fmi2Component c, fmi2Boolean loggingOn, size_t nCategories, const fmi2String categories[])
@@ -182,7 +220,7 @@ fmi2Status fmi2Terminate(fmi2Component c)
         return fmi2Error;
     }
     s->phase = PHASE_TERMINATED;
-#if N_TAPE > 0
+#if N_TAPE > 0 && !REAL_TIME
     const char *path = s->texts[model_variables[TAPE_FILE].text];
     if (path[0] != '\0') {
         if (tape_commit(s) != fmi2OK || tape_save(s, path) != fmi2OK) {

@@ -7,14 +7,12 @@
 #define RAILCOSIM_INSTANCE_H
 
 /* All headers of the C library are here, before anything that is declared as C in a program of C++. */
-#include <errno.h>
 #include <float.h>
 #include <math.h>
 #include <stdarg.h>
 #include <stdbool.h>
 #include <stddef.h>
 #include <stdint.h>
-#include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 
@@ -85,6 +83,11 @@ typedef void Equations(const double *clock, const double *values, double *result
 
 #include "model.h"
 
+#if !REAL_TIME
+#include <errno.h>
+#include <stdio.h>
+#endif
+
 /* What a block keeps of its values to integrate between its samples; none if it has either no states or no samples. */
 #define N_BASE (IS_SAMPLED && N_STATES > 0 ? N_VALUES : 1)
 
@@ -97,7 +100,7 @@ typedef enum {
 } Phase;
 
 /* The tape: two buffers of `rows` times N_TAPE numbers, and a line to filter one column in; allocated together when the
-   initial state is prepared. */
+   initial state is prepared, or for hard real time in the instance. */
 typedef struct {
     int rows;
     double sample_time;
@@ -139,6 +142,9 @@ typedef struct {
     double states[AT_LEAST_ONE(N_STATES)];
     char texts[AT_LEAST_ONE(N_TEXTS)][MAX_TEXT];
     Tape tape;
+#if REAL_TIME && N_TAPE > 0
+    double tape_cells[2 * TAPE_ROWS * N_TAPE + TAPE_ROWS + 2 * TAPE_PAD];
+#endif
     fmi2CallbackLogger logger;
     fmi2ComponentEnvironment environment;
     bool debug;

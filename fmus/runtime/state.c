@@ -1,5 +1,54 @@
 /* Saved states and their FMI 2.0 functions: one flat block that can be copied, compared and moved to another process. */
 
+#if REAL_TIME
+static fmi2Status no_state(fmi2Component c, const char *function)
+{
+    Instance *s = enter(c, ANY_PHASE, function);
+    return s == NULL ? fmi2Error : fail(s, "%s: a real-time FMU saves no states: they take memory", function);
+}
+
+fmi2Status fmi2GetFMUstate(fmi2Component c, fmi2FMUstate *state)
+{
+    (void)state;
+    return no_state(c, "fmi2GetFMUstate");
+}
+
+fmi2Status fmi2SetFMUstate(fmi2Component c, fmi2FMUstate state)
+{
+    (void)state;
+    return no_state(c, "fmi2SetFMUstate");
+}
+
+fmi2Status fmi2FreeFMUstate(fmi2Component c, fmi2FMUstate *state)
+{
+    (void)state;
+    return no_state(c, "fmi2FreeFMUstate");
+}
+
+fmi2Status fmi2SerializedFMUstateSize(fmi2Component c, fmi2FMUstate state, size_t *size)
+{
+    (void)state;
+    (void)size;
+    return no_state(c, "fmi2SerializedFMUstateSize");
+}
+
+fmi2Status fmi2SerializeFMUstate(fmi2Component c, fmi2FMUstate state, fmi2Byte bytes[], size_t size)
+{
+    (void)state;
+    (void)bytes;
+    (void)size;
+    return no_state(c, "fmi2SerializeFMUstate");
+}
+
+fmi2Status fmi2DeSerializeFMUstate(fmi2Component c, const fmi2Byte bytes[], size_t size, fmi2FMUstate *state)
+{
+    (void)bytes;
+    (void)size;
+    (void)state;
+    return no_state(c, "fmi2DeSerializeFMUstate");
+}
+#else
+
 enum { STATE_VERSION = 4 };
 
 /* What tells a block from any other; small enough to be copied to the stack and looked at. */
@@ -227,3 +276,4 @@ fmi2Status fmi2DeSerializeFMUstate(fmi2Component c, const fmi2Byte bytes[], size
     *state = block;
     return fmi2OK;
 }
+#endif

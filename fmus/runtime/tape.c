@@ -140,6 +140,7 @@ static fmi2Status tape_follow(Instance *s)
     return tape_commit(s);
 }
 
+#if !REAL_TIME
 /* -------------------------------------------------------------------------------------------------------- the file */
 
 enum { REAL_TEXT = 40 };
@@ -286,9 +287,13 @@ static fmi2Status tape_save(Instance *s, const char *path)
     return fmi2OK;
 }
 
+#endif
+
 static void tape_free(Tape *tape)
 {
+#if !REAL_TIME
     free(tape->committed);
+#endif
     memset(tape, 0, sizeof *tape);
     tape->first = tape->last = -1;
 }
@@ -307,10 +312,19 @@ static fmi2Status tape_allocate(Instance *s, int rows)
     if (tape->rows != rows || tape->pad != (int)pad) {
         size_t cells = (size_t)rows * N_TAPE;
         tape_free(tape);
+#if REAL_TIME
+        if (rows > TAPE_ROWS || pad > TAPE_PAD) {
+            return fail(s, "this real-time FMU has room for a tape of %d samples and %d of run-in, not %d and %d; lower "
+                           "tape_duration, or compile its sources with larger TAPE_ROWS and TAPE_PAD", TAPE_ROWS, TAPE_PAD, rows,
+                        (int)pad);
+        }
+        tape->committed = s->tape_cells;
+#else
         tape->committed = (double *)malloc((2 * cells + (size_t)rows + 2 * (size_t)pad) * sizeof(double));
         if (tape->committed == NULL) {
             return fail(s, "out of memory for a tape of %d samples", rows);
         }
+#endif
         tape->recording = tape->committed + cells;
         tape->line = tape->recording + cells;
         tape->rows = rows;
@@ -341,7 +355,11 @@ static fmi2Status tape_prepare(Instance *s)
         memcpy(tape->committed + (size_t)n * N_TAPE, model_tape_start, N_TAPE * sizeof(double));
     }
     const char *path = s->texts[model_variables[TAPE_FILE].text];
+#if REAL_TIME
+    return path[0] == '\0' ? fmi2OK : fail(s, "tape_file: a real-time FMU reads and writes no files; leave it empty");
+#else
     return path[0] == '\0' ? fmi2OK : tape_load(s, path);
+#endif
 }
 
 #endif

@@ -18,6 +18,7 @@ from .options import (
     Algorithm,
     PackagingName,
     Preset,
+    ProfileName,
     Quiet,
     Scenario,
     Set,
@@ -111,6 +112,10 @@ def build(
             autocompletion=completing.platforms,
         ),
     ] = None,
+    profile: Annotated[
+        ProfileName,
+        typer.Option(help="real-time: native FMUs without files, and without memory taken after instantiation."),
+    ] = ProfileName.standard,
     output: Annotated[Path | None, typer.Option("--output", "-o", help="Directory for the FMUs.")] = None,
     quiet: Quiet = False,
 ) -> Answer:
@@ -130,6 +135,7 @@ def build(
             output or default_directory(),
             kind=kind.value,
             platforms=[name.strip() for name in (platforms or "").split(",") if name.strip()],
+            profile=profile.value,
             checksums=every,
             tell=(lambda line: None) if quiet else tell,
         )

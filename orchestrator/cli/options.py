@@ -38,6 +38,13 @@ class PackagingName(StrEnum):
     python = "python"
 
 
+class ProfileName(StrEnum):
+    """What the C of native FMUs may do, as the command line needs it."""
+
+    standard = "standard"
+    real_time = "real-time"
+
+
 Scenario = Annotated[
     str,
     typer.Argument(

@@ -234,11 +234,11 @@ def load(unpack, driver):
     """Instances of a component's native FMU behind the bare functions of the standard; freed at the end of the test."""
     made = []
 
-    def make(reference, arguments=None, **options):
+    def make(reference, arguments=None, profile="standard", **options):
         if isinstance(reference, Component):
-            path = build_component(reference, "native")
+            path = build_component(reference, "native", profile=profile)
         else:
-            path = build(reference, arguments, kind="native")
+            path = build(reference, arguments, kind="native", profile=profile)
         made.append(driver.Fmu(unpack(path), **options))
         return made[-1]
 

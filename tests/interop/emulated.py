@@ -44,9 +44,14 @@ def require(found, what):
 @functools.cache
 def importer(platform, folder):
     """The importer as a program of a platform."""
-    target = folder / f"importer-{platform}{'.exe' if platform == 'win64' else ''}"
+    return compile_for(platform, folder / f"importer-{platform}{'.exe' if platform == 'win64' else ''}", IMPORTER)
+
+
+def compile_for(platform, target, *sources_and_options):
+    """A program of a platform."""
     command = [sys.executable, "-m", "ziglang", "cc", "-target", PLATFORMS[platform].targets[0], *FLAGS, "-Werror"]
-    subprocess.run([*command, "-I", HEADERS, IMPORTER, "-o", target], check=True, env=os.environ | zig_cache())
+    command += ["-I", HEADERS, *sources_and_options, "-o", target]
+    subprocess.run(command, check=True, env=os.environ | zig_cache())
     return target
 
 
@@ -113,6 +118,21 @@ class Machine:
         return [" ".join(row[column] for column in columns) for row in rows[:STEPS]]
 
 
+def bare_host(machine, folder, name):
+    """What the bare host of an unpacked real-time FMU writes on a machine, by column."""
+    sources = (folder / "sources" / "all.c", folder / "resources" / "host" / "host.c")
+    options = ("-DFMI2_OVERRIDE_FUNCTION_PREFIX", "-DMAX_INSTANCES=1", "-lm")
+    host = compile_for(machine.platform, folder / f"host-{machine.platform}", *sources, *options)
+    rows = (folder / "documentation" / f"{name}_in.csv").read_text()
+    done = subprocess.run([*machine.launcher, host], input=rows, capture_output=True, text=True, check=True)
+    return columns(done.stdout)
+
+
+def columns(text):
+    """A table of numbers by column."""
+    return {key: np.array(column, dtype=float) for key, *column in zip(*csv.reader(io.StringIO(text)), strict=True)}
+
+
 def compare(name, here, there):
     """Run a component's FMU on this machine and on another one; the same trajectory, and the one in its reference."""
     with pytest.MonkeyPatch.context() as patch:
@@ -121,10 +141,7 @@ def compare(name, here, there):
         fmu = build(name, kind="native", platforms=tuple(PLATFORMS))  # in the cache for a release of all
     ours, theirs = here.run(fmu), there.run(fmu)
     with zipfile.ZipFile(fmu) as archive:
-        text = archive.read(f"documentation/{name}_ref.csv").decode()
-    reference = {
-        key: np.array(column, dtype=float) for key, *column in zip(*csv.reader(io.StringIO(text)), strict=True)
-    }
+        reference = columns(archive.read(f"documentation/{name}_ref.csv").decode())
     deviation = largest(ours, theirs)
     equal = all(ours[k].tobytes() == theirs[k].tobytes() for k in ours)
     print(f"{name}, {there.platform}: {'bit-equal to' if equal else f'{deviation:.2g} from'} linux64", end=", ")

@@ -3,9 +3,11 @@
 import importlib.util
 import shutil
 import sys
+import zipfile
 from pathlib import Path
 
 import pytest
+from railcosim.fmus.build import build
 
 NAME = "railcosim_emulated"
 if NAME not in sys.modules:
@@ -31,3 +33,14 @@ def machines(tmp_path_factory):
 @pytest.mark.parametrize("name", emulated.components())
 def test_arm_gives_the_same_trajectory(name, machines):
     emulated.compare(name, *machines)
+
+
+@pytest.mark.long
+def test_the_bare_host_of_a_real_time_fmu_runs_on_arm(machines, tmp_path):
+    """Host and sources as one program, without an importer and without a heap."""
+    with zipfile.ZipFile(build("Cailc", kind="native", profile="real-time")) as archive:
+        archive.extractall(tmp_path)
+    ours, theirs = (emulated.bare_host(machine, tmp_path, "Cailc") for machine in machines)
+    assert emulated.largest(ours, theirs) <= emulated.SAME
+    reference = emulated.columns((tmp_path / "documentation" / "Cailc_ref.csv").read_text())
+    assert emulated.largest(reference, theirs) <= emulated.SAME
