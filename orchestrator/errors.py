@@ -78,6 +78,10 @@ class RecordError(RunError):
     """What a run records cannot be written: a disk is full, or a directory is gone."""
 
 
+class LateError(RunError):
+    """A run that is to keep pace with the clock came too late."""
+
+
 class FmuError(RunError):
     """An FMU failed while it ran.
 

@@ -17,7 +17,7 @@ from . import analysis, models, reports, runs, scenarios, searches, studies
 from .completing import completing_bash
 from .documents import answering, fail, failed, wants_json
 from .lines import Log
-from .options import OK
+from .options import OK, with_factor
 from .streams import flush_streams, secure_streams
 from .supervision import supervised
 
@@ -52,10 +52,10 @@ def _command() -> int:
 
 def call(arguments: Sequence[str] | None = None) -> int:
     """Run a command, with the arguments of the process by default, and return its exit code."""
-    words = sys.argv[1:] if arguments is None else arguments
+    words = with_factor(sys.argv[1:] if arguments is None else arguments)
     try:
         with completing_bash(_ASKED):
-            code = app(list(words), standalone_mode=False, complete_var=_ASKED)
+            code = app(words, standalone_mode=False, complete_var=_ASKED)
     except _USAGE as error:
         if wants_json(words):
             return fail([error.format_message()], error.exit_code, words)

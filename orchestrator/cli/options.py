@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from enum import StrEnum
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -95,6 +96,46 @@ Isolate = Annotated[
         "than the run.",
     ),
 ]
+
+
+class LateName(StrEnum):
+    """`run.pacing.LATE`, as the command line needs them."""
+
+    warn = "warn"
+    catch_up = "catch-up"
+    fail = "fail"
+
+
+_REAL_TIME = "--real-time"
+RealTimeFactor = Annotated[
+    float | None,
+    typer.Option(
+        _REAL_TIME,
+        metavar="[FACTOR]",
+        help="Keep pace with the clock, or run FACTOR times as fast; how well that went is told and recorded.",
+    ),
+]
+WhenLate = Annotated[
+    LateName | None,
+    typer.Option(
+        "--late",
+        help="With --real-time, a step that is done too late: warn at once (the default), catch-up and tell at the "
+        "end, or fail.",
+    ),
+]
+
+
+def with_factor(words: Sequence[str]) -> list[str]:
+    """A command line on which the factor of real time stands: an option of typer's has a value, or never one."""
+    found = list(words)
+    if _REAL_TIME in found:
+        place = found.index(_REAL_TIME) + 1
+        try:
+            float(found[place])
+        except (IndexError, ValueError):
+            found.insert(place, "1")
+    return found
+
 
 Workers = Annotated[
     int | None,

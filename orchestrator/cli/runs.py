@@ -22,13 +22,16 @@ from .options import (
     Isolate,
     Kind,
     KindName,
+    LateName,
     Preset,
     Quiet,
+    RealTimeFactor,
     Report,
     Set,
     Step,
     Stop,
     Swap,
+    WhenLate,
     With,
     draw_as,
     interrupted,
@@ -66,6 +69,8 @@ def run(
             help="Threads that step in parallel, under jacobi with FMI 2.0 FMUs: for many or heavy ones on idle cores.",
         ),
     ] = 1,
+    real_time: RealTimeFactor = None,
+    late: WhenLate = None,
     checkpoint_every: Annotated[
         float | None,
         typer.Option(metavar="T", help="Write a checkpoint about every T s of the run, to go on from by --resume."),
@@ -128,7 +133,12 @@ def run(
         check_drawable()
     for file in save or ():
         check_ending(file)
-    how: Any = {"figures": not no_figures, "threads": threads, "checkpoint_every": checkpoint_every}
+    how = {
+        "figures": not no_figures,
+        "threads": threads,
+        "checkpoint_every": checkpoint_every,
+        **_pace(real_time, late),
+    }
     if resume_from is not None:
         given = (preset, settings or None, builds or None, step, algorithm, isolated or None, output)
         changed = any(x is not None for x in (*given, figure_format, dpi)) or kind is not KindName.auto or verify_step
@@ -299,6 +309,14 @@ def convert(
 
     _save(Results.load(results), files)
     return written(files, quiet)
+
+
+def _pace(factor: float | None, late: LateName | None) -> dict[str, Any]:
+    from ..run import RealTime
+
+    if factor is None and late is not None:
+        raise ScenarioError("--late is about a run in step with the clock: give --real-time as well")
+    return {} if factor is None else {"real_time": RealTime(factor, late.value if late else "warn")}
 
 
 def _save(results: Results, files: Sequence[Path]) -> None:

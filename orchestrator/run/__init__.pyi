@@ -5,6 +5,7 @@ from .directory import RunDirectory
 from .ending import Interruption, conclude
 from .execution import at_half_the_step, execute, go_on, resume, run
 from .outcome import Run, Status
+from .pacing import RealTime
 from .record import add_step_check, read_metrics
 from .record import read as read_record
 from .recording import CSV_FILE, RESULT_ENDINGS, ROWS_FILE, Results, Telling, check_ending, read_json, recover_rows
@@ -24,6 +25,7 @@ __all__ = [
     "Flown",
     "Interruption",
     "Progress",
+    "RealTime",
     "Repeater",
     "Results",
     "Revision",

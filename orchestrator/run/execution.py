@@ -25,6 +25,7 @@ from .checking import Checked, check
 from .checkpoint import check_serializable
 from .directory import RunDirectory
 from .outcome import Run
+from .pacing import RealTime
 from .recording import ROWS_FILE, SEEN_FILE, Telling, finish_rows, remove_rows
 from .session import Job, Progress, Session, rows_before
 
@@ -42,6 +43,7 @@ def run(
     figures: bool = True,
     threads: int = 1,
     checkpoint_every: float | None = None,
+    real_time: RealTime | None = None,
     progress: Progress | None = None,
 ) -> Run:
     """Run a system.
@@ -58,6 +60,7 @@ def run(
         threads: how many threads step the instances in parallel, with compiled FMUs and an algorithm that can
             (``jacobi``); results are the same to the bit. Where they cannot act that is an error.
         checkpoint_every: distance in s of the points from which `resume` can go on; needs an output directory.
+        real_time: how the run keeps pace with the clock; without it, it goes as fast as it can.
         progress: called at every per cent of the run and at least ten times a second.
 
     Raises:
@@ -73,6 +76,7 @@ def run(
         figures=figures,
         threads=threads,
         checkpoint_every=checkpoint_every,
+        real_time=real_time,
         progress=progress,
     )
     return _raised(outcome)
@@ -94,6 +98,7 @@ def execute(
     figures: bool = True,
     threads: int = 1,
     checkpoint_every: float | None = None,
+    real_time: RealTime | None = None,
     progress: Progress | None = None,
     writing: Telling | None = None,
 ) -> Run:
@@ -105,7 +110,7 @@ def execute(
     _check_distance(checkpoint_every)
     if checkpoint_every is not None and place is None:
         raise ScenarioError("checkpoints are files: name an output directory for them")
-    return _execute(system, Job(kind, place, threads, checkpoint_every, None, progress, writing), figures)
+    return _execute(system, Job(kind, place, threads, checkpoint_every, None, progress, writing, real_time), figures)
 
 
 def resume(
@@ -115,6 +120,7 @@ def resume(
     figures: bool = True,
     threads: int = 1,
     checkpoint_every: float | None = None,
+    real_time: RealTime | None = None,
     progress: Progress | None = None,
     scenario: System | None = None,
     trust: bool = True,
@@ -127,6 +133,7 @@ def resume(
         figures: whether to draw the system's figures.
         threads: how many threads step the instances in parallel.
         checkpoint_every: distance of further checkpoints in s; as before by default.
+        real_time: as `run` has it.
         progress: as `run` has it.
         scenario: the scenario of the run, from `load`, to be sure that it is a run of that.
         trust: whether Python code that only the checkpoint names is imported; else that which `scenario` names.
@@ -141,6 +148,7 @@ def resume(
         figures=figures,
         threads=threads,
         checkpoint_every=checkpoint_every,
+        real_time=real_time,
         progress=progress,
         scenario=scenario,
         trust=trust,
@@ -155,6 +163,7 @@ def go_on(
     figures: bool = True,
     threads: int = 1,
     checkpoint_every: float | None = None,
+    real_time: RealTime | None = None,
     progress: Progress | None = None,
     writing: Telling | None = None,
     scenario: System | None = None,
@@ -179,7 +188,7 @@ def go_on(
                 f"time, {digits(system.stepping.stop_time)} s"
             )
         every = checkpoint_every if checkpoint_every is not None else point.every
-        return _execute(system, Job(point.kind, place, threads, every, point, progress, writing), figures)
+        return _execute(system, Job(point.kind, place, threads, every, point, progress, writing, real_time), figures)
 
 
 def _check_distance(checkpoint_every: float | None) -> None:

@@ -25,6 +25,7 @@ from .crew import Crew
 from .directory import RunDirectory
 from .ending import Interruption
 from .outcome import Status
+from .pacing import Pacer, RealTime
 from .recording import Due, Recording, Results, Telling, check_stored
 from .watching import Finding, Watching
 
@@ -44,6 +45,7 @@ class Job:
         begin: the checkpoint to begin at, if the run goes on.
         progress: told of how far it has got.
         writing: told of how far results.csv has got.
+        real_time: how it keeps pace with the clock, if it does.
     """
 
     kind: Kind
@@ -53,6 +55,7 @@ class Job:
     begin: Checkpoint | None = None
     progress: Progress | None = None
     writing: Telling | None = None
+    real_time: RealTime | None = None
 
 
 class Session:
@@ -84,6 +87,7 @@ class Session:
         self._slaves: Mapping[str, Slave] = {}
         self._master: Master | None = None
         self._crew = crew
+        self._pacer: Pacer | None = None
         self.interruption = Interruption(self._abandon) if crew is None else crew.interruption
         self._restoring: list[str] = []
         self._is_complete = False
@@ -176,7 +180,7 @@ class Session:
         finally:
             if self._recording is not None:
                 self._recording.close()
-            self.coupling = master.report()
+            self.coupling = master.report() | ({"real_time": self._pacer.report()} if self._pacer else {})
             if self._restoring:
                 names = ", ".join(self._restoring)
                 told = f"{names} discards steps, and is restored before it goes on: the run was begun anew for that"
@@ -258,20 +262,30 @@ class Session:
         assert self._recording is not None
         table = None if varies else self._recording.lend()
         begin, before = world.perf_counter(), master.steps
+        pacer = self._pacer = self._make_pacer(master.time)
         try:
             while True:
                 late = slack(system.stepping.step, system.stepping.start_time, master.time)
                 passed = math.floor((master.time - system.stepping.start_time + late) / system.stepping.step)
                 until = min(count, (passed // stride + 1) * stride)
+                if pacer is not None:
+                    until = min(until, passed + pacer.due(master.time, system.stepping.step))
                 points = {"first": master.steps, "until": until}
                 times = system.stepping.start_time, system.stepping.step
                 if not master.run(*times, count, told_every, observe, **points, table=table):
                     return False
+                if pacer is not None:
+                    pacer.meet_all(range(passed + 1, until + 1), system.stepping.start_time, system.stepping.step)
                 if until == count:
                     return True
-                self._keep(master)
+                if until % stride == 0:
+                    self._keep(master)
         finally:
             self.seconds.update(stepping=world.perf_counter() - begin, steps=master.steps - before)
+
+    def _make_pacer(self, time: float) -> Pacer | None:
+        real_time = self.job.real_time
+        return None if real_time is None else Pacer(real_time, time, lambda: self.interruption.is_asked_for)
 
     def _observer(self, master: Master, due: Due, count: int) -> Callable[[int, Rows], bool]:
         assert self._recording is not None
