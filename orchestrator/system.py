@@ -63,6 +63,9 @@ class Connection:
         scale: 1 where it is not given; one that is given also says that units which do not convert are taken care of.
         optional: whether it stands for nothing where one of its ends has no such variable: an element that a pattern
             may or may not mean.
+        convert: whether units are converted where the two ends say what they are.
+        map: what becomes of single values that are no Reals, by the value as text: ``{"1": 10}``, ``{"true": False}``,
+            items of enumerations by name. Others stay.
         origin: where it was written, for messages.
     """
 
@@ -73,6 +76,8 @@ class Connection:
     offset: float = 0.0
     optional: bool = False
     threshold: float | None = None
+    convert: bool = True
+    map: dict[str, bool | int | str] | None = None
     origin: str = field(default="", compare=False)
 
 

@@ -89,8 +89,10 @@ class CompiledLoop:
     def of(cls, coupling: Coupling, algorithm: Explicit) -> CompiledLoop | None:
         """One that takes these steps, where the kernel is there and can do all that is asked for."""
         able = kernel is not None and all(_can_be_called(x, coupling.exchange) for x in coupling.slaves.values())
+        mapped = any(link.mapping is not None for link in coupling.exchange.links)
         held = not coupling.settings.stepping.extrapolation and coupling.loops is None and coupling.refresher is None
-        return cls(coupling, algorithm) if able and held and "String" not in coupling.exchange.kinds else None
+        able = able and held and not mapped and "String" not in coupling.exchange.kinds
+        return cls(coupling, algorithm) if able else None
 
     def __init__(self, coupling: Coupling, algorithm: Explicit) -> None:
         self._coupling = coupling

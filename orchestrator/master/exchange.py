@@ -56,6 +56,7 @@ class Feed:
     scales: tuple[float, ...]
     offsets: tuple[float, ...]
     thresholds: tuple[float | None, ...]
+    mappings: tuple[Mapping[int, int] | None, ...]
     ages: tuple[int | None, ...]
     ages_at_point: tuple[int | None, ...]
     changes: list[Change | None] = field(default_factory=list)
@@ -169,10 +170,11 @@ class Exchange:
                     kind=kind,
                     targets=tuple(link.target[1] for link in links),
                     sources=tuple(self.places[link.source] for link in links),
-                    plain=all((x.scale, x.offset, x.delay, x.threshold) == (1.0, 0.0, 0, None) for x in links),
+                    plain=all(x.is_linear and (x.scale, x.offset, x.delay) == (1.0, 0.0, 0) for x in links),
                     scales=tuple(link.scale for link in links),
                     offsets=tuple(link.offset for link in links),
                     thresholds=tuple(link.threshold for link in links),
+                    mappings=tuple(link.mapping for link in links),
                     ages=tuple(self.age(link) for link in links),
                     ages_at_point=tuple(self._age_at_point(link) for link in links),
                 )
@@ -210,7 +212,7 @@ class Exchange:
                 feed.channel.set(self.inputs(feed, time))
 
     def inputs(self, feed: Feed, time: float) -> list[Any]:
-        """Input values with delay, scale, offset and threshold applied, and what events make of them."""
+        """Input values with delay, scale, offset, threshold and mapping applied, and what events make of them."""
         result = []
         ages = feed.ages_at_point if self.is_at_point else feed.ages
         for k, scale, offset, age in zip(feed.sources, feed.scales, feed.offsets, ages, strict=True):
@@ -219,6 +221,9 @@ class Exchange:
         for k, threshold in enumerate(feed.thresholds):
             if threshold is not None:
                 result[k] = made_whole(result[k], threshold, feed.kind)
+        for k, mapping in enumerate(feed.mappings):
+            if mapping is not None:
+                result[k] = mapping.get(result[k], result[k])
         for k, change in enumerate(feed.changes):
             if change is not None and change.active:
                 result[k] = change.apply(result[k], feed.kind, time)

@@ -165,6 +165,8 @@ def _refused_link(link: Link, checked: Checked) -> Iterator[Problem]:
         yield Problem(where, delay, names=ends)
     if len(set(types)) > 1 or link.threshold is not None:
         yield Problem(where, f"a {types[0]} that feeds a {types[1]} cannot be packed", names=ends)
+    if link.mapping is not None:
+        yield Problem(where, "a map cannot be packed", names=ends)
     if (link.scale, link.offset) == (1.0, 0.0):
         return
     what = f"scale {link.scale:g} and offset {link.offset:g}"

@@ -21,6 +21,7 @@ from ..fmi import is_fmu_name
 from ..problems import Problem, suggestion
 from ..system import Instance, System
 from .changes import apply_preset, apply_settings, apply_step, apply_swaps, preset_descriptions
+from .connections import read_connections
 from .events import draft_events, expand_events, read_events
 from .groups import Draft, Entry, expand_group
 from .patterns import connect
@@ -184,6 +185,7 @@ class _Scenario:
         self.folder = os.path.dirname(os.path.abspath(path))
         self.reader = Reader(source, self.folder)
         self.draft = self.reader.read()
+        self.draft.rules = read_connections(self.reader)
         self.problems = self.reader.problems
         presets = self.reader.table(source.data, "presets")
         self.default = default if isinstance(default := source.data.get("default_preset"), str) else None

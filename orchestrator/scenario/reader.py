@@ -48,7 +48,6 @@ TOP_KEYS = (
     "study",
 )
 INSTANCE_KEYS = ("component", "fmu", "count", *OPTION_KEYS, "swapped", "build", "start")
-CONNECTION_KEYS = ("from", "delay", "scale", "offset", "threshold", "optional")
 
 
 class Reader:
@@ -70,7 +69,6 @@ class Reader:
                 self.problem(f"takes a text, not {shown(data[key])}", key)
         self._simulation(self.table(data, "simulation"))
         self._instances(self.table(data, "instances"))
-        self._connections(self.table(data, "connections"))
         return self.draft
 
     # ---------------------------------------------------------------- helpers
@@ -300,61 +298,6 @@ class Reader:
                     entry.problem(f"takes numbers, texts, true or false, or lists of these, not {shown(value)}")
                 )
         return start
-
-    # ---------------------------------------------------------------- connections
-
-    def _connections(self, table: Mapping[str, Any]) -> None:
-        for keys, value in self._lines(table, ()):
-            path = ("connections", *keys)
-            options = self._options(value, *path)
-            ends = []
-            for end in (".".join(keys), options.source):
-                try:
-                    ends.append(read_endpoint(end, self.draft.counts))
-                except ScenarioError as error:
-                    self.failed(error, *path)
-            if len(ends) == 2:
-                self.draft.rules.append(Rule(ends[0], ends[1], options))
-
-    def _lines(self, table: Mapping[str, Any], path: tuple[str, ...]) -> Iterator[tuple[tuple[str, ...], Any]]:
-        """The lines of the section; `gust.size = "x.y"` without quotes is a table in TOML, and a line here."""
-        for key, value in table.items():
-            keys = (*path, key)
-            is_options = "." in key or (path and isinstance(value, dict) and any(k in CONNECTION_KEYS for k in value))
-            if isinstance(value, dict) and not is_options:
-                yield from self._lines(value, keys)
-            elif isinstance(value, str | dict):
-                yield keys, value
-            else:
-                self.problem(
-                    f'takes "instance.output" or {{ from = "instance.output", ... }}, not {shown(value)}',
-                    "connections",
-                    *keys,
-                )
-
-    def _options(self, value: str | Mapping[str, Any], *path: str) -> Connection:
-        made = Connection("", path[-1], origin=self.source.origin(*path))
-        if isinstance(value, str):
-            made.source = value
-            return made
-        self.check_keys(value, CONNECTION_KEYS, *path)
-        if not isinstance(value.get("from"), str):
-            self.problem("names no source", *path, remedy='write { from = "instance.output", ... }')
-        else:
-            made.source = value["from"]
-        delay = value.get("delay", 0)
-        if isinstance(delay, bool) or not isinstance(delay, int) or not 0 <= delay <= 10**6:
-            self.problem(f"takes a whole number of communication steps, at least 0, not {shown(delay)}", *path, "delay")
-        else:
-            made.delay = delay
-        if "scale" in value:
-            made.scale = number(self.entry(value["scale"], *path, "scale"), self.problems, 1.0)
-        if "threshold" in value:
-            made.threshold = number(self.entry(value["threshold"], *path, "threshold"), self.problems, 0.5)
-        if "optional" in value:
-            made.optional = truth(self.entry(value["optional"], *path, "optional"), self.problems)
-        made.offset = number(self.entry(value.get("offset", 0.0), *path, "offset"), self.problems)
-        return made
 
 
 class _AnyIndex(Collection[int | None]):

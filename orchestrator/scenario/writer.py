@@ -88,7 +88,7 @@ def _instance(instance: Instance) -> Iterator[str]:
 
 
 def _options(connection: Connection) -> str | dict[str, Any]:
-    keys = ("delay", "scale", "offset", "threshold", "optional")
+    keys = ("delay", "scale", "offset", "threshold", "optional", "convert", "map")
     given = {key: value for key in keys if (value := getattr(connection, key)) != getattr(Connection, key)}
     return {"from": connection.source, **given} if given else connection.source
 

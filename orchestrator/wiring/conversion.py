@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import re
+from collections.abc import Mapping
 from dataclasses import dataclass
 
 from ..fmi import Interface, Type, Variable
@@ -21,26 +23,33 @@ _ANY_BYTES = "application/octet-stream"
 """The MIME type of Binary variables of which the FMU does not say it."""
 _A: dict[Type, str] = {kind: f"a{'n' * (kind[0] in 'EI')} {kind}" for kind in _AS_IT_IS}
 _MAKES: dict[Type, str] = {"Boolean": "threshold = 0.5 makes it true above 0.5"}
+_INTEGER = re.compile(r"[+-]?\d{1,19}")
 _ROUNDS = "threshold = 0.5 takes the nearest whole number"
 
 
 @dataclass(frozen=True)
 class Conversion:
-    """input = scale * output + offset; with a problem they do not fit; a note is what a user should know."""
+    """input = scale * output + offset; with a problem they do not fit; a note is what a user should know.
+
+    Where there is a mapping, the input is what that makes of the output, or the output where it says nothing of it.
+    """
 
     scale: float = 1.0
     offset: float = 0.0
     problem: str = ""
     note: str = ""
+    mapping: Mapping[int, int] | None = None
 
 
 def fit(a: Variable, of_a: Interface, b: Variable, of_b: Interface, connection: Connection) -> Conversion:
     """How output ``a`` feeds input ``b``; the connection's scale and offset apply after the conversion of units."""
+    if connection.map is not None:
+        return _mapped(a, b, connection)
     scale, offset = 1.0 if connection.scale is None else connection.scale, connection.offset
     problem = _misfit(a.type, b.type, connection, is_changed=(scale, offset) != (1.0, 0.0)) or _other_bytes(a, b)
     if problem:
         return Conversion(problem=problem)
-    found = relate(a, of_a, b, of_b)
+    found = relate(a, of_a, b, of_b) if connection.convert else Relation()
     if connection.scale is not None or offset:  # whoever gives a scale has taken care; an offset leaves its doubt
         told = f"{found.refused.partition(';')[0]}; what is given there is applied to the values"
         found = found._replace(
@@ -51,6 +60,38 @@ def fit(a: Variable, of_a: Interface, b: Variable, of_b: Interface, connection: 
     note = found.doubt or found.note or _told(a.type, b.type, connection.threshold) or _told_of_bytes(a, b)
     note = "; ".join(filter(None, (note, _twice(found, scale, offset, a, b))))
     return Conversion(found.scale * scale, found.offset * scale + offset, found.refused, note)
+
+
+def _mapped(a: Variable, b: Variable, connection: Connection) -> Conversion:
+    """What single values become, as the numbers that instances exchange."""
+    assert connection.map is not None
+    if connection.scale is not None or connection.offset or connection.threshold is not None:
+        return Conversion(problem="map stands for itself: leave scale, offset and threshold out")
+    is_truth = a.type == b.type == "Boolean"
+    if not is_truth and not {a.type, b.type} <= {"Integer", "Enumeration"}:
+        what = f"{_A[a.type]} output leads to {_A[b.type]} input"
+        return Conversion(problem=f"map is for Booleans, or for whole numbers and enumerations, and {what}")
+    mapping = {}
+    for source, target in connection.map.items():
+        found = [_whole(one, variable) for one, variable in ((source, a), (str(target), b))]
+        for value, one, variable in zip(found, (source, target), (a, b), strict=True):
+            if value is None:
+                items = ", ".join(name for name, _ in variable.choices)
+                kind = "true or false" if is_truth else f"a whole number{' or one of ' * bool(items)}{items}"
+                return Conversion(problem=f"map takes {kind} for {variable.name}, not {one!r}")
+        first, second = found
+        assert first is not None and second is not None
+        mapping[first] = second
+    return Conversion(mapping=mapping)
+
+
+def _whole(text: str, variable: Variable) -> int | None:
+    """A value in a map as a number; None where the variable has no such value."""
+    if variable.type == "Boolean":
+        return {"true": 1, "false": 0}.get(text.lower())
+    if text in dict(variable.choices):
+        return dict(variable.choices)[text]
+    return int(text) if _INTEGER.fullmatch(text) else None
 
 
 def _twice(found: Relation, scale: float, offset: float, a: Variable, b: Variable) -> str:

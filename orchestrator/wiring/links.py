@@ -27,6 +27,7 @@ class Link:
         source, target: scalar variables.
         direct: whether the source output depends directly on an input of its FMU.
         connection: what it was made from.
+        mapping: what becomes of single values, which replaces scale and offset; None where there is no such thing.
     """
 
     source: SignalName
@@ -36,11 +37,17 @@ class Link:
     delay: int
     direct: bool
     connection: Connection
+    mapping: Mapping[int, int] | None = None
 
     @property
     def threshold(self) -> float | None:
         """By what a number is made a truth value or a whole number."""
         return self.connection.threshold
+
+    @property
+    def is_linear(self) -> bool:
+        """Whether scale and offset are all that happens to a value."""
+        return self.threshold is None and self.mapping is None
 
 
 @dataclass
@@ -109,7 +116,7 @@ def find_links(connection: Connection, interfaces: Mapping[str, Interface], wiri
             wiring.notes.append(str(Problem(described(connection), conversion.note)))
         ends = SignalName(source.instance, one), SignalName(target.instance, other)
         delay, direct = connection.delay, is_direct(of_a, a)
-        links.append(Link(*ends, conversion.scale, conversion.offset, delay, direct, connection))
+        links.append(Link(*ends, conversion.scale, conversion.offset, delay, direct, connection, conversion.mapping))
     return links
 
 

@@ -121,6 +121,8 @@ def _changed(one: Connection) -> str:
         "" if one.scale is None or one.scale == 1.0 else f"times {one.scale:g}",
         f"plus {one.offset:g}" if one.offset else "",
         "" if one.threshold is None else f"whole by the threshold {one.threshold:g}",
+        "units as they are" if not one.convert else "",
+        ", ".join(f"{a} as {b}" for a, b in (one.map or {}).items()),
         f"{counted(one.delay, 'point')} later" if one.delay else "",
     ]
     return ", ".join(filter(None, parts))

@@ -53,6 +53,8 @@ def refusals(system: System, checked: Checked) -> list[Problem]:
     for link in checked.wiring.links:
         if interfaces[link.source[0]].variables[link.source[1]].type == "String":
             problems.append(Problem(described(link.connection), "it hands a text on, which a live page does not"))
+        if link.mapping is not None:
+            problems.append(Problem(described(link.connection), "it maps values, which a live page does not"))
     return list(dict.fromkeys(problems))
 
 

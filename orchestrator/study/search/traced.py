@@ -235,7 +235,7 @@ def _of_stepping(checked: Checked) -> Iterator[Problem]:
     for name in Settings.of(system).rates:
         yield _problem(name, "it takes steps of its own")
     for link in checked.wiring.links:
-        if link.delay or link.threshold is not None:
+        if link.delay or not link.is_linear:
             what = "is delayed" if link.delay else "turns a number into another type"
             yield _problem(link.target[0], f"the connection to {link.target} {what}")
     for name, model in checked.models.items():

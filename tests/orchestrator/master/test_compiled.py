@@ -13,7 +13,7 @@ from railcosim.orchestrator import load
 from railcosim.orchestrator.fmi.slave import STATUS
 from railcosim.orchestrator.master import compiled
 from railcosim.orchestrator.run.execution import run
-from railcosim.orchestrator.system import Event, System
+from railcosim.orchestrator.system import Connection, Event, System
 
 GCC = shutil.which("gcc")
 pytestmark = [
@@ -201,7 +201,7 @@ if sys.argv[2] == "without":
     sys.modules["railcosim.orchestrator.master.kernel"] = None
 from railcosim.orchestrator.master import compiled
 from railcosim.orchestrator.run.execution import run
-from railcosim.orchestrator.system import Event, System
+from railcosim.orchestrator.system import Connection, Event, System
 assert (compiled.kernel is None) == (sys.argv[2] == "without")
 system = System(stop_time=9.0, step=0.25)
 system.add("a", sys.argv[1], u=1.5)
@@ -287,3 +287,21 @@ def test_after_a_run_every_instance_knows_the_time(workspace, odd, ring, instant
     master = instantiated(ring(odd, 2, 1.0))
     assert master.run(0.0, 0.25, 4, 1, lambda *_: True)
     assert [slave.time for slave in master.slaves.values()] == [1.0, 1.0]
+
+
+def test_maps_are_left_to_python(odd, mine, used):
+    """The whole number 2 becomes 7 and others stay, truth its opposite: each a step after it was there."""
+    system = System(stop_time=2.0, step=0.25)
+    system.add("wave", mine("Wave"))
+    for name in ("a", "b"):
+        system.add(name, odd)
+    system.connect("wave.y", "a.m", scale=1.4, threshold=0.5)
+    system.connect("wave.y", "a.on", threshold=0.25)
+    system.connections.append(Connection("a.n", "b.m", map={"2": 7}))
+    system.connections.append(Connection("a.off", "b.on", map={"true": False, "false": True}))
+    result = run(system)
+    assert not used
+    assert {1, 2} <= set(result["a.n"])
+    assert list(result["b.n"][1:]) == [8 if n == 2 else n + 1 for n in result["a.n"][:-1]]
+    assert set(result["a.off"]) == {0, 1}
+    assert list(result["b.off"][1:]) == list(result["a.off"][:-1])

@@ -14,6 +14,7 @@ from railcosim.orchestrator import Event, RailcosimError, ScenarioError, System,
 from railcosim.orchestrator.cli.app import call
 from railcosim.orchestrator.packing.container import pack
 from railcosim.orchestrator.packing.exposure import Exposed, select
+from railcosim.orchestrator.system import Connection
 
 pytest.importorskip("fmu_manipulation_toolbox")
 pytestmark = pytest.mark.skipif(
@@ -246,6 +247,15 @@ def test_a_conversion_of_units_is_refused(tmp_path, components):
     system.add("near", mine("Near"))
     system.connect("far.away", "near.place")
     with pytest.raises(ScenarioError, match=r"conversion of units \(times 1000, plus 0\) cannot be packed"):
+        pack(system, tmp_path / "one.fmu")
+
+
+def test_maps_are_refused(mine, tmp_path):
+    system = System(stop_time=1.0)
+    for name in ("a", "b"):
+        system.add(name, mine("Whole"))
+    system.connections.append(Connection("a.m", "b.n", map={"1": 2}))
+    with pytest.raises(ScenarioError, match="'b.n' = 'a.m': a map cannot be packed"):
         pack(system, tmp_path / "one.fmu")
 
 

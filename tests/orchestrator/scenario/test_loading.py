@@ -247,8 +247,9 @@ def test_the_tables_of_the_documentation_name_every_key():
     from railcosim.orchestrator.evaluation.published import PUBLISHED_KEYS
     from railcosim.orchestrator.figures import PANEL_KEYS
     from railcosim.orchestrator.master import ALGORITHMS
+    from railcosim.orchestrator.scenario.connections import CONNECTION_KEYS
     from railcosim.orchestrator.scenario.events import EVENT_KEYS
-    from railcosim.orchestrator.scenario.reader import CONNECTION_KEYS, INSTANCE_KEYS, TOP_KEYS
+    from railcosim.orchestrator.scenario.reader import INSTANCE_KEYS, TOP_KEYS
     from railcosim.orchestrator.scenario.simulation import SIMULATION_KEYS
     from railcosim.orchestrator.system import ACCELERATIONS, ACTIONS, LOOPS
 

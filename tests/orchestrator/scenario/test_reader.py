@@ -218,6 +218,17 @@ MISTAKES = [
     ),
     (
         "scale = 2",
+        "convert = 1",
+        'two.toml:28: connections."cruise[i].target_speed".convert: takes true or false, not 1',
+    ),
+    (
+        "scale = 2",
+        "map = { a = 1.5 }",
+        'two.toml:28: connections."cruise[i].target_speed".map: takes a table of what becomes of which value, '
+        'not {\'a\': 1.5}; as in',
+    ),
+    (
+        "scale = 2",
         "optional = 1",
         'two.toml:28: connections."cruise[i].target_speed".optional: takes true or false, not 1',
     ),

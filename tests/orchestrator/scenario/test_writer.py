@@ -65,6 +65,14 @@ def test_a_swapped_model_stays_a_swapped_one():
         assert loads(dump(again)).instances == system.instances
 
 
+@pytest.mark.parametrize("options", ["convert = false", 'map = { "1" = 10, "-2" = 3 }', 'map = { park = "hold" }'])
+def test_what_happens_on_the_way(options):
+    system = loads(EXAMPLE.replace("scale = 2, offset = 1.5", options))
+    changed = next(one for one in system.connections if not one.convert or one.map)
+    assert (changed.convert, changed.map) in ((False, None), (True, {"1": 10, "-2": 3}), (True, {"park": "hold"}))
+    assert loads(dump(system)).connections == system.connections
+
+
 def test_how_an_instance_steps_and_runs():
     system = loads(EXAMPLE, settings=["cruise.step=1.0", "cruise[2].isolate=true", "cruise[2].step_timeout=5"])
     system.instances["target"].memory_limit = 0.5

@@ -150,3 +150,40 @@ def test_an_offset_that_is_added_twice_is_told():
     assert found.note.endswith(
         "(plus 273.15) is applied after that; that is the same twice: leave scale and offset out"
     )
+
+
+def mapped(a, b, table, **how):
+    return between(a, b, map=table, **how)
+
+
+def test_single_values_that_become_others():
+    truth, whole = end("A", kind="Boolean"), end("B", kind="Integer")
+    gear = end("C", kind="Enumeration", choices=(("park", 1), ("drive", 5)))
+    assert mapped(truth, truth, {"true": False, "false": True}).mapping == {1: 0, 0: 1}
+    assert mapped(whole, whole, {"1": 10, "-2": 20}).mapping == {1: 10, -2: 20}
+    assert mapped(gear, gear, {"park": "drive"}).mapping == {1: 5}
+    assert mapped(gear, whole, {"drive": 7}).mapping == {5: 7}
+    assert mapped(whole, gear, {"0": "park"}).mapping == {0: 1}
+
+
+def test_maps_that_mean_nothing():
+    truth, whole, real = end("A", kind="Boolean"), end("B", kind="Integer"), end("D")
+    gear = end("C", kind="Enumeration", choices=(("park", 1), ("drive", 5)))
+    asked = "map is for Booleans, or for whole numbers and enumerations, and a Real output leads to an Integer input"
+    assert mapped(real, whole, {"1": 2}).problem == asked
+    assert "a Boolean output leads to an Integer input" in mapped(truth, whole, {"true": 2}).problem
+    assert mapped(truth, truth, {"yes": True}).problem == "map takes true or false for v, not 'yes'"
+    assert mapped(whole, whole, {"1": "ten"}).problem == "map takes a whole number for v, not 'ten'"
+    assert (
+        mapped(gear, whole, {"reverse": 1}).problem
+        == "map takes a whole number or one of park, drive for v, not 'reverse'"
+    )
+    for how in ({"scale": 2.0}, {"offset": 1.0}, {"threshold": 0.5}):
+        problem = "map stands for itself: leave scale, offset and threshold out"
+        assert mapped(whole, whole, {"1": 2}, **how).problem == problem
+
+
+def test_units_that_are_not_to_be_converted():
+    warm, cold = end("A", "degC", DEGC), end("B", "K", K)
+    assert between(warm, cold, convert=False) == Conversion()
+    assert between(warm, cold, convert=False, scale=2.0, offset=1.0) == Conversion(2.0, 1.0)

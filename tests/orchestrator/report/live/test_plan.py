@@ -95,6 +95,16 @@ def test_what_a_page_cannot_do_is_refused(driven, how, said):
     assert said in problem
 
 
+def test_maps_are_refused(driven):
+    system = driven()
+    system.connections[-1].threshold = None
+    system.connections[-1].source = "count.m"
+    system.connections[-1].map = {"1": 2}
+    system.add("count", system.instances["whole"].model)
+    (problem,) = refused(system)
+    assert problem.endswith("it maps values, which a live page does not")
+
+
 def test_loops_are_refused(mine):
     system = System(stop_time=1.0, step=0.1)
     for name in ("a", "b"):
