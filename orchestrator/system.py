@@ -172,6 +172,7 @@ class Provenance:
         modified: whether anything was changed beyond file and preset, so that known values are not judged.
         command: the words after ``orchestrate run`` that give this system; empty where no options do: Python made it.
         rescaled_from: the step in s before `--step` changed it: every sample time equal to it follows the step.
+        notes: what a user should know of how it was read.
         origins: where things were written, for messages: by ``"train[1]"``, ``"train[1].speed"`` (a start value),
             ``"instances.train[1].step"`` (an option of an instance), ``"instances.train[1].build.carriages"`` (a build
             argument that a preset or an option gave), ``"simulation.step"``,
@@ -194,6 +195,7 @@ class Provenance:
     path: str = field(default="", compare=False)
     text: str = field(default="", compare=False, repr=False)
     named: tuple[str, ...] = field(default=(), compare=False)
+    notes: tuple[str, ...] = field(default=(), compare=False)
     origins: dict[str, str] = field(default_factory=dict, compare=False, repr=False)
 
 

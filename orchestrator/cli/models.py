@@ -56,13 +56,14 @@ def describe(
     from ..fmi import Workspace, is_fmu_name, load_fmu
     from ..problems import Problem, suggestion
     from ..scenario import shipped
+    from ..ssp import is_ssp_name
     from ..times import digits
     from .documents import describe_document, scenario_document
     from .printing import open_console, show_compilations, show_model, show_system
 
     arguments = build_arguments(builds)
-    is_scenario = name.endswith(".toml") or name in dict(shipped())
-    # Any other file is told for what it is: an SSP, a folder with an unpacked FMU.
+    is_scenario = name.endswith(".toml") or is_ssp_name(name) or name in dict(shipped())
+    # Any other file is told for what it is: a folder with an unpacked FMU, a program.
     is_file = not (is_scenario or name in CATALOGUE or ".py" in name) and Path(name).exists()
     is_fmu = is_fmu_name(name) or is_file
     if is_scenario:

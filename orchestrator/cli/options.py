@@ -50,7 +50,7 @@ Scenario = Annotated[
     str,
     typer.Argument(
         metavar="SCENARIO",
-        help="A shipped scenario (see 'orchestrate list'), or a .toml file.",
+        help="A shipped scenario (see 'orchestrate list'), or a .toml, .ssp or .ssd file (a.ssp#Name is a variant).",
         autocompletion=completing.scenarios,
     ),
 ]

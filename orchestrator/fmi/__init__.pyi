@@ -1,6 +1,7 @@
 from ...fmus.kinds import Kind
 from .archive import Workspace
 from .interface import Interface, Sort, Type, Unit, Variable
+from .members import check_entries
 from .models import Model, Packaged, load_fmu, load_models, packaged, provide
 from .plain import PlainSlave
 from .reading import read as read_as_written
@@ -22,6 +23,7 @@ __all__ = [
     "Unit",
     "Variable",
     "Workspace",
+    "check_entries",
     "is_fmu_name",
     "is_pedantry",
     "load_fmu",

@@ -94,6 +94,17 @@ def list_members(path: Path, archive: zipfile.ZipFile) -> Members:
     return Members(files, (*notes, *more, *spelled, *_alike(files)))
 
 
+def check_entries(path: Path, archive: zipfile.ZipFile) -> None:
+    """Look at the entries of any archive for what is a danger.
+
+    Raises:
+        FmuFileError: one of them is, or all together unpack to too much.
+    """
+    _check_size(path, archive.infolist())
+    for entry in archive.infolist():
+        _check_entry(path, entry)
+
+
 def extract(archive: zipfile.ZipFile, members: Members, target: Path) -> None:
     """Write the files below a folder; what may be run there may be run here."""
     for name, entry in members.files.items():

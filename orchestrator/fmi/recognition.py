@@ -55,7 +55,7 @@ def describe_members(names: Collection[str]) -> str:
     """What an archive is that holds no model description, with the remedy; empty where that is not known."""
     fmus = [name for name in names if is_fmu_name(name)]
     if "SystemStructure.ssd" in names:
-        return f"an SSP, a system of {len(fmus)} FMUs; unpack it and name one of those in resources/"
+        return f"an SSP, a system of {len(fmus)} FMUs; call it .ssp, or unpack it and name one of those in resources/"
     if fmus:
         return f"an archive with an FMU in it; unpack it and name {fmus[0]!r}"
     places = [name for name in names if PurePosixPath(name).name.lower() == "modeldescription.xml"]

@@ -242,7 +242,8 @@ def describe_stepping(checked: Checked) -> list[str]:
 
 
 def _notes(system: System, models: Mapping[str, Model], wiring: Wiring, order: Order) -> list[str]:
-    notes: dict[str, None] = dict.fromkeys([model.note for model in models.values() if model.note] + wiring.notes)
+    notes = dict.fromkeys(system.provenance.notes)
+    notes |= dict.fromkeys([model.note for model in models.values() if model.note] + wiring.notes)
     notes.update(dict.fromkeys(import_notes(system)))
     interfaces = {name: model.interface for name, model in models.items()}
     for interface in {id(interface): interface for interface in interfaces.values()}.values():

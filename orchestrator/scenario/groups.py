@@ -164,7 +164,7 @@ def resolve_model(text: Any, folder: str, kind: str = "component") -> str:
         if not is_fmu:
             remedy = "for a component of the catalogue write component = ..."
             if text.lower().endswith(".ssp"):
-                remedy = "it is a system of FMUs: unpack it, and name one of those in its resources/"
+                remedy = "it is a system of FMUs: run it as it is, or unpack it and name one of those in its resources/"
             raise ScenarioError(Problem("", f"'{text}' does not end in .fmu", remedy))
         return _existing(text, folder)
     match = _PYTHON_CLASS.fullmatch(text)

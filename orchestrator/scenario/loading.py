@@ -19,6 +19,7 @@ from .. import world
 from ..errors import ScenarioError
 from ..fmi import is_fmu_name
 from ..problems import Problem, suggestion
+from ..ssp import is_ssp_name, read_system
 from ..system import Instance, System
 from .changes import apply_preset, apply_settings, apply_step, apply_swaps, preset_descriptions
 from .connections import read_connections
@@ -52,9 +53,6 @@ def find(name_or_path: str | os.PathLike[str]) -> Path:
             f"see 'orchestrate describe', and name it in a scenario: [instances.it] fmu = {os.path.basename(text)!r}"
         )
         raise ScenarioError(Problem("", f"'{text}' is an FMU, not a scenario", remedy))
-    if text.lower().endswith(".ssp"):
-        remedy = "unpack it, and write a scenario with the FMUs in its resources/"
-        raise ScenarioError(Problem("", f"'{text}' is an SSP, and a scenario is a TOML file", remedy))
     names = [name for name, _ in shipped()]
     folder, file = os.path.split(text)
     if not text.endswith(".toml") and not folder:
@@ -102,11 +100,29 @@ def load(
     Raises:
         ScenarioError: with every problem of the file and of the changes, each with its place.
     """
-    path = find(scenario)
-    source = Source.read(path, path.name if is_shipped(path) else str(path))
     changes = _Changes(preset, settings, builds, swaps, stop_time, step, algorithm)
-    system = _system(source, path, changes)
+    if is_ssp_name(os.fspath(scenario)):
+        system = _system_of_ssp(os.fspath(scenario), changes)
+    else:
+        path = find(scenario)
+        source = Source.read(path, path.name if is_shipped(path) else str(path))
+        system = _system(source, path, changes)
     system.provenance.command = (os.fspath(scenario), *changes.words())
+    return system
+
+
+def _system_of_ssp(name: str, changes: _Changes) -> System:
+    """The system of an SSP: by way of the scenario that it makes, so that options change it as they change any."""
+    read = read_system(name)
+    places: dict[tuple[str | int, ...], str] = {}
+    for instance in read.instances.values():
+        places["instances", instance.name] = instance.origin
+        for variable in instance.start:
+            origin = read.provenance.origins[f"{instance.name}.{variable}"]
+            places["instances", instance.name, "start", variable] = origin
+    places |= {("connections", connection.target): connection.origin for connection in read.connections}
+    system = _system(Source(dump(read), read.provenance.path, places), Path(read.provenance.path), changes)
+    system.provenance.notes = read.provenance.notes
     return system
 
 

@@ -12,7 +12,6 @@ from ..evaluation import FUNCTIONS, check_entry, parse, parse_requirement
 from ..figures import FIGURE_KEYS, PANEL_KEYS
 from ..names import SignalName
 from ..problems import Problem, suggestion
-from ..system import Connection
 from .groups import (
     MAX_COUNT,
     OPTION_KEYS,
@@ -23,12 +22,11 @@ from .groups import (
     Member,
     build_argument,
     is_plain,
-    number,
     resolve_model,
     shown,
     truth,
 )
-from .patterns import NAME, Rule, read_endpoint
+from .patterns import NAME
 from .simulation import SIMULATION_KEYS, TOLERANCES
 from .toml_source import Source
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 import tomllib
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import Any
 
@@ -37,10 +37,14 @@ class Source:
 
     Attributes:
         label: how messages call the file. text: as read. data: the values.
+
+    Args:
+        places: where values were really written, by their path; for a text that was made of another file.
     """
 
-    def __init__(self, text: str, label: str) -> None:
+    def __init__(self, text: str, label: str, places: Mapping[Path_, str] | None = None) -> None:
         self.label = label
+        self._places = places
         self.text = text.removeprefix("\ufeff")
         self._check_size(len(text))
         self.data = self._parse()
@@ -75,6 +79,9 @@ class Source:
 
     def origin(self, *path: str | int) -> str:
         """``"scenario.toml:31"``, or the file alone where the line is unknown."""
+        if self._places is not None:
+            found = (self._places.get(path[:length]) for length in range(len(path), 0, -1))
+            return next(filter(None, found), self.label)
         line = self.line(*path)
         return self.label if line is None else f"{self.label}:{line}"
 

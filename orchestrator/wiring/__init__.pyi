@@ -6,6 +6,7 @@ from .resolution import wire
 from .starts import as_text, bounded, find_starts
 from .topology import describe_topology
 from .trains import Control, Following, Quantity, Train, find_controls, find_followings, find_trains
+from .units import convert
 
 __all__ = [
     "Control",
@@ -19,6 +20,7 @@ __all__ = [
     "bounded",
     "circles",
     "condensed",
+    "convert",
     "derive_order",
     "describe_topology",
     "described",

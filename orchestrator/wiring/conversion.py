@@ -71,27 +71,28 @@ def _mapped(a: Variable, b: Variable, connection: Connection) -> Conversion:
     if not is_truth and not {a.type, b.type} <= {"Integer", "Enumeration"}:
         what = f"{_A[a.type]} output leads to {_A[b.type]} input"
         return Conversion(problem=f"map is for Booleans, or for whole numbers and enumerations, and {what}")
-    mapping = {}
-    for source, target in connection.map.items():
-        found = [_whole(one, variable) for one, variable in ((source, a), (str(target), b))]
-        for value, one, variable in zip(found, (source, target), (a, b), strict=True):
-            if value is None:
-                items = ", ".join(name for name, _ in variable.choices)
-                kind = "true or false" if is_truth else f"a whole number{' or one of ' * bool(items)}{items}"
-                return Conversion(problem=f"map takes {kind} for {variable.name}, not {one!r}")
-        first, second = found
-        assert first is not None and second is not None
-        mapping[first] = second
-    return Conversion(mapping=mapping)
+    try:
+        pairs = connection.map.items()
+        return Conversion(mapping={_whole(source, a): _whole(str(target), b) for source, target in pairs})
+    except ValueError as error:
+        return Conversion(problem=str(error))
 
 
-def _whole(text: str, variable: Variable) -> int | None:
-    """A value in a map as a number; None where the variable has no such value."""
-    if variable.type == "Boolean":
-        return {"true": 1, "false": 0}.get(text.lower())
+def _whole(text: str, variable: Variable) -> int:
+    """A value in a map as a number.
+
+    Raises:
+        ValueError: the variable has no such value.
+    """
+    if variable.type == "Boolean" and text.lower() in ("true", "false"):
+        return int(text.lower() == "true")
     if text in dict(variable.choices):
         return dict(variable.choices)[text]
-    return int(text) if _INTEGER.fullmatch(text) else None
+    if variable.type != "Boolean" and _INTEGER.fullmatch(text):
+        return int(text)
+    items = ", ".join(name for name, _ in variable.choices)
+    kind = "true or false" if variable.type == "Boolean" else f"a whole number{' or one of ' * bool(items)}{items}"
+    raise ValueError(f"map takes {kind} for {variable.name}, not {text!r}")
 
 
 def _twice(found: Relation, scale: float, offset: float, a: Variable, b: Variable) -> str:

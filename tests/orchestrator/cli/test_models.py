@@ -112,8 +112,13 @@ def test_a_name_that_is_neither_is_told_with_the_nearest_of_both(name, nearest, 
 
 
 def test_describe_tells_what_another_file_is(tmp_path, xml, capsys):
-    ssp = xml["write_archive"](tmp_path / "system.ssp", {"SystemStructure.ssd": "<x/>", "resources/a.fmu": ""})
-    for name, what in ((ssp, "is an SSP, a system of 1 FMUs; unpack it"), (tmp_path, "is a folder, not an FMU file")):
+    inside = {"SystemStructure.ssd": "<x/>", "resources/a.fmu": ""}
+    odd = xml["write_archive"](tmp_path / "system.fmu", inside)
+    for name, what in (
+        (odd, "is an SSP, a system of 1 FMUs; call it .ssp"),
+        (tmp_path, "is a folder, not an FMU file"),
+        (xml["write_archive"](tmp_path / "system.ssp", inside), "SystemStructure.ssd:1: it is a x, not a System"),
+    ):
         assert call(["describe", str(name)]) == 2
         assert what in capsys.readouterr().err
 

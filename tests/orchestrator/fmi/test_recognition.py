@@ -55,7 +55,7 @@ def test_a_truncated_zip(refused, tmp_path, xml, kept):
     ("names", "what"),
     [
         (["readme.txt"], "is not an FMU: it holds no modelDescription.xml"),
-        (["SystemStructure.ssd", "resources/a.fmu"], "is an SSP, a system of 1 FMUs; unpack it"),
+        (["SystemStructure.ssd", "resources/a.fmu"], "is an SSP, a system of 1 FMUs; call it .ssp, or unpack it"),
         (["models/Train.FMU"], "is an archive with an FMU in it; unpack it and name 'models/Train.FMU'"),
         (["a/b/modelDescription.xml"], "its model description is 'a/b/modelDescription.xml'; zip its folder"),
         (["a/modelDescription.xml", "b/x"], "its model description is 'a/modelDescription.xml'; zip its folder"),

@@ -255,7 +255,7 @@ def test_maps_are_refused(mine, tmp_path):
     for name in ("a", "b"):
         system.add(name, mine("Whole"))
     system.connections.append(Connection("a.m", "b.n", map={"1": 2}))
-    with pytest.raises(ScenarioError, match="'b.n' = 'a.m': a map cannot be packed"):
+    with pytest.raises(ScenarioError, match="a map cannot be packed"):
         pack(system, tmp_path / "one.fmu")
 
 

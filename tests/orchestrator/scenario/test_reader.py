@@ -225,7 +225,7 @@ MISTAKES = [
         "scale = 2",
         "map = { a = 1.5 }",
         'two.toml:28: connections."cruise[i].target_speed".map: takes a table of what becomes of which value, '
-        'not {\'a\': 1.5}; as in',
+        "not {'a': 1.5}; as in",
     ),
     (
         "scale = 2",

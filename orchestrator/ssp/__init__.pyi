@@ -1,0 +1,3 @@
+from .reading import is_ssp_name, read_system
+
+__all__ = ["is_ssp_name", "read_system"]

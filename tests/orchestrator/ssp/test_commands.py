@@ -1,0 +1,66 @@
+"""SSPs as the commands and `load` take them: what options change, what is told, and a run of known numbers."""
+
+import pytest
+from railcosim.fmus.build import build
+from railcosim.orchestrator import ScenarioError, load, run
+from railcosim.orchestrator.cli.app import call
+
+from .conftest import binding, bindings, component, connection, connectors, packed, parameters, real, structure, system
+
+
+@pytest.fixture
+def passing(mine, tmp_path):
+    """y = 3 u + 1 of the root's input u = 2, and z = 2 y + 10 behind it: 7 and 24."""
+    shown = connectors(u="input", y="output", gain="parameter", bias="parameter")
+    own = bindings(binding(parameters(("gain", real(3)), ("bias", real(1)))))
+    parts = component("first", own, source="resources/pass.fmu", shown=shown)
+    inner = system(
+        component("second", source="resources/pass.fmu", shown=shown),
+        connection("i", "second.u", '<ssc:LinearTransformation factor="2" offset="10"/>'),
+        connectors(i="input"),
+        name="inner",
+    )
+    wires = connection("u", "first.u") + connection("inner.i", "first.y")
+    bound = bindings(binding(parameters(("u", real(2)))))
+    top = structure(
+        system(parts + inner, wires, connectors(u="input"), bound),
+        '<ssd:DefaultExperiment startTime="0" stopTime="1"/>',
+    )
+    other = top.replace('value="2"', 'value="4"')
+    fmu = build(mine("Pass"), kind="native").read_bytes()
+    path = tmp_path / "system.ssp"
+    path.write_bytes(packed({"SystemStructure.ssd": top, "Four.ssd": other, "resources/pass.fmu": fmu}))
+    return str(path)
+
+
+def test_a_run_of_known_numbers(passing):
+    result = run(load(passing))
+    assert result.status == "completed"
+    assert set(result["first.y"]) == {7.0}
+    assert set(result["inner_second.y"]) == {24.0}
+    changed = run(load(f"{passing}#Four", settings=["first.gain=1"], stop_time=0.5, step=0.25))
+    assert list(changed.time) == [0.0, 0.25, 0.5]
+    assert set(changed["first.y"]) == {5.0}
+    options = ("--set", "first.gain=1", "--step", "0.25", "--stop", "0.5")
+    assert changed.system.provenance.command == (f"{passing}#Four", *options)
+
+
+def test_what_is_wrong_is_told_where_it_stands(archive):
+    wrong = bindings(binding(parameters(("n", real(1.5)))))
+    path = archive(structure(system(component("a", wrong))))
+    system_ = load(path)
+    assert system_.provenance.origins["a.n"].endswith("system.ssp/SystemStructure.ssd:4")
+    assert system_.instances["a"].origin.endswith("system.ssp/SystemStructure.ssd:4")
+    with pytest.raises(ScenarioError, match=r"system\.ssp: there is no preset 'x'"):
+        load(path, preset="x")
+
+
+def test_the_commands(passing, tmp_path, capsys):
+    assert call(["check", passing]) == 0
+    told = capsys.readouterr().out
+    assert "names of instances: inner.second is inner_second" in told
+    assert call(["describe", passing]) == 0
+    assert "inner_second.u" in capsys.readouterr().out
+    assert call(["run", passing, "-o", str(tmp_path / "out"), "--quiet", "--no-figures"]) == 0
+    assert (tmp_path / "out" / "run.json").is_file()
+    assert call(["check", f"{passing}#None"]) == 2

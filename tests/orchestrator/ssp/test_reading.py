@@ -1,0 +1,179 @@
+"""From archive to `System`: variants, bare structures, versions, times, steps and algorithms."""
+
+import pytest
+from railcosim.orchestrator import ScenarioError
+from railcosim.orchestrator.ssp import is_ssp_name, read_system
+
+from .conftest import DESCRIPTION, GADGET, UNITS, component, connection, packed, structure, system
+
+
+def test_names_of_files():
+    assert [is_ssp_name(name) for name in ("a.ssp", "b.SSD", "a.ssp#B", "a.toml", "a.fmu#b.ssp")] == [
+        *(True, True, True),
+        *(False, False),
+    ]
+
+
+def test_variants_by_file_or_name(archive, tmp_path):
+    one, other = structure(system(component("a")), name="first"), structure(system(component("b")), name="second")
+    path = archive({"Other.ssd": other, "SystemStructure.ssd": one, "Broken.ssd": "no xml"})
+    for variant, instance in (("", "a"), ("Other", "b"), ("Other.ssd", "b"), ("second", "b"), ("first", "a")):
+        found = read_system(f"{path}#{variant}" if variant else path, tmp_path / "fmus")
+        assert (list(found.instances), found.provenance.path) == ([instance], path)
+    with pytest.raises(ScenarioError, match="there is no variant 'third'; there are SystemStructure"):
+        read_system(f"{path}#third", tmp_path / "fmus")
+
+
+def test_a_bare_structure(tmp_path):
+    """Beside what it names; a link out of its folder is not followed."""
+    (tmp_path / "it" / "resources").mkdir(parents=True)
+    (tmp_path / "it" / "resources" / "gadget.fmu").write_bytes(GADGET)
+    top = tmp_path / "it" / "My.ssd"
+    top.write_text(structure(system(component("a"))))
+    found = read_system(str(top))
+    assert found.instances["a"].model == str(tmp_path / "it" / "resources" / "gadget.fmu")
+    assert found.instances["a"].origin == f"{top}:4"
+    (tmp_path / "it" / "resources" / "gadget.fmu").rename(tmp_path / "gadget.fmu")
+    (tmp_path / "it" / "resources" / "gadget.fmu").symlink_to(tmp_path / "gadget.fmu")
+    with pytest.raises(ScenarioError, match="there is no such file"):
+        read_system(str(top))
+
+
+def test_an_archive_without_a_default_structure(tmp_path):
+    (tmp_path / "x.ssp").write_bytes(packed({"Other.ssd": structure(system(component("a")))}))
+    with pytest.raises(ScenarioError, match=r"it is no SSP: there is no SystemStructure\.ssd at its top"):
+        read_system(str(tmp_path / "x.ssp"), tmp_path / "fmus")
+
+
+def told(found, *texts):
+    return [any(text in note for note in found.provenance.notes) for text in texts]
+
+
+def test_what_the_schema_says(read, archive, tmp_path):
+    """Three of it, and how many more; of 2.0, that there is none."""
+    wrong = "".join(f"<ssd:Wrong{k}/>" for k in range(1))
+    many = "".join(f'<ssd:Connector name="c{k}" kind="wrong{k}"/>' for k in range(5))
+    found = read(system(component("a") + wrong, shown=f"<ssd:Connectors>{many}</ssd:Connectors>"))
+    against = [note for note in found.provenance.notes if "against the schema" in note]
+    assert len(against) == 4
+    assert "SystemStructure.ssd:4: against the schema: Element" in against[0]
+    assert "more places are against the schema" in against[-1]
+    text = structure(system(component("a")), version="2.0")
+    found = read_system(archive(text, name="two.ssp"), tmp_path / "two")
+    assert told(found, "no schema for version '2.0' is at hand; it is read without one") == [True]
+
+
+EXPERIMENT = '<ssd:DefaultExperiment startTime="1" stopTime="5">{}</ssd:DefaultExperiment>'
+
+
+def annotated(kind, inside):
+    return f'<ssd:Annotations><ssc:Annotation type="{kind}">{inside}</ssc:Annotation></ssd:Annotations>'
+
+
+def oms(inside):
+    information = f"<oms:SimulationInformation>{inside}</oms:SimulationInformation>"
+    more = annotated("org.openmodelica", f'<oms:Annotations xmlns:oms="o">{information}</oms:Annotations>')
+    return system(component("a"), more=more)
+
+
+def times(found):
+    return found.stepping.start_time, found.stepping.stop_time, found.stepping.step, found.stepping.algorithm
+
+
+def test_times_that_the_fmus_recommend(read):
+    """The gadget recommends 20 s in steps of 0.05 s."""
+    found = read(system(component("a")))
+    assert times(found) == (0.0, 20.0, 0.05, "gauss-seidel")
+    assert told(found, "it gives no stop time; 20 s is taken", "it gives no step; 0.05 s is taken") == [True, True]
+
+
+def test_times_that_nobody_recommends(read):
+    plain = packed({"modelDescription.xml": DESCRIPTION.replace('stopTime="20" stepSize="0.05"', "")})
+    found = read(system(component("a")), {"resources/gadget.fmu": plain})
+    assert times(found)[:3] == (0.0, 1.0, 0.1)
+
+
+def test_the_default_experiment(read):
+    assert times(read(system(component("a")), after=UNITS + EXPERIMENT.format("")))[:2] == (1.0, 5.0)
+    with pytest.raises(ScenarioError, match="startTime of DefaultExperiment is 'soon', not a number"):
+        read(system(component("a")), after=UNITS + EXPERIMENT.format("").replace('"1"', '"soon"'))
+
+
+def test_a_fixed_step_of_omsimulator(read):
+    fixed = '<oms:FixedStepMaster description="oms-ma" stepSize="0.25" relativeTolerance="1e-4"/>'
+    assert times(read(oms(f"<!-- c -->{fixed}")))[2:] == (0.25, "jacobi")
+    with pytest.raises(ScenarioError, match=r"stepSize is 0\.0, not a positive number"):
+        read(oms(fixed.replace("0.25", "0")))
+
+
+def test_a_variable_step_of_omsimulator(read):
+    varied = '<oms:VariableStepMaster description="oms-mav" minimumStepSize="0.001" maximumStepSize="0.5"/>'
+    found = read(oms(varied))
+    assert times(found)[2:] == (0.5, "adaptive")
+    assert (found.stepping.min_step, found.stepping.tolerance) == (0.001, 1e-4)
+    plain = packed(
+        {"modelDescription.xml": DESCRIPTION.replace("canGetAndSetFMUstate", "canHandleVariableCommunicationStepSize")}
+    )
+    found = read(oms(varied), {"resources/gadget.fmu": plain})
+    assert times(found)[2:] == (0.5, "jacobi")
+    assert told(found, "steps that vary need FMUs that save their state") == [True]
+
+
+def test_a_solver_of_omsimulator_is_left_out(read):
+    found = read(oms('<oms:VariableStepSolver description="cvode"/>'))
+    assert times(found)[2:] == (0.05, "gauss-seidel")
+    assert told(found, "VariableStepSolver of OMSimulator is for models without a solver of their own") == [True]
+
+
+def osp(inside):
+    return UNITS + EXPERIMENT.format(
+        annotated("com.opensimulationplatform", f'<osp:Algorithm xmlns:osp="o">{inside}</osp:Algorithm>')
+    )
+
+
+def test_steps_of_osp(read):
+    """The system's, and those that components hint at where they are multiples of it."""
+    hint = annotated("com.opensimulationplatform", '<osp:StepSizeHint xmlns:osp="o" value="{}"/>')
+    parts = "".join(
+        component(name, hint.format(step) if step else "")
+        for name, step in (("a", 0.4), ("b", 0.25), ("c", 0.1), ("d", 0))
+    )
+    found = read(system(parts), after=osp('<osp:FixedStepAlgorithm baseStepSize="0.1"/>'))
+    assert times(found) == (1.0, 5.0, 0.1, "jacobi")
+    assert {name: one.step for name, one in found.instances.items()} == {"a": 0.4, "b": None, "c": None, "d": None}
+    assert told(found, "its step 0.25 s is no multiple of 0.1 s, and is left out") == [True]
+    found = read(system(component("a")), after=osp("<osp:Other/>"))
+    assert told(found, "the algorithm of its annotation is not known here") == [True]
+
+
+def test_a_hint_that_is_no_number(read):
+    hint = annotated("com.opensimulationplatform", '<osp:StepSizeHint xmlns:osp="o" value="x"/>')
+    with pytest.raises(ScenarioError, match="value of StepSizeHint is 'x', not a number"):
+        read(system(component("a", hint)))
+
+
+def test_annotations_of_others_are_left_out(read):
+    found = read(system(component("a"), more=annotated("org.example", "<x:Y xmlns:x='x'/>")))
+    assert times(found)[2:] == (0.05, "gauss-seidel")
+
+
+def test_many_names_are_told_in_part(read):
+    inner = "".join(system(component("c"), name=f"s{k}") for k in range(10))
+    found = read(system(inner))
+    assert told(found, "s0.c is s0_c", "s7.c is s7_c, and 2 more") == [True, True]
+
+
+def test_units_as_the_schema_does_not_allow_them(read):
+    """They convert nothing."""
+    after = '<ssd:Units><ssc:Unit name="m/s"/><ssc:Unit name="x"><ssc:BaseUnit m="one"/></ssc:Unit></ssd:Units>'
+    found = read(system(component("a") + component("b"), connection("a.y", "b.u")), after=after)
+    assert found.connections[0].convert
+
+
+def test_two_connectors_of_one_name(read):
+    twice = (
+        '<ssd:Connectors><ssd:Connector name="y" kind="input"/><ssd:Connector name="y" kind="output"/></ssd:Connectors>'
+    )
+    found = read(system(component("a", shown=twice) + component("b"), connection("a.y", "b.u")))
+    assert told(found, "a has two connectors 'y'; the last counts") == [True]
+    assert found.connections[0].source == "a.y"
