@@ -120,7 +120,7 @@ class Package:
             return Path(os.path.abspath(self.path)).parent / path
         target = self.folder / path
         entry = self._files[path]
-        if target.is_file() and target.stat().st_size == entry.file_size:
+        if target.is_file() and world.stat(target).st_size == entry.file_size:
             return target
         try:
             world.mkdir(target.parent, parents=True, exist_ok=True)

@@ -46,7 +46,7 @@ def read_system(name: str, folder: FilePath | None = None) -> System:
         raise ScenarioError(Problem("", f"there is no file '{file}'"))
     package = Package(path, file, folder or cache_folder().with_name("ssp") / digest_of(path)[:32])
     reader = StructureReader()
-    document, root = reader.open(package, _variant(package, variant))
+    document, root = reader.top(package, _variant(package, variant))
     with Workspace() as workspace:
         interfaces = dict(_interfaces(root, (), workspace, reader.problems, {}))
     network, settings = Network(root, interfaces), Settings(root, interfaces)
@@ -87,7 +87,7 @@ def _variant(package: Package, wanted: str) -> str:
 
 def _name(package: Package, root: str) -> str:
     try:
-        document, _ = StructureReader().open(package, root)
+        document, _ = StructureReader().top(package, root)
     except ScenarioError:  # of another variant than the one that is wanted
         return root
     return str(document.root.get("name", ""))

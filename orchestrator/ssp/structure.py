@@ -79,7 +79,7 @@ class StructureReader:
         self._depth = 0
         self._count = 0
 
-    def open(self, package: Package, path: str) -> tuple[Document, Element]:
+    def top(self, package: Package, path: str) -> tuple[Document, Element]:
         """One document, and the system in it.
 
         Raises:
@@ -157,7 +157,7 @@ class StructureReader:
         kind = node.get("type") or {".ssd": _SSD, ".ssp": _SSP}.get(Path(path).suffix.lower(), _FMU)
         if kind in (_SSD, _SSP):
             package = document.package if kind == _SSD else document.package.inner(path)
-            _, top = self.open(package, path if kind == _SSD else fragment or DEFAULT)
+            _, top = self.top(package, path if kind == _SSD else fragment or DEFAULT)
             return self._placed(document, node, top, path)
         if kind != _FMU:
             what = f"component {node.get('name')!r} is of type {kind!r}, which is not supported"
