@@ -115,7 +115,7 @@ def _imported_modules(file: Path) -> Iterator[str]:
 
 
 def names_data(value: Any) -> bool:
-    """Whether a build argument names a data file: a text that ends in ``.json``, or of railML ``.railml``, ``.xml``."""
+    """Whether a build argument names a data file: a text that ends in ``.json``, ``.railml``, ``.xml`` or ``.onnx``."""
     return isinstance(value, str) and value.endswith(DATA_SUFFIXES)
 
 

@@ -1,4 +1,4 @@
-"""Other people's formats of lines and trains, read into this project's own: units and values are checked here."""
+"""Other people's formats of lines, trains and networks, read into this project's own: units and values are checked."""
 
 from .quantities import ForeignError
 from .reading import DATA_SUFFIXES, read_data
