@@ -1,6 +1,7 @@
-"""What a process of its own costs an instance: N light FMUs in a ring, isolated and not, through the same Python loop.
+"""What a process of its own costs an instance: N light FMUs in a ring, isolated and not, through the same loop.
 
-    python benchmarks/isolation.py
+    python benchmarks/isolation.py             # the compiled loop: a step is a hand-over through shared memory
+    python benchmarks/isolation.py --python    # the loop in Python: a step is a message
 
 Microseconds per FMU step, wall time and CPU time of all processes together, and the ratio to the ring without
 isolation; both are driven from this process and step in turn, so that a busy machine slows both alike; medians. Then
@@ -24,10 +25,9 @@ from railcosim.orchestrator.fmi.archive import Workspace
 from railcosim.orchestrator.isolation.choice import instantiate
 from railcosim.orchestrator.isolation.proxy import IsolatedSlave
 from railcosim.orchestrator.master import compiled
-from railcosim.orchestrator.master.loop import Master, Rows
+from railcosim.orchestrator.master.loop import Master
 from railcosim.orchestrator.run.checking import check
-from railcosim.orchestrator.run.recording import Recorder
-from railcosim.orchestrator.system import Algorithm, System
+from railcosim.orchestrator.system import System
 from ring import HERE, light
 
 STEP, STOP = 1e-3, 1e6
@@ -36,9 +36,7 @@ STEP, STOP = 1e-3, 1e6
 class Candidate:
     """A ring with all of its instances isolated, or none."""
 
-    def __init__(
-        self, path: Path, count: int, algorithm: Algorithm, workspace: Workspace, isolated: bool, **start: float
-    ):
+    def __init__(self, path: Path, count: int, algorithm: str, workspace: Workspace, isolated: bool, **start: float):
         system = System(stop_time=STOP, step=STEP, algorithm=algorithm)
         for k in range(count):
             system.add(f"lag{k}", str(path), x=(k + 1) / count, **start)
@@ -55,14 +53,8 @@ class Candidate:
 
     def run(self, steps: int) -> tuple[float, float]:
         """Seconds of wall time and of CPU time."""
-        recorder = Recorder(self.master.signals, self.master.kinds, None)
-
-        def observe(_: int, rows: Rows) -> bool:
-            recorder.extend(rows)
-            return True
-
         wall, cpu = time.perf_counter(), self._cpu()
-        self.master.run(self.done * STEP, STEP, steps, 1, observe)
+        self.master.run(self.done * STEP, STEP, steps, 1, lambda *_: True)
         self.done += steps
         return time.perf_counter() - wall, self._cpu() - cpu
 
@@ -81,7 +73,7 @@ def cpu_of(process: int) -> float:
     return int(file.read_text().split()[0]) * 1e-9 if file.exists() else 0.0
 
 
-def compare(path: Path, count: int, algorithm: Algorithm, steps: int, repetitions: int, **start: float) -> str:
+def compare(path: Path, count: int, algorithm: str, steps: int, repetitions: int, **start: float) -> str:
     """One row of the table."""
     with Workspace() as workspace:
         both = [Candidate(path, count, algorithm, workspace, isolated, **start) for isolated in (False, True)]
@@ -106,8 +98,10 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--steps", type=int, default=10_000, help="communication steps of a repetition")
     parser.add_argument("--repetitions", type=int, default=5)
+    parser.add_argument("--python", action="store_true", help="without the compiled loop")
     options = parser.parse_args()
-    compiled.kernel = None  # it does not take isolated instances: both go through the loop in Python
+    if options.python:
+        compiled.kernel = None
     own = build(f"{HERE / 'lag.py'}:Lag", {}, kind="native")
     print("| N | algorithm | wall, here | isolated | ratio | CPU, here | isolated | ratio | set-up s |")
     print("| --- | --- | --- | --- | --- | --- | --- | --- | --- |")

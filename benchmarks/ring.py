@@ -41,7 +41,7 @@ from railcosim.orchestrator.master import compiled
 from railcosim.orchestrator.master.loop import Master, Rows
 from railcosim.orchestrator.run.checking import check
 from railcosim.orchestrator.run.execution import run
-from railcosim.orchestrator.run.results import Recorder
+from railcosim.orchestrator.run.recording import Recorder
 from railcosim.orchestrator.system import System
 
 HERE = Path(__file__).parent

@@ -171,6 +171,7 @@ class Provenance:
         default_preset: the one that means the file as it stands.
         modified: whether anything was changed beyond file and preset, so that known values are not judged.
         command: the words after ``orchestrate run`` that give this system; empty where no options do: Python made it.
+        notes: what options have decided, for the user of a run.
         rescaled_from: the step in s before `--step` changed it: every sample time equal to it follows the step.
         notes: what a user should know of how it was read.
         origins: where things were written, for messages: by ``"train[1]"``, ``"train[1].speed"`` (a start value),
@@ -190,6 +191,7 @@ class Provenance:
     default_preset: str | None = field(default=None, compare=False)
     modified: bool = field(default=False, compare=False)
     command: tuple[str, ...] = field(default=(), compare=False)
+    notes: tuple[str, ...] = field(default=(), compare=False)
     rescaled_from: float | None = field(default=None, compare=False)
     name: str = field(default="system", compare=False)
     path: str = field(default="", compare=False)

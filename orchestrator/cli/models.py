@@ -201,12 +201,14 @@ def validate(
 
     Exit codes: 0 nothing failed; 1 something did; 2 the file is no FMU that could be used.
     """
+    from ..isolation import note_validation
     from ..validation import validate as validate_fmu
     from .documents import validate_document
     from .printing import open_console, show_compilations, show_report
 
     with show_compilations(quiet, doing=f"reading and trying {fmu}"):
         report = validate_fmu(fmu, timeout=timeout)
+    note_validation(Path(fmu), passed=report.passed)
     return Answer(
         lambda: validate_document(report),
         lambda: show_report(open_console(), report, quiet),

@@ -92,8 +92,8 @@ Isolate = Annotated[
         "--isolate",
         metavar="NAME",
         autocompletion=completing.instances,
-        help="Run an instance, a group such as 'train', or 'all' in processes of their own: a crash there ends no more "
-        "than the run.",
+        help="Run an instance, a group such as 'train', 'all', or, by 'auto', FMUs that this machine does not know in "
+        "processes of their own: a crash there ends no more than the run.",
     ),
 ]
 

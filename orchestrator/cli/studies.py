@@ -155,9 +155,10 @@ def study(
 
 def _isolating(system: System, names: list[str]) -> list[str]:
     """The settings that isolate instances; groups of them by their name, however many they are in a run."""
-    from ..isolation import ALL, isolate
+    from ..isolation import ALL, AUTO, isolate, strangers
 
     isolate(system, names)  # tells which are unknown
+    names = [*(name for name in names if name != AUTO), *(strangers(system) if AUTO in names else ())]
     groups = dict.fromkeys(SignalName(name).group for name in system.instances)
     return [f"{name}.isolate=true" for name in (groups if ALL in names else names)]
 

@@ -1,17 +1,29 @@
 from .channel import IsolatedChannel
-from .choice import ALL, check_isolation, check_once_per_process, instantiate, is_isolated, isolate, isolation_notes
+from .choice import (
+    ALL,
+    AUTO,
+    check_isolation,
+    check_once_per_process,
+    instantiate,
+    is_isolated,
+    isolate,
+    isolation_notes,
+)
 from .lanes import HAS_LANES
 from .launch import CRASHES, end_process, end_with_parent, signal_name, starting
 from .proxy import IsolatedSlave
 from .riding import Ride, may_ride
+from .strangers import become_known, note_validation, strangers
 
 __all__ = [
     "ALL",
+    "AUTO",
     "CRASHES",
     "HAS_LANES",
     "IsolatedChannel",
     "IsolatedSlave",
     "Ride",
+    "become_known",
     "check_isolation",
     "check_once_per_process",
     "end_process",
@@ -21,6 +33,8 @@ __all__ = [
     "isolate",
     "isolation_notes",
     "may_ride",
+    "note_validation",
     "signal_name",
     "starting",
+    "strangers",
 ]

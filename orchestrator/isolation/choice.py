@@ -12,8 +12,9 @@ from ..names import SignalName
 from ..problems import Problem, suggestion
 from ..system import Instance, System
 from .proxy import IsolatedSlave
+from .strangers import strangers
 
-ALL = "all"
+ALL, AUTO = "all", "auto"
 
 
 def is_isolated(model: Model, instance: Instance) -> bool:
@@ -49,16 +50,18 @@ def isolate(system: System, names: Iterable[str]) -> System:
 
     Args:
         system: it is not changed.
-        names: of instances, or of groups of them (``"train"`` for all of ``"train[1]"`` and so on); ``"all"`` for all.
+        names: of instances, or of groups of them (``"train"`` for all of ``"train[1]"`` and so on); ``"all"`` for all;
+            ``"auto"`` for those whose FMUs this machine does not know.
 
     Raises:
         ScenarioError: there is no such instance.
     """
-    groups: dict[str, list[str]] = {ALL: list(system.instances)}
+    wanted = list(names)
+    strange = strangers(system) if AUTO in wanted else []
+    groups: dict[str, list[str]] = {ALL: list(system.instances), AUTO: strange}
     for name in system.instances:
         groups.setdefault(SignalName(name).group, []).append(name)
     groups |= {name: [name] for name in system.instances}
-    wanted = list(names)
     unknown = [name for name in wanted if name not in groups]
     if unknown:
         none = "the system has no such instance"
@@ -67,7 +70,11 @@ def isolate(system: System, names: Iterable[str]) -> System:
     instances = {name: replace(x, isolate=x.isolate or name in chosen) for name, x in system.instances.items()}
     words = tuple(word for name in wanted for word in ("--isolate", name))
     command = system.provenance.command
-    return system.changed(instances=instances, command=command and (*command, *words))
+    changed = system.changed(instances=instances, command=command and (*command, *words))
+    if strange:
+        told = f"in processes of their own, because this machine does not know their FMUs: {', '.join(strange)}"
+        changed.provenance = replace(changed.provenance, notes=(*changed.provenance.notes, told))
+    return changed
 
 
 def check_isolation(system: System) -> list[Problem]:
@@ -104,4 +111,5 @@ def check_once_per_process(system: System, interfaces: Mapping[str, Interface]) 
 def isolation_notes(system: System, models: Mapping[str, Model]) -> list[str]:
     """What a user should know of it."""
     plain = [name for name, x in system.instances.items() if x.isolate and not is_isolated(models[name], x)]
-    return [f"not isolated, because plain components run in this process: {', '.join(plain)}"] if plain else []
+    told = [f"not isolated, because plain components run in this process: {', '.join(plain)}"] if plain else []
+    return [*system.provenance.notes, *told]

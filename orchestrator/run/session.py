@@ -15,6 +15,7 @@ from ..errors import RollbackError, RunError, StoppedError
 from ..evaluation import Signals
 from ..fmi import Interface, Kind, Slave
 from ..fmi.guard import run_guarded
+from ..isolation import become_known
 from ..master import ALGORITHMS, Master, Rows
 from ..times import slack
 from . import record as record_file
@@ -186,6 +187,8 @@ class Session:
                 told = f"{names} discards steps, and is restored before it goes on: the run was begun anew for that"
                 self.coupling["rollback"] = {"instances": list(self._restoring), "summary": told}
         master.terminate()
+        if self.status == "completed":
+            become_known(self.checked.models.values())
 
     def disturbances(self) -> list[str]:
         """What FMUs have done to the process, a sentence each."""

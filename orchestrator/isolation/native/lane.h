@@ -34,21 +34,26 @@ typedef struct {
     double length;
 } Entry;
 
-/* In the shared memory: each side writes into a line of the cache of its own. */
+/* What one side writes, into a line of the cache of its own. */
 typedef struct {
-    atomic_uint posted; /* entries so far, by the master */
-    atomic_uint master_sleeps;
-    char apart[64 - 2 * sizeof(atomic_uint)];
-    atomic_uint done; /* and those that the host has come to the end of */
-    atomic_uint host_sleeps;
-    char apart_too[64 - 2 * sizeof(atomic_uint)];
+    atomic_uint count; /* of the entries that the master has posted, or the host has come to the end of */
+    atomic_uint sleeps;
+    atomic_int core; /* on which it was seen to run last */
+    char apart[64 - 3 * sizeof(atomic_uint)];
+} Side;
+
+/* In the shared memory. */
+typedef struct {
+    Side master;
+    Side host;
     Entry entries[RING];
 } Lane;
 
 /* Words of 64 bits at the head of an instance's memory: see messages.py. */
 enum { NOTE_CALL = 0, NOTE_FAILED = 4, NOTE_STATUS = 5 };
 
-/* How long somebody watches before it sleeps: as long as it may where the last wait was a short one, else hardly. */
+/* How long somebody watches before it sleeps: as long as it may where the last wait was a short one, else hardly; and not at
+   all where the other needs the same core. */
 typedef struct {
     int64_t most; /* ns */
     int64_t now;
@@ -56,11 +61,11 @@ typedef struct {
 
 #pragma GCC visibility push(hidden)
 
-/* Wait until a count of the other side's is another than `old`; 0 if it still is after so many ns. */
-int lane_wait(atomic_uint *count, unsigned old, atomic_uint *sleeps, Spin *spin, int64_t most);
+/* Wait until the count of the other side is another than `old`; 0 if it still is after so many ns. */
+int lane_wait(Side *mine, Side *other, unsigned old, Spin *spin, int64_t most);
 
-/* Raise a count, and wake the other if it sleeps. */
-void lane_count(atomic_uint *count, unsigned value, atomic_uint *sleeps);
+/* Change one's count, and wake the other if it sleeps. */
+void lane_count(Side *mine, const Side *other, unsigned count);
 
 #pragma GCC visibility pop
 

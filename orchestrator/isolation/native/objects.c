@@ -80,7 +80,7 @@ static PyObject *wait_for_all(PyObject *self, PyObject *arguments)
     }
     if (road->lane != NULL) {
         Py_BEGIN_ALLOW_THREADS
-        how = await(road, atomic_load(&road->lane->posted), (int64_t)(most * 1e9));
+        how = await(road, atomic_load(&road->lane->master.count), (int64_t)(most * 1e9));
         Py_END_ALLOW_THREADS
     }
     return PyLong_FromLong(how);
@@ -154,7 +154,7 @@ static PyObject *add(PyObject *self, PyObject *arguments)
     if (seat == NULL) {
         return PyErr_NoMemory();
     }
-    *seat = (Seat){rider, rider->operations++, atomic_load(&rider->road->lane->posted), offset,
+    *seat = (Seat){rider, rider->operations++, atomic_load(&rider->road->lane->master.count), offset,
                    rider->seats};
     rider->seats = seat;
     rider->gives |= kind == GET_REALS || kind == GET_INTEGERS;

@@ -15,7 +15,7 @@ enum { SLICE = 10 * 1000 * 1000 }; /* ns between two looks at the line to the pr
 
 static int is_done(const Lane *lane, uint32_t ticket, uint32_t *seen)
 {
-    *seen = atomic_load_explicit(&((Lane *)lane)->done, memory_order_acquire);
+    *seen = atomic_load_explicit(&((Lane *)lane)->host.count, memory_order_acquire);
     return (int32_t)(*seen - ticket) >= 0;
 }
 
@@ -23,11 +23,11 @@ int await(LaneObject *road, uint32_t ticket, int64_t most)
 {
     uint32_t seen;
     if (!is_done(road->lane, ticket, &seen)) { /* it may have been posted without waking the host */
-        lane_count(&road->lane->posted, atomic_load(&road->lane->posted), &road->lane->host_sleeps);
+        lane_count(&road->lane->master, &road->lane->host, atomic_load(&road->lane->master.count));
     }
     while (!is_done(road->lane, ticket, &seen)) {
         int64_t slice = most < SLICE ? most : SLICE;
-        if (lane_wait(&road->lane->done, seen, &road->lane->master_sleeps, &road->spin, slice)) {
+        if (lane_wait(&road->lane->master, &road->lane->host, seen, &road->spin, slice)) {
             continue;
         }
         struct pollfd line = {.fd = road->line};
@@ -45,16 +45,16 @@ int await(LaneObject *road, uint32_t ticket, int64_t most)
 int post(LaneObject *road, Entry entry, int wakes, uint32_t *ticket)
 {
     Lane *lane = road->lane;
-    uint32_t count = atomic_load_explicit(&lane->posted, memory_order_relaxed);
+    uint32_t count = atomic_load_explicit(&lane->master.count, memory_order_relaxed);
     if (await(road, count - (RING - 1), road->moment) != CAME) {
         return 0;
     }
     lane->entries[count % RING] = entry;
     *ticket = count + 1;
     if (wakes) {
-        lane_count(&lane->posted, count + 1, &lane->host_sleeps);
+        lane_count(&lane->master, &lane->host, count + 1);
     } else {
-        atomic_store_explicit(&lane->posted, count + 1, memory_order_release);
+        atomic_store_explicit(&lane->master.count, count + 1, memory_order_release);
     }
     return 1;
 }

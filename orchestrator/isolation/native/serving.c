@@ -127,19 +127,19 @@ static void take_entry(const Service *service, const Entry *entry)
 static void ride(Service *service)
 {
     Lane *lane = service->lane;
-    unsigned done = atomic_load(&lane->done);
+    unsigned done = atomic_load(&lane->host.count);
     is_a_copy = 0; /* the guard's, if any */
     service->control = float_control();
     fegetenv(&service->floats);
     for (int is_over = 0; !is_over; done++) {
-        while (!lane_wait(&lane->posted, done, &lane->host_sleeps, &service->spin, INT64_MAX)) {
+        while (!lane_wait(&lane->host, &lane->master, done, &service->spin, INT64_MAX)) {
         }
         Entry entry = lane->entries[done % RING];
         is_over = entry.what == LEAVE;
         if (!is_over) {
             take_entry(service, &entry);
         }
-        lane_count(&lane->done, done + 1, &lane->master_sleeps);
+        lane_count(&lane->host, &lane->master, done + 1);
     }
 }
 
