@@ -30,11 +30,14 @@ from pathlib import Path
 ROOT = Path(__file__).parents[1]
 DATA = ROOT / "build" / "coverage"
 GRANTED = ROOT / "tests" / "uncovered.txt"
-KERNEL = [ROOT / "orchestrator" / "master" / "native" / name for name in ("kernel.c", "plan.c", "stepping.c", "team.c")]
+KERNEL = [
+    ROOT / "orchestrator" / "master" / "native" / name
+    for name in ("fmi3.c", "kernel.c", "plan.c", "stepping.c", "team.c")
+]
 RUNTIME = sorted((ROOT / "fmus" / "runtime").glob("*.c"))
 LOOP_TESTS = [
-    *(f"tests/orchestrator/master/{name}.py" for name in ("test_compiled", "test_compiled_blocks", "test_kernel")),
-    "tests/orchestrator/master/test_threads.py",
+    *(f"tests/orchestrator/master/test_compiled{name}.py" for name in ("", "_blocks", "_fmi3")),
+    *("tests/orchestrator/master/test_kernel.py", "tests/orchestrator/master/test_threads.py"),
     *("tests/orchestrator/master/test_event_loops.py", "tests/orchestrator/fmi/test_foreign.py"),
 ]
 RUNTIME_TESTS = ["tests/fmus/runtime"]

@@ -67,7 +67,7 @@ def _without_threads(system: System, models: Mapping[str, Model]) -> dict[str, l
         "these run Python, one thread at a time": python if len(files) - len(python) < 2 else [],
         "these run in processes of their own": [name for name in files if system.instances[name].isolate],
         "these give texts": [n for n, face in files.items() if any(v.type == "String" for v in face.of("output"))],
-        "these are FMUs of another version than 2.0": [n for n, face in files.items() if face.version != "2.0"],
+        "these are FMUs of FMI 1.0": [n for n, face in files.items() if face.version == "1.0"],
     }
 
 

@@ -7,6 +7,7 @@ signals), steps are taken in Python with identical results.
 from __future__ import annotations
 
 from collections.abc import Sequence
+from ctypes import addressof
 from functools import reduce
 
 import numpy as np
@@ -14,12 +15,13 @@ from numpy.typing import NDArray
 
 from .. import world
 from ..fmi import Channel, Slave
-from ..fmi.binding import FmuChannel, FmuSlave, is_watched
+from ..fmi.binding import ElementsChannel, Fmi3Slave, FmuSlave, is_watched
 from ..fmi.guard import GUARD, NOTE_SIZE, NOTES, own_note, said
 from ..isolation import IsolatedChannel, IsolatedSlave, Ride, may_ride
 from .algorithms import Explicit, Operation
 from .coupling import Coupling
 from .exchange import Change, Exchange
+from .flattening import TYPES, Wide, can_exchange, parts_of
 from .observer import Observer, Table
 
 try:
@@ -34,6 +36,8 @@ _CHANGE = 3
 _AS_IT_IS, _TRUE_ABOVE, _ROUNDED_UP = 0, 1, 2
 """The kernel's numbers for what a threshold does."""
 _DISCARD = 2
+_NONE = 2**32 - 1
+"""What stands where there is no value reference, so that lists of other lengths are others."""
 _BLOCK_SECONDS = 0.05
 """Wall time a block is meant to take: short enough for Ctrl-C and a progress bar, long enough to cost nothing."""
 _GROWTH = 256
@@ -41,8 +45,11 @@ _GROWTH = 256
 _MOST_VALUES = 4_000_000
 """Numbers a block may record, so that its buffer stays small."""
 
-_CHANNEL = np.dtype([("function", "u8"), ("component", "u8"), ("begin", "i8"), ("count", "i8"), ("is_real", "i8")])
-_INSTANCE = np.dtype([("function", "u8"), ("component", "u8")])
+_CHANNEL = np.dtype(
+    [(name, "u8") for name in ("function", "component")]
+    + [(name, "i8") for name in ("begin", "count", "is_real", "type", "reference_count")]
+)
+_INSTANCE = np.dtype([("function", "u8"), ("component", "u8"), ("told", "u8")])
 _ENTRY = np.dtype(
     [
         ("place", "i8"),
@@ -52,6 +59,7 @@ _ENTRY = np.dtype(
         ("offset", "f8"),
         ("whole", "i8"),
         ("threshold", "f8"),
+        ("form", "i8"),
     ]
 )
 _CHANGES = np.dtype(
@@ -61,7 +69,7 @@ _OPERATION = np.dtype([(name, "i4") for name in ("kind", "index", "period", "pha
 _PLACE = np.dtype([(name, "i8") for name in ("begin", "failed", "status")])
 
 _OWN = [each.itemsize for each in (_OPERATION, _CHANNEL, _INSTANCE, _ENTRY, _CHANGES, _PLACE)]
-_SIZES = (_OWN[0], 8, *_OWN[1:4], 4, _OWN[4], 8, 8, 8, 8, _OWN[5], 8)
+_SIZES = (_OWN[0], 8, *_OWN[1:4], 4, 8, _OWN[4], 8, 8, 8, 8, _OWN[5], 8)
 """Of what the kernel's buffers hold, in bytes, in the order in which it takes them."""
 
 
@@ -79,7 +87,8 @@ if HAS_KERNEL:
     if GUARD:
         kernel.watch(GUARD)
 
-_Entry = tuple[int, int, int, float, float, int, float]
+_Entry = tuple[int, int, int, float, float, int, float, int]
+_Called = FmuSlave | Fmi3Slave | Ride
 
 
 class CompiledLoop:
@@ -91,20 +100,22 @@ class CompiledLoop:
         able = kernel is not None and all(_can_be_called(x, coupling.exchange) for x in coupling.slaves.values())
         mapped = any(link.mapping is not None for link in coupling.exchange.links)
         held = not coupling.settings.stepping.extrapolation and coupling.loops is None and coupling.refresher is None
-        able = able and held and not mapped and "String" not in coupling.exchange.kinds
+        able = able and held and not mapped and can_exchange(coupling.exchange)
         return cls(coupling, algorithm) if able else None
 
     def __init__(self, coupling: Coupling, algorithm: Explicit) -> None:
         self._coupling = coupling
         self._exchange = coupling.exchange
+        self._wide = Wide(coupling.exchange)
         self._under_way: tuple[Table, Observer, float, float] | None = None
         self._note = 0
-        self._channels: list[tuple[int, int, int, int, int]] = []
+        self._channels: list[tuple[int, ...]] = []
+        self._arrays: list[ElementsChannel] = []
         self._entries: list[_Entry] = []
         self._references: list[int] = []
         self._operations: list[tuple[int, int, int, int]] = []
-        self._culprits: list[tuple[FmuSlave | Ride | None, str]] = []
-        self._instances: list[tuple[int, int]] = []
+        self._culprits: list[tuple[_Called | None, str]] = []
+        self._instances: list[tuple[int, int, int]] = []
         self._changes: list[tuple[Change, int, bool]] = []
         self._slaves = {name: _called(slave) for name, slave in coupling.slaves.items()}
         self._rides = [slave for slave in self._slaves.values() if isinstance(slave, Ride)]
@@ -130,6 +141,7 @@ class CompiledLoop:
             np.array(self._instances, dtype=_INSTANCE),
             np.array(self._entries, dtype=_ENTRY),
             np.array(self._references, dtype=np.uint32),
+            self._wide.forms,
         )
 
     def _add(self, names: Sequence[str], operations: Sequence[Operation]) -> None:
@@ -142,13 +154,11 @@ class CompiledLoop:
         """Where an operation of several that failed would stand without threads: all are set before any steps."""
         return self._operations[operation][0] != Operation.SET, operation
 
-    def _add_operation(
-        self, kind: int, index: int, culprit: tuple[FmuSlave | Ride | None, str], due: tuple[int, int]
-    ) -> None:
+    def _add_operation(self, kind: int, index: int, culprit: tuple[_Called | None, str], due: tuple[int, int]) -> None:
         self._operations.append((kind, index, *due))
         self._culprits.append(culprit)
 
-    def _add_sets(self, slave: FmuSlave | Ride, rate: int) -> None:
+    def _add_sets(self, slave: _Called, rate: int) -> None:
         for feed in self._exchange.feeds[slave.name]:
             entries = []
             for k, source in enumerate(feed.sources):
@@ -157,15 +167,16 @@ class CompiledLoop:
                 whole = _AS_IT_IS if threshold is None else _TRUE_ABOVE if feed.kind == "Boolean" else _ROUNDED_UP
                 change = -1 if slot is None else self._add_change(slot, -1, feed.is_real)
                 place = (source, -1 if age is None else age, change)
-                entries.append((*place, feed.scales[k], feed.offsets[k], whole, threshold or 0.0))
-            self._add_channel(Operation.SET, slave, feed.channel, entries, feed.is_real, due=(rate, 0))
+                changed = feed.scales[k], feed.offsets[k], whole, threshold or 0.0
+                entries.append((*place, *changed, self._wide.form(source)))
+            self._add_channels(Operation.SET, slave, feed.channel, entries, feed.is_real, due=(rate, 0))
 
-    def _add_gets(self, slave: FmuSlave | Ride, rate: int) -> None:
+    def _add_gets(self, slave: _Called, rate: int) -> None:
         for part in self._exchange.yields[slave.name]:
             due = (rate, 0 if part.direct else rate - 1)
             whole = _TRUE_ABOVE if part.kind == "Boolean" else _AS_IT_IS
-            entries = [(place, -1, -1, 1.0, 0.0, whole, 0.0) for place in range(part.begin, part.end)]
-            self._add_channel(Operation.GET, slave, part.channel, entries, part.is_real, due=due)
+            entries = [(place, -1, -1, 1.0, 0.0, whole, 0.0, 0) for place in range(part.begin, part.end)]
+            self._add_channels(Operation.GET, slave, part.channel, entries, part.is_real, due=due)
             for place, change in self._exchange.output_changes.items():
                 if part.begin <= place < part.end:
                     index = self._add_change(change, place, part.is_real)
@@ -175,31 +186,36 @@ class CompiledLoop:
         self._changes.append((change, place, is_real))
         return len(self._changes) - 1
 
-    def _add_channel(
+    def _add_channels(
         self,
         kind: int,
-        slave: FmuSlave | Ride,
+        slave: _Called,
         channel: Channel,
-        entries: list[_Entry],
+        entries: Sequence[_Entry],
         is_real: bool,
         *,
         due: tuple[int, int],
     ) -> None:
-        assert isinstance(channel, FmuChannel | IsolatedChannel)
-        call = channel.calls[kind == Operation.GET]
-        self._add_operation(kind, len(self._channels), (slave, call), due)
-        if isinstance(slave, Ride):
-            assert isinstance(channel, IsolatedChannel)
-            addresses = slave.add(channel, is_get=kind == Operation.GET)
-        else:
-            addresses = slave.addresses(call)
-        self._channels.append((*addresses, len(self._entries), len(entries), int(is_real)))
-        self._entries += entries
-        self._references += channel.references
+        if isinstance(channel, ElementsChannel):
+            self._arrays.append(channel)
+        for own, places in parts_of(channel) or ():
+            call = own.calls[kind == Operation.GET]
+            self._add_operation(kind, len(self._channels), (slave, call), due)
+            if isinstance(slave, Ride):
+                assert isinstance(own, IsolatedChannel)
+                addresses = slave.add(own, is_get=kind == Operation.GET)
+            else:
+                addresses = slave.addresses(call)
+            what = len(self._entries), len(places), int(is_real), TYPES.get(own.kind, 0) * isinstance(slave, Fmi3Slave)
+            self._channels.append((*addresses, *what, len(own.references)))
+            self._entries += [entries[k] for k in places]
+            self._references += [*own.references, *[_NONE] * (len(places) - len(own.references))]
 
-    def _add_step(self, slave: FmuSlave | Ride, rate: int) -> None:
-        self._add_operation(Operation.STEP, len(self._instances), (slave, "fmi2DoStep"), (rate, 0))
-        self._instances.append(slave.add_step() if isinstance(slave, Ride) else slave.addresses("fmi2DoStep"))
+    def _add_step(self, slave: _Called, rate: int) -> None:
+        call = FmuSlave.DO_STEP if isinstance(slave, Ride) else slave.DO_STEP
+        self._add_operation(Operation.STEP, len(self._instances), (slave, call), (rate, 0))
+        addresses = slave.add_step() if isinstance(slave, Ride) else slave.addresses(call)
+        self._instances.append((*addresses, addressof(slave.told) if isinstance(slave, Fmi3Slave) else 0))
 
     def run(
         self,
@@ -230,7 +246,7 @@ class CompiledLoop:
         places = np.zeros(self.threads, _PLACE)
         places["failed"] = -1
         disturbed = np.zeros(len(self._operations), np.int64)
-        values = np.array(exchange.values, dtype=np.float64)
+        values = self._wide.packed(exchange.values)
         history, newest = self._unrolled(len(values))
         changes = np.array(
             [
@@ -259,7 +275,7 @@ class CompiledLoop:
             done += taken
             self._tell_disturbers(disturbed, done, places)
             coupling.steps, coupling.time = done, start_time + done * step
-            exchange.values[:] = values.tolist()
+            exchange.values[:] = self._wide.unpacked(values)
             for place in self._whole:  # the kernel's values are all doubles
                 exchange.values[place] = int(exchange.values[place])
             if taken:
@@ -270,6 +286,8 @@ class CompiledLoop:
             block = max(1, int(taken * min(_BLOCK_SECONDS / max(seconds, 1e-9), _GROWTH)))
         for slave in coupling.slaves.values():
             slave.time = start_time + done * step
+        for array in self._arrays:
+            array.forget()
         return goes_on
 
     def rescue(self) -> None:
@@ -301,11 +319,12 @@ class CompiledLoop:
         """The recorded points that delayed connections look back on, as the kernel's ring, and its newest row."""
         kept = list(self._exchange.history)
         rows = [*[kept[0]] * (self._exchange.depth - len(kept)), *kept] if kept else []
-        return np.array(rows, dtype=np.float64).reshape(len(rows), width), max(0, len(rows) - 1)
+        packed = np.array([self._wide.packed(row) for row in rows], dtype=np.float64)
+        return packed.reshape(len(rows), width), max(0, len(rows) - 1)
 
     def _roll(self, history: NDArray[np.float64], newest: int) -> None:
         if len(history):
-            self._exchange.history.extend(np.roll(history, -newest - 1, axis=0).tolist())
+            self._exchange.history.extend(map(self._wide.unpacked, np.roll(history, -newest - 1, axis=0)))
 
     def _go_on(self, places: NDArray[np.void], time: float, step: float) -> None:
         """After the first failure of a step let its part of the step go on; those after it wait for their turn."""
@@ -323,18 +342,18 @@ class CompiledLoop:
         slave, call = self._culprits[failed]
         assert slave is not None
         period, phase = self._operations[failed][2:]
-        when = time + (period - phase) * step if call.startswith("fmi2Get") else time
+        when = time + (period - phase) * step if "Get" in call else time
         if isinstance(slave, Ride):
             if not 0 <= status <= 1:
                 return slave.recover(call, status, when)
-        elif call == "fmi2DoStep" and status == _DISCARD:
+        elif call == slave.DO_STEP and 0 <= status <= _DISCARD:  # it was discarded, or ended early
             slave.resume(time, period * step, status, final=True)
             return False
         owner = self._coupling.slaves[slave.name]
         owner.time = when
-        if call.startswith("fmi2Set") and 0 <= status <= 1:  # a number that C's int does not hold
+        if "Set" in call and 0 <= status <= 1:  # a number that its type does not hold
             self._exchange.write(slave.name, time)
-        if status >> 32 > 0 and isinstance(slave, FmuSlave):  # a call that was left, how, and with which exit code
+        if status >> 32 > 0 and not isinstance(slave, Ride):  # a call that was left, how, and with which exit code
             raise slave.lose(said(call, status >> 32, (status & 0x7FFFFFFF) - (status & 0x80000000)))
         slave.check(call, status)
         self._exchange.check_finite(owner)
@@ -346,14 +365,14 @@ def _can_be_called(slave: Slave, exchange: Exchange) -> bool:
     if isinstance(slave, IsolatedSlave):
         given = [part.channel for part in exchange.yields[slave.name]]
         return may_ride(slave, [*(feed.channel for feed in exchange.feeds[slave.name]), *given])
-    return isinstance(slave, FmuSlave) and not slave.rolls_back
+    return isinstance(slave, FmuSlave | Fmi3Slave) and not slave.rolls_back
 
 
-def _called(slave: Slave) -> FmuSlave | Ride:
+def _called(slave: Slave) -> _Called:
     """What the kernel calls."""
     if isinstance(slave, IsolatedSlave):
         return slave.ride()
-    assert isinstance(slave, FmuSlave)
+    assert isinstance(slave, FmuSlave | Fmi3Slave)
     return slave
 
 

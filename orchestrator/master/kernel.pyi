@@ -11,6 +11,7 @@ def run(
     instances: Any,
     entries: Any,
     references: Any,
+    forms: Any,
     changes: Any,
     kept: Any,
     values: Any,

@@ -1,5 +1,7 @@
-from .channel import FmuChannel
+from .arrays import ElementsChannel
+from .channel import FmuChannel, MixedChannel
 from .fmi2 import FmuSlave
+from .fmi3 import Fmi3Slave
 from .interfaces import plain_interface, read_interface
 from .libraries import forget_paths, library, names_of_platform
 from .loaded import LoadedSlave
@@ -8,9 +10,12 @@ from .watch import Watch, is_watched
 
 __all__ = [
     "SLAVES",
+    "ElementsChannel",
+    "Fmi3Slave",
     "FmuChannel",
     "FmuSlave",
     "LoadedSlave",
+    "MixedChannel",
     "Watch",
     "call_name",
     "forget_paths",

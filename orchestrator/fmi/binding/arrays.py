@@ -51,21 +51,30 @@ class ElementsChannel:
     def __init__(
         self, channel: Channel, whole: Sequence[str], names: Sequence[str], given: dict[str, Any], interface: Interface
     ) -> None:
-        self._channel, self._names, self._given = channel, names, given
+        self.channel, self._names, self._given = channel, names, given
         rank = {name: k for k, name in enumerate(whole)}
         self._places = [rank[name] for name in names]
         variables = (interface.variables[name] for name in whole)
         self._starts = {v.name: v.start for v in variables}
+
+    @property
+    def is_whole(self) -> bool:
+        """Whether they are whole arrays, in the order of their elements."""
+        return self._places == list(range(len(self._starts)))
+
+    def forget(self) -> None:
+        """They were set past this channel: what a part of an array is beside, the FMU has to say."""
+        self._given.update(dict.fromkeys(self._names))
 
     def set(self, values: Sequence[Any]) -> None:
         """Set all of them."""
         self._given.update(zip(self._names, values, strict=True))
         every = [self._given.get(name, start) for name, start in self._starts.items()]
         if None in every:
-            every = [own if value is None else value for value, own in zip(every, self._channel.get(), strict=True)]
-        self._channel.set(every)
+            every = [own if value is None else value for value, own in zip(every, self.channel.get(), strict=True)]
+        self.channel.set(every)
 
     def get(self) -> list[Any]:
         """Read all of them."""
-        values = self._channel.get()
+        values = self.channel.get()
         return [values[k] for k in self._places]

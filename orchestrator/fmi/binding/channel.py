@@ -54,7 +54,7 @@ class FmuChannel:
     def __init__(self, slave: Owner, kind: str, names: Sequence[str]) -> None:
         suffix, c_type = slave.TYPES[kind]
         count = len(names)
-        self._slave, self._kind, self._names = slave, kind, names
+        self._slave, self.kind, self.names = slave, kind, names
         self.calls = f"{slave.SET}{suffix}", f"{slave.GET}{suffix}"
         self._set, self._get = (slave.functions.get(call) for call in self.calls)
         self._values = (c_type * count)()
@@ -80,9 +80,9 @@ class FmuChannel:
 
     def _check_limits(self, values: Sequence[Any], low: int, high: int) -> None:
         """C would take what does not fit for another number."""
-        for name, value in zip(self._names, values, strict=True):
+        for name, value in zip(self.names, values, strict=True):
             if not low <= value <= high:
-                what = f"{name!r} cannot become {value}: its type {self._kind} holds {low} to {high}"
+                what = f"{name!r} cannot become {value}: its type {self.kind} holds {low} to {high}"
                 raise FmuError(what, instance=self._slave.name, time=self._slave.time)
 
     def get(self) -> list[Any]:
@@ -102,17 +102,17 @@ class MixedChannel:
     """Variables of one type of ours that are of several types in the FMU."""
 
     def __init__(self, parts: Sequence[tuple[Channel, Sequence[int]]], count: int) -> None:
-        self._parts, self._count = parts, count
+        self.parts, self._count = parts, count
 
     def set(self, values: Sequence[Any]) -> None:
         """Set all of them."""
-        for channel, places in self._parts:
+        for channel, places in self.parts:
             channel.set([values[k] for k in places])
 
     def get(self) -> list[Any]:
         """Read all of them."""
         found: list[Any] = [None] * self._count
-        for channel, places in self._parts:
+        for channel, places in self.parts:
             for place, value in zip(places, channel.get(), strict=True):
                 found[place] = value
         return found

@@ -84,6 +84,12 @@ _TYPES: dict[str, tuple[str, Any]] = {
 }
 
 
+class Told(ctypes.Structure):
+    """How a step went, beside its status; the compiled loop writes it as well."""
+
+    _fields_ = (("waits", c_bool), ("ends", c_bool), ("early", c_bool), ("reached", c_double))
+
+
 class Fmi3Slave(LoadedSlave):
     """An FMI 3.0 FMU loaded into this process."""
 
@@ -102,9 +108,9 @@ class Fmi3Slave(LoadedSlave):
 
     def _instantiate(self, folder: Path) -> int | None:
         # What fmi3DoStep tells beside its status; the first, that an event waits to be handled, is for the event mode.
-        self._told = c_bool(), c_bool(), c_bool(), c_double()
-        self._waits, self._ends, self._is_early, self._came_to = self._told
-        self._telling = tuple(ctypes.byref(each) for each in self._told)
+        self.told = Told()
+        places = (getattr(Told, name).offset for name, _ in Told._fields_)
+        self._telling = tuple(ctypes.byref(self.told, place) for place in places)
         resources = folder / "resources"
         place = f"{resources}{os.sep}".encode() if resources.is_dir() else None
         name, token = self.name.encode(), self.interface.guid.encode()
@@ -126,7 +132,7 @@ class Fmi3Slave(LoadedSlave):
 
     def enter_initialization(self) -> None:
         """Enter initialization mode; what the last step of another run told is no more."""
-        self._waits.value = False
+        self.told.waits = False
         self.call_once("fmi3EnterInitializationMode", False, 0.0, self._span[0], *self._end())
 
     def exit_initialization(self) -> None:
@@ -139,10 +145,10 @@ class Fmi3Slave(LoadedSlave):
         """Event mode -> step mode."""
         needed, others, until = c_bool(True), (c_bool * 3)(), c_double()
         places = [ctypes.byref(others, k * ctypes.sizeof(c_bool)) for k in range(len(others))]
-        told = ctypes.byref(needed), ctypes.byref(self._ends), *places, ctypes.byref(until)
+        told = ctypes.byref(needed), self._telling[1], *places, ctypes.byref(until)
         for _ in range(_MOST_UPDATES):
             self.call("fmi3UpdateDiscreteStates", *told)
-            if self._ends.value:
+            if self.told.ends:
                 return
             if not needed.value:
                 break
@@ -154,22 +160,22 @@ class Fmi3Slave(LoadedSlave):
         pass  # entering initialization mode says it all
 
     def _attempt(self, time: float, part: float, final: bool, *, again: bool) -> int:
-        self._ends.value = self._is_early.value = False
-        self._came_to.value = math.nan
+        self.told.ends = self.told.early = False
+        self.told.reached = math.nan
         status = int(self._do_step(self.pointer, time, part, final, *self._telling))
-        if self._events and status in (OK, WARNING) and self._waits.value and not self._ends.value:
+        if self._events and status in (OK, WARNING) and self.told.waits and not self.told.ends:
             self.call("fmi3EnterEventMode")
             self._leave_events()
         return status
 
     def _is_cut_short(self) -> bool:
-        return self._ends.value or self._is_early.value
+        return bool(self.told.ends or self.told.early)
 
     def _last_successful_time(self) -> float | None:
-        return self._came_to.value if math.isfinite(self._came_to.value) else None
+        return float(self.told.reached) if math.isfinite(self.told.reached) else None
 
     def _stops(self, status: int) -> bool:
-        return status in (OK, WARNING, DISCARD) and self._ends.value
+        return status in (OK, WARNING, DISCARD) and bool(self.told.ends)
 
     def directional_derivatives(
         self, unknowns: Sequence[str], knowns: Sequence[str], seed: Sequence[float]

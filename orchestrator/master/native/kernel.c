@@ -84,8 +84,8 @@ static PyObject *run(PyObject *module, PyObject *arguments)
     Py_ssize_t newest, row;
     PyObject *result = NULL;
     (void)module;
-    if (!PyArg_ParseTuple(arguments, "y*y*y*y*y*y*y*y*w*w*nw*nw*w*LddLLL:run", &b[OPERATIONS], &b[PARTS], &b[CHANNELS],
-                          &b[INSTANCES], &b[ENTRIES], &b[REFERENCES], &b[CHANGES], &b[KEPT], &b[VALUES], &b[HISTORY],
+    if (!PyArg_ParseTuple(arguments, "y*y*y*y*y*y*y*y*y*w*w*nw*nw*w*LddLLL:run", &b[OPERATIONS], &b[PARTS], &b[CHANNELS],
+                          &b[INSTANCES], &b[ENTRIES], &b[REFERENCES], &b[FORMS], &b[CHANGES], &b[KEPT], &b[VALUES], &b[HISTORY],
                           &newest, &b[TABLE], &row, &b[PLACES], &b[DISTURBED], &block.every, &block.start, &block.step,
                           &block.first, &block.count, &block.last)) {
         return NULL;

@@ -19,6 +19,27 @@ enum { OPERATION_SET = 0, OPERATION_STEP = 1, OPERATION_GET = 2, OPERATION_CHANG
 
 enum { AS_IT_IS = 0, TRUE_ABOVE = 1, ROUNDED_UP = 2 };
 
+/* What a value is among the others: a number, or the bits of a whole number of 64 bits. */
+enum { NUMBER = 0, SIGNED_BITS = 1, UNSIGNED_BITS = 2 };
+
+typedef union {
+    double number;
+    int64_t whole;
+    uint64_t natural;
+} Cell;
+
+/* The types of FMI 3.0; 0 is that of a channel of FMI 2.0. */
+enum {
+    TYPE_FLOAT64 = 1, TYPE_FLOAT32 = 2, TYPE_INT8 = 3, TYPE_UINT8 = 4, TYPE_INT16 = 5, TYPE_UINT16 = 6, TYPE_INT32 = 7, TYPE_UINT32 = 8, TYPE_INT64 = 9, TYPE_UINT64 = 10,
+    TYPE_BOOLEAN = 11,
+};
+
+/* How a step of FMI 3.0 went, beside its status; Python reads it (`Told` in fmi3.py). */
+typedef struct {
+    uint8_t waits, ends, early; /* C's bool, of which an FMU may set any bit */
+    double reached;
+} Told;
+
 /* ------------------------------------------------------------------------------------- the plan, as Python writes it */
 
 typedef struct {
@@ -27,11 +48,14 @@ typedef struct {
     int64_t begin;      /* first of its entries */
     int64_t count;      /* number of its entries */
     int64_t is_real;
+    int64_t type;            /* of FMI 3.0, or 0 */
+    int64_t reference_count; /* of FMI 3.0: an array has one for all its elements; what is left of `count` is no reference */
 } Channel;
 
 typedef struct {
-    uint64_t function; /* address of fmi2DoStep */
+    uint64_t function; /* address of fmi2DoStep, or of fmi3DoStep */
     uint64_t component;
+    uint64_t told; /* address of what fmi3DoStep tells; 0: it is fmi2DoStep */
 } Instance;
 
 typedef struct {
@@ -42,6 +66,7 @@ typedef struct {
     double offset;
     int64_t whole; /* what the threshold makes of it: of a truth value read, 1 or 0 */
     double threshold;
+    int64_t form; /* of the value that it reads */
 } Entry;
 
 /* What an event makes of a value, while it is active; `place` is that of an output. */
@@ -68,19 +93,22 @@ typedef struct {
 typedef struct {
     int64_t begin;  /* operation to go on with */
     int64_t failed; /* the one that failed, or -1 */
-    int64_t status; /* of its call; ok or warning: a value is not finite, or none that C's int holds */
+    int64_t status; /* of its call; ok or warning: a value is not finite, or none that the type holds, or a step is not over */
 } Place;
 
 /* ------------------------------------------------------------------------------------------------ the plan, as it runs */
 
-typedef enum { STEP, SET_REALS_IN_PLACE, SET_REALS, SET_INTEGERS, GET_REALS, GET_INTEGERS, CHANGE } Kind;
+typedef enum { STEP, SET_REALS_IN_PLACE, SET_REALS, SET_INTEGERS, GET_REALS, GET_INTEGERS, CHANGE, STEP_3, SET_3, GET_3 } Kind;
 
 /* One operation. */
 typedef struct {
     void *component;
     double *values;       /* where they are read or written in place */
     const Entry *entries; /* where they are gathered from */
-    const Change *change;
+    union {
+        const Change *change;
+        Told *told;
+    };
 } Call;
 
 /* Calls of one kind, one after the other, of one function with the same value references. */
@@ -88,7 +116,9 @@ typedef struct {
     Kind kind;
     uintptr_t function;
     const unsigned int *references;
-    size_t count; /* of the references */
+    size_t count; /* of the values */
+    size_t reference_count;
+    int type; /* of FMI 3.0 */
     int32_t period;
     int32_t phase;
     int32_t is_watched;
@@ -110,6 +140,7 @@ typedef struct {
     size_t depth;
     size_t newest; /* the ring's newest row */
     const Change *changes;
+    const int64_t *forms; /* of the values; NULL where all of them are numbers */
     int64_t *disturbed; /* by operation, after which of its steps numbers were first rounded in another way, from 1 */
     unsigned control; /* how numbers are rounded when the block begins, as `float_control` has it, */
     fenv_t floats;    /* and all that belongs to it */
@@ -166,6 +197,47 @@ extern Guard guard;
 
 /* Failed calls have an FMI status, or this with how they were left and the exit code (`said_by_status` in compiled.py). */
 #define LEFT(way, code) ((int64_t)(way) << 32 | (uint32_t)(code))
+
+enum { WARNING = 1 }; /* the last status of the standard that is no failure */
+
+static inline int is_failure(int status)
+{
+    return status < 0 || status > WARNING;
+}
+
+static inline void note_call(const Hand *hand, const Call *call)
+{
+    hand->note->instance = (uint64_t)(uintptr_t)call->component;
+}
+
+/* Where the value stands that an entry reads. */
+static inline const double *value_of(const Plan *plan, const Entry *entry)
+{
+    const double *row = plan->values;
+    if (entry->age >= 0) {
+        size_t age = (size_t)entry->age;
+        row = plan->history + (plan->newest + (plan->newest < age ? plan->depth : 0) - age) * plan->value_count;
+    }
+    return row + entry->place;
+}
+
+/* Whether it is set as it is. */
+static inline int is_plain(const Entry *entry)
+{
+    return entry->scale == 1.0 && entry->offset == 0.0 && entry->whole == AS_IT_IS && entry->change < 0;
+}
+
+/* What an entry makes of the value that it reads. */
+double read_entry(const Plan *plan, const Entry *entry, double time);
+
+/* A value as a number, rounded where it has more bits than that. */
+double number_of(double value, int64_t form);
+
+/* Each of these takes a group's calls; it returns the one that failed, or the end. A failure with a status that is none is
+   a value that is not finite, or none that the type holds, or a step that ended early or with the simulation. */
+const Call *take_steps_3(const Hand *hand, const Group *group, double time, double step, int *status);
+const Call *set_3(const Hand *hand, const Group *group, double time, int *status);
+const Call *get_3(const Hand *hand, const Group *group, int *status);
 
 /* That of a block of which nothing is done. */
 Outcome outcome_of(const Block *block);

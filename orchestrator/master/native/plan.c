@@ -10,13 +10,13 @@
 #include <string.h>
 
 static const char *const buffer_names[N_BUFFERS] = {
-    "operations", "parts", "channels", "instances", "entries", "references", "changes", "kept", "values", "history",
-    "table", "places", "disturbed",
+    "operations", "parts", "channels", "instances", "entries", "references", "forms", "changes", "kept", "values",
+    "history", "table", "places", "disturbed",
 };
 static const size_t buffer_sizes[N_BUFFERS] = {
     sizeof(Operation), sizeof(int64_t), sizeof(Channel), sizeof(Instance), sizeof(Entry),
-    sizeof(unsigned),  sizeof(Change),  sizeof(int64_t), sizeof(double),   sizeof(double),
-    sizeof(double),    sizeof(Place),   sizeof(int64_t),
+    sizeof(unsigned),  sizeof(int64_t), sizeof(Change),  sizeof(int64_t),  sizeof(double),
+    sizeof(double),    sizeof(double),  sizeof(Place),   sizeof(int64_t),
 };
 
 size_t length(const Py_buffer *buffers, int which)
@@ -45,6 +45,10 @@ static int check_buffers(const Py_buffer *buffers)
         return 0;
     }
     size_t value_count = length(buffers, VALUES);
+    if (length(buffers, FORMS) != 0 && length(buffers, FORMS) != value_count) {
+        PyErr_SetString(PyExc_ValueError, "kernel: there must be a form for each of the values, or none at all");
+        return 0;
+    }
     if (value_count > 0 && length(buffers, HISTORY) % value_count != 0) {
         PyErr_SetString(PyExc_ValueError, "kernel: the history must be whole rows of values");
         return 0;
@@ -58,15 +62,15 @@ static int is_within(int64_t begin, int64_t count, size_t length)
     return begin >= 0 && (uint64_t)begin <= length && (uint64_t)count <= length - (uint64_t)begin;
 }
 
-/* Whether a channel's entries can be read (or, written, stand side by side among the values). */
-static int entries_fit(const Plan *plan, const Entry *entries, int64_t count, size_t change_count, int is_written)
+/* Whether a channel's entries can be read (or stand side by side among the values, where they must). */
+static int entries_fit(const Plan *plan, const Entry *entries, int64_t count, size_t change_count, int is_row)
 {
     for (int64_t k = 0; k < count; k++) {
         const Entry *entry = &entries[k];
         if (!is_within(entry->place, 1, plan->value_count) || entry->age < -1 || entry->change < -1 ||
             (entry->change >= 0 && (uint64_t)entry->change >= change_count) ||
             (entry->age >= 0 && (uint64_t)entry->age >= plan->depth) ||
-            (is_written && entry->place != entries[0].place + k)) {
+            (is_row && entry->place != entries[0].place + k)) {
             return 0;
         }
     }
@@ -77,7 +81,7 @@ static int entries_fit(const Plan *plan, const Entry *entries, int64_t count, si
 static int are_in_place(const Entry *entries, int64_t count)
 {
     for (int64_t k = 0; k < count; k++) {
-        if (entries[k].age >= 0 || entries[k].change >= 0 || entries[k].scale != 1.0 || entries[k].offset != 0.0 ||
+        if (entries[k].form != NUMBER || entries[k].age >= 0 || entries[k].change >= 0 || entries[k].scale != 1.0 || entries[k].offset != 0.0 ||
             entries[k].place != entries[0].place + k) {
             return 0;
         }
@@ -113,7 +117,8 @@ static int resolve(const Plan *plan, const Py_buffer *buffers, const Operation *
             return 0;
         }
         const Instance *instance = (const Instance *)buffers[INSTANCES].buf + operation->index;
-        group->kind = STEP;
+        group->kind = instance->told == 0 ? STEP : STEP_3;
+        call->told = (Told *)(uintptr_t)instance->told;
         group->function = (uintptr_t)instance->function;
         call->component = (void *)(uintptr_t)instance->component;
         return group->function != 0;
@@ -124,19 +129,24 @@ static int resolve(const Plan *plan, const Py_buffer *buffers, const Operation *
         return 0;
     }
     const Channel *channel = (const Channel *)buffers[CHANNELS].buf + operation->index;
-    if (channel->count < 1 || !is_within(channel->begin, channel->count, length(buffers, ENTRIES))) {
+    if (channel->count < 1 || !is_within(channel->begin, channel->count, length(buffers, ENTRIES)) ||
+        channel->type < 0 || channel->type > TYPE_BOOLEAN || channel->reference_count < 1 ||
+        channel->reference_count > channel->count) {
         return 0;
     }
     const Entry *entries = (const Entry *)buffers[ENTRIES].buf + channel->begin;
-    if (!entries_fit(plan, entries, channel->count, length(buffers, CHANGES), is_get)) {
+    if (!entries_fit(plan, entries, channel->count, length(buffers, CHANGES), is_get && channel->type == 0)) {
         return 0;
     }
-    int in_place = channel->is_real && (is_get || are_in_place(entries, channel->count));
-    group->kind = in_place ? (is_get ? GET_REALS : SET_REALS_IN_PLACE)
+    int in_place = channel->type == 0 && channel->is_real && (is_get || are_in_place(entries, channel->count));
+    group->kind = channel->type ? (is_get ? GET_3 : SET_3)
+                  : in_place ? (is_get ? GET_REALS : SET_REALS_IN_PLACE)
                            : (is_get ? GET_INTEGERS : channel->is_real ? SET_REALS : SET_INTEGERS);
     group->function = (uintptr_t)channel->function;
     group->references = (const unsigned int *)buffers[REFERENCES].buf + channel->begin;
     group->count = (size_t)channel->count;
+    group->reference_count = (size_t)channel->reference_count;
+    group->type = (int)channel->type;
     call->component = (void *)(uintptr_t)channel->component;
     call->values = plan->values + (in_place || is_get ? entries[0].place : 0);
     call->entries = entries;
@@ -209,6 +219,7 @@ int make_plan(Plan *plan, const Py_buffer *buffers, Py_ssize_t newest)
     plan->depth = plan->value_count ? length(buffers, HISTORY) / plan->value_count : 0;
     plan->newest = (size_t)newest;
     plan->changes = buffers[CHANGES].buf;
+    plan->forms = length(buffers, FORMS) == 0 ? NULL : buffers[FORMS].buf;
     plan->disturbed = buffers[DISTURBED].buf;
     plan->largest = 1;
     if (!check_parts(plan, buffers, count) || !check_places(plan, buffers, count)) {

@@ -32,13 +32,6 @@ static int do_unguarded(void (*work)(void *), void *context, int *code) /* uncov
 
 Guard guard = {find_note, do_unguarded};
 
-enum { WARNING = 1 }; /* the last status of the standard that is no failure */
-
-static int is_failure(int status)
-{
-    return status < 0 || status > WARNING;
-}
-
 static double changed(const Change *change, double value, double time)
 {
     if (!change->active) {
@@ -48,14 +41,12 @@ static double changed(const Change *change, double value, double time)
     return change->is_real ? value : trunc(value);
 }
 
-static double read_entry(const Plan *plan, const Entry *entry, double time)
+double read_entry(const Plan *plan, const Entry *entry, double time)
 {
-    const double *row = plan->values;
-    if (entry->age >= 0) {
-        size_t age = (size_t)entry->age;
-        row = plan->history + (plan->newest + (plan->newest < age ? plan->depth : 0) - age) * plan->value_count;
+    double value = *value_of(plan, entry);
+    if (entry->form != NUMBER) {
+        value = number_of(value, entry->form);
     }
-    double value = row[entry->place];
     if (entry->scale != 1.0 || entry->offset != 0.0) {
         value = entry->scale * value + entry->offset;
     }
@@ -66,14 +57,6 @@ static double read_entry(const Plan *plan, const Entry *entry, double time)
     }
     return entry->change < 0 ? value : changed(&plan->changes[entry->change], value, time);
 }
-
-static inline void note_call(const Hand *hand, const Call *call)
-{
-    hand->note->instance = (uint64_t)(uintptr_t)call->component;
-}
-
-/* Each of these takes a group's calls; it returns the one that failed, or the end. A failure with a status that is none is
-   a value that is not finite, or none that C's int holds. */
 
 static const Call *take_steps(const Hand *hand, const Group *group, double time, double step, int *status)
 {
@@ -199,6 +182,9 @@ static const Call *take_group(const Hand *hand, const Group *group, double time,
     case SET_INTEGERS: return set_integers(hand, group, time, status);
     case GET_REALS: return get_reals(hand, group, status);
     case GET_INTEGERS: return get_integers(hand, group, status);
+    case STEP_3: return take_steps_3(hand, group, time, (double)group->period * step, status);
+    case SET_3: return set_3(hand, group, time, status);
+    case GET_3: return get_3(hand, group, status);
     default: return change_values(group, time + step);
     }
 }
@@ -282,7 +268,8 @@ void finish_step(Plan *plan, const Block *block, const Advance *it, Outcome *out
         *to = block->start + (double)(it->number + 1) * block->step;
         for (size_t k = 0; k < block->kept_count; k++) {
             to += block->stride;
-            *to = plan->values[block->kept[k]];
+            double value = plan->values[block->kept[k]];
+            *to = plan->forms == NULL ? value : number_of(value, plan->forms[block->kept[k]]);
         }
         plan->note->rows = ++outcome->written;
     }

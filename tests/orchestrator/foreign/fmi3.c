@@ -158,7 +158,7 @@ static int update(Third *s)
         for (size_t k = 0; k < count; k++) {                                                                           \
             ((Third *)c)->now.kept[vr[k] % 10] = values[k];                                                            \
         }                                                                                                              \
-        return count == size ? 0 : 3;                                                                                  \
+        return count == size && mode(c) != 13 ? 0 : 3;                                                                 \
     }                                                                                                                  \
     int fmi3Get##name(void *c, const unsigned *vr, size_t count, type *values, size_t size)                            \
     {                                                                                                                  \

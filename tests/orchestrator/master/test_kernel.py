@@ -35,7 +35,7 @@ def test_a_guard_is_an_address():
 
 
 NAMES = (
-    "operations parts channels instances entries references changes kept values history newest table row places "
+    "operations parts channels instances entries references forms changes kept values history newest table row places "
     "disturbed every start step first count last"
 )
 
@@ -110,6 +110,11 @@ WRONG = {
     "a channel of negative length": lambda a: {"channels": changed(a["channels"], "count", -1)},
     "a channel without function": lambda a: {"channels": changed(a["channels"], "function", 0)},
     "a channel without an entry": lambda a: {"channels": changed(a["channels"], "count", 0)},
+    "a channel of no type": lambda a: {"channels": changed(a["channels"], "type", -1)},
+    "a channel of an unknown type": lambda a: {"channels": changed(a["channels"], "type", 12)},
+    "a channel without a reference": lambda a: {"channels": changed(a["channels"], "reference_count", 0)},
+    "more references than values": lambda a: {"channels": changed(a["channels"], "reference_count", 10**6)},
+    "forms of some values": lambda a: {"forms": np.zeros(1, np.int64)},
     "a step without function": lambda a: {"instances": changed(a["instances"], "function", 0)},
     "an unknown operation": lambda a: {"operations": changed(a["operations"], "kind", 4)},
     "an unknown change": lambda a: {"entries": changed(a["entries"], "change", 1)},
@@ -225,7 +230,7 @@ def test_a_kernel_of_another_version_is_refused():
 
 def compile_kernel(target, *flags):
     command = [GCC, "-Wall", "-Wextra", "-Wconversion", "-Wshadow", "-Werror", "-ffp-contract=off", "-shared", "-fPIC"]
-    sources = [MASTER / "native" / name for name in ("kernel.c", "plan.c", "stepping.c", "team.c")]
+    sources = sorted((MASTER / "native").glob("*.c"))
     command += [f"-I{sysconfig.get_paths()['include']}", *flags, *sources, "-o", target]
     subprocess.run(command, check=True)
     return target
@@ -236,7 +241,7 @@ def test_the_compiler_has_nothing_to_say(tmp_path, flags):
     compile_kernel(tmp_path / "kernel.so", *flags)
 
 
-PARTS = ("test_compiled.py", "test_compiled_blocks.py", "test_kernel.py", "test_threads.py")
+PARTS = ("test_compiled.py", "test_compiled_blocks.py", "test_compiled_fmi3.py", "test_kernel.py", "test_threads.py")
 SANITIZERS = {
     ("address", "undefined"): (
         "not sanitized and not compiler and not ctrl_c and not without_the_extension and not short_in_time"

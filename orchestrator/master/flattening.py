@@ -1,0 +1,99 @@
+"""What the compiled loop makes of channels and values: single calls, and doubles.
+
+Of whole numbers of 64 bits, which doubles do not hold, its values are the bits.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..fmi import Channel
+from ..fmi.binding import ElementsChannel, FmuChannel, MixedChannel
+from ..isolation import IsolatedChannel
+from .exchange import Exchange
+
+_NUMBERS = "Float64", "Float32", "Int8", "UInt8", "Int16", "UInt16", "Int32", "UInt32", "Int64", "UInt64", "Boolean"
+TYPES = {name: number for number, name in enumerate(_NUMBERS, 1)} | {"Enumeration": 9}
+"""The kernel's numbers for the types of FMI 3.0."""
+NUMBER, SIGNED_BITS, UNSIGNED_BITS = 0, 1, 2
+"""The kernel's numbers for what a value is."""
+_FORMS = {"Int64": SIGNED_BITS, "Enumeration": SIGNED_BITS, "UInt64": UNSIGNED_BITS}
+_WIDEST = 2.0**53
+"""Beyond that a whole number of 64 bits is compared with a threshold in Python."""
+_BITS = {SIGNED_BITS: np.int64, UNSIGNED_BITS: np.uint64}
+
+Parts = list[tuple[FmuChannel | IsolatedChannel, Sequence[int]]]
+
+
+class Wide:
+    """What each of the values of an exchange is.
+
+    Attributes:
+        forms: by place, for the kernel; empty where all of them are numbers.
+    """
+
+    def __init__(self, exchange: Exchange) -> None:
+        variables = (
+            exchange.slaves[owner].interface.variables[signal.removeprefix(f"{owner}.")]
+            for owner, signal in zip(exchange.owners, exchange.signals, strict=True)
+        )
+        forms = [_FORMS.get(v.fmi_type, NUMBER) for v in variables]
+        self.forms = np.array(forms if any(forms) else [], dtype=np.int64)
+        self._wide = [(place, _BITS[form]) for place, form in enumerate(forms) if form]
+
+    def form(self, place: int) -> int:
+        """What the value at a place is."""
+        return int(self.forms[place]) if self._wide else NUMBER
+
+    def packed(self, values: Sequence[Any]) -> NDArray[np.float64]:
+        """Values as the kernel takes them."""
+        cells = np.array(values, dtype=np.float64)
+        for place, bits in self._wide:
+            cells.view(bits)[place] = int(values[place])
+        return cells
+
+    def unpacked(self, cells: NDArray[np.float64]) -> list[Any]:
+        """Values that the kernel has left."""
+        values: list[Any] = cells.tolist()
+        for place, bits in self._wide:
+            values[place] = int(cells.view(bits)[place])
+        return values
+
+
+def parts_of(channel: Channel) -> Parts | None:
+    """The calls behind a channel, each with the places of its values in it; None where there are others."""
+    if isinstance(channel, FmuChannel):
+        return [(channel, range(len(channel.names)))]
+    if isinstance(channel, IsolatedChannel):
+        return [(channel, range(len(channel.references)))]
+    if isinstance(channel, ElementsChannel):
+        return parts_of(channel.channel) if channel.is_whole else None
+    found: Parts = []
+    for own, places in channel.parts if isinstance(channel, MixedChannel) else ():
+        inner = parts_of(own)
+        if inner is None:
+            return None
+        found += [(each, [places[k] for k in own_places]) for each, own_places in inner]
+    return found or None
+
+
+def can_exchange(exchange: Exchange) -> bool:
+    """Whether the kernel can: numbers and truth values, whole arrays, wide numbers that no event changes."""
+    if "String" in exchange.kinds:
+        return False
+    channels = [feed.channel for feeds in exchange.feeds.values() for feed in feeds]
+    channels += [part.channel for parts in exchange.yields.values() for part in parts]
+    wide = Wide(exchange)
+    compared = (
+        abs(threshold or 0.0) >= _WIDEST and wide.form(source)
+        for feeds in exchange.feeds.values()
+        for feed in feeds
+        for source, threshold in zip(feed.sources, feed.thresholds, strict=True)
+    )
+    return (
+        None not in map(parts_of, channels) and not any(map(wide.form, exchange.output_changes)) and not any(compared)
+    )

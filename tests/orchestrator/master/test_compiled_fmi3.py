@@ -1,0 +1,268 @@
+"""FMI 3.0 in the compiled loop (fmi3.c): the same bits as in Python for all types, arrays, and steps cut short."""
+
+import shutil
+import sys
+
+import numpy as np
+import pytest
+from railcosim.orchestrator.fmi.binding import MixedChannel
+from railcosim.orchestrator.master import compiled
+from railcosim.orchestrator.master.flattening import parts_of
+from railcosim.orchestrator.run.execution import run
+from railcosim.orchestrator.system import Event, System
+
+pytestmark = [
+    pytest.mark.skipif(compiled.kernel is None, reason="installed without the compiled step loop"),
+    pytest.mark.skipif(not sys.platform.startswith("linux"), reason="FMUs by hand are compiled for Linux here"),
+    pytest.mark.skipif(shutil.which("gcc") is None, reason="FMUs by hand need gcc"),
+]
+ALGORITHMS = pytest.mark.parametrize("algorithm", ["gauss-seidel", "jacobi"])
+TEXTS = (
+    ('<String name="said" valueReference="111" causality="output"/>', ""),
+    ('<Binary name="blob" valueReference="121" causality="output"/>', ""),
+    *((f'    <{kind} valueReference="{k}"/>\n', "") for kind in ("Output", "InitialUnknown") for k in (111, 121)),
+)
+"""What takes from the FMU of fmi3.c the outputs that are no numbers."""
+WIDTHS = ("8", "16", "32", "64")
+BEYOND = 2**53 + 1
+"""The first whole number that no double is."""
+
+
+@pytest.fixture
+def third(by_hand):
+    return str(by_hand(3, *TEXTS))
+
+
+@pytest.fixture
+def plain(arrays):
+    """The FMU of arrays3.c without the output of texts."""
+    return str(
+        arrays(
+            ('<String name="copies" valueReference="10" causality="output"><Dimension start="2"/></String>', ""),
+            ('<Output valueReference="10"/>', ""),
+        )
+    )
+
+
+@ALGORITHMS
+@pytest.mark.parametrize("delay", [0, 2])
+def test_every_type(both, third, odd, algorithm, delay):
+    """The limits of all types go from one to the next, and to an FMU of FMI 2.0; two swing around each other."""
+    limits = {}
+    for bits in map(int, WIDTHS):
+        limits[f"i{bits}"], limits[f"ui{bits}"] = (-(2 ** (bits - 1)), 2 ** (bits - 1) - 1), (0, 2**bits - 1)
+    limits["ui8"] = (5, 200)
+    system = System(stop_time=3.0, step=0.25, algorithm=algorithm)
+    system.add("low", third, f=0.1, on=True, gear="high", x=4.0, **{name: least for name, (least, _) in limits.items()})
+    system.add("high", third, x=-2.0, **{name: most for name, (_, most) in limits.items()})
+    for name in ("p", "q"):
+        system.add(name, third)
+    system.add("odd", odd)
+    for one, other in (("low", "p"), ("high", "q")):
+        for name in limits:
+            system.connect(f"{one}.{name.replace('i', 'o')}", f"{other}.{name}", delay=delay)
+        system.connect(f"{one}.g", f"{other}.f", delay=delay)
+        system.connect(f"{one}.shown", f"{other}.gear")
+        system.connect(f"{one}.off", f"{other}.on")
+    system.connect("low.x", "high.u", scale=-0.5, offset=0.25)
+    system.connect("high.x", "low.u", delay=delay)
+    system.connect("low.o16", "odd.m")
+    system.connect("high.uo32", "odd.u", delay=delay)
+    result = both(system)
+    for name, ends in limits.items():
+        shown = name.replace("i", "o")
+        assert tuple(result[f"{of}.{shown}"][-1] for of in "pq") == tuple(map(float, ends))
+    assert (result["p.g"][-1], result["p.shown"][-1]) == (np.float32(0.1), 5e9)
+    assert [result[f"{name}.off"][-1] for name in ("low", "high", "p", "q")] == [0, 1, 1, 0]
+    assert (result["odd.n"][-1], result["odd.x"][-1] > 1e9) == (-(2**15) + 1, True)
+
+
+@ALGORITHMS
+@pytest.mark.parametrize("number", [BEYOND, -BEYOND, 2**63 - 1, 2**63, 2**64 - 1])
+def test_whole_numbers_that_no_double_is(both, third, odd, algorithm, number):
+    """To the bit from one to the other, delayed and not; to a Real, a truth value and C's int as Python converts it."""
+    system = System(stop_time=2.0, step=0.25, algorithm=algorithm, order=["a", "b", "c", "odd"])
+    wide = "i64" if -(2**63) <= number < 2**63 else "ui64"
+    shown = wide.replace("i", "o")
+    system.add("a", third, **{wide: number})
+    system.add("b", third)
+    system.add("c", third)
+    system.add("odd", odd)
+    system.connect(f"a.{shown}", f"b.{wide}")
+    system.connect(f"b.{shown}", f"c.{wide}", delay=2)
+    if 0 <= number < 2**63:
+        system.connect(f"a.{shown}", "b.ui64")
+        system.connect("b.uo64", "c.ui64")
+    system.connect(f"a.{shown}", "odd.u")
+    system.connect(f"a.{shown}", "b.on", threshold=0.5)
+    system.connect(f"a.{shown}", "c.i16", scale=1e-16, threshold=0.5)
+    system.connect(f"a.{shown}", "b.f", scale=-1.0)
+    result = both(system)
+    assert result[f"c.{shown}"][-1] == float(number)
+
+
+@ALGORITHMS
+def test_wide_numbers_that_are_small(both, third, algorithm):
+    """Where another type holds them they go there, scaled or not."""
+    system = System(stop_time=1.0, step=0.25, algorithm=algorithm, order=["a", "b", "c"])
+    system.add("a", third, i64=6, ui64=7)
+    for name in "bc":
+        system.add(name, third)
+    for source, target, how in (
+        ("o64", "b.ui64", {}), ("uo64", "b.i64", {}), ("o64", "b.i16", {}), ("uo64", "b.ui16", {"delay": 1}),
+        ("o64", "c.i64", {"scale": 0.5, "threshold": 0.5}), ("uo64", "c.ui64", {"scale": 2.0, "threshold": 0.5}),
+    ):  # fmt: skip
+        system.connect(f"a.{source}", target, **how)
+    result = both(system)
+    shown = ("b.uo64", "b.o64", "b.o16", "b.uo16", "c.o64", "c.uo64")
+    assert [result[name][-1] for name in shown] == [6.0, 7.0, 6.0, 7.0, 3.0, 14.0]
+
+
+def test_the_bits_themselves(third, instantiated, used):
+    """What the FMU has, not what is recorded, is the number to its last bit."""
+    system = System(stop_time=1.0, step=0.25, order=["a", "b"])
+    system.add("a", third, i64=BEYOND, ui64=2**64 - 3)
+    system.add("b", third)
+    system.connect("a.o64", "b.i64")
+    system.connect("a.uo64", "b.ui64")
+    system.connect("b.o64", "a.i32", scale=0.0, threshold=0.5, delay=1)
+    master = instantiated(system)
+    seen = []
+    assert master.run(0.0, 0.25, 4, 1, lambda steps, rows: seen.append(len(rows)) or True)
+    assert used
+    values = dict(zip(master.signals, master.values, strict=True))
+    assert (values["b.o64"], values["b.uo64"]) == (BEYOND, 2**64 - 3)
+    assert master.slaves["b"].channel("Integer", ["o64"]).get() == [BEYOND]
+    for slave in master.slaves.values():
+        slave.free()
+
+
+@ALGORITHMS
+@pytest.mark.parametrize(
+    ("source", "target", "number"),
+    [
+        ("i16", "i8", 300),
+        ("i16", "ui8", -1),
+        ("i32", "i16", 2**20),
+        ("i32", "ui16", -1),
+        ("ui32", "i32", 2**31),
+        ("i64", "ui32", -1),
+        ("i64", "ui64", -1),
+        ("ui64", "i64", 2**63),
+    ],
+)
+def test_a_number_that_the_type_does_not_hold(both, third, algorithm, *, source, target, number):
+    """It stops both with the same sentence."""
+    system = System(stop_time=2.0, step=0.25, algorithm=algorithm, order=["a", "b"])
+    system.add("a", third, **{source: 7})
+    system.add("b", third)
+    system.connect(f"a.{source.replace('i', 'o')}", f"b.{target}")
+    system.events.append(Event(f"a.{source}", "set", 0.5, value=number))
+    result = both(system)
+    assert result.status == "failed"
+    assert f"'{target}' cannot become {number}: its type" in str(result.error)
+
+
+@pytest.mark.parametrize(("target", "sign"), [("i64", 1.0), ("i64", -1.0), ("ui64", -1.0), ("ui64", 1.0), ("i8", 1.0)])
+def test_a_real_that_no_whole_number_holds(both, third, target, sign):
+    system = System(stop_time=2.0, step=0.25, order=["a", "b"])
+    system.add("a", third, gain=1e30)
+    system.add("b", third)
+    system.connect("a.y", f"b.{target}", threshold=0.5)
+    system.events.append(Event("a.u", "set", 0.75, value=sign))
+    result = both(system)
+    assert f"'{target}' cannot become" in str(result.error)
+
+
+@ALGORITHMS
+@pytest.mark.parametrize("mode", [3, 6, 7, 8, 9, 11, 12, 13, 23])
+def test_steps_that_are_not_over_or_fail(both, third, algorithm, mode):
+    """Discarded, returned from early, ended with the simulation, failed, another status, NaN, a failed set and get."""
+    system = System(stop_time=6.0, step=0.25, algorithm=algorithm)
+    system.add("a", third, mode=mode)
+    system.add("b", third)
+    system.connect("a.x", "b.u")
+    system.connect("b.x", "a.u", scale=-1.0, offset=2.0)
+    result = both(system)
+    assert result.status == {6: "completed", 7: "completed", 8: "terminated", 11: "completed"}.get(mode, "failed")
+
+
+def test_rates_and_events(both, third):
+    system = System(stop_time=3.0, step=0.25)
+    system.add("a", third, x=2.0)
+    system.add("b", third)
+    system.instances["b"].step = 0.5
+    system.connect("a.x", "b.u", scale=2.0)
+    system.connect("b.x", "a.u")
+    system.connect("a.o32", "b.i32")
+    system.events += [
+        Event("a.x", "override", 1.0, value=3.0, duration=0.5),
+        Event("b.u", "bias", 2.0, value=1.0),
+        Event("a.i32", "set", 1.0, value=-4),
+    ]
+    result = both(system)
+    assert result["a.x"][4] == 3.0
+    assert result["b.o32"][-1] == -4
+
+
+@pytest.mark.parametrize("threads", [1, 2])
+def test_arrays(both, plain, threads):
+    """Whole arrays are handed over with one reference each; the ends are numbers of all types."""
+    system = System(stop_time=1.0, step=0.25, algorithm="jacobi")
+    for name in "abc":
+        system.add(name, plain, u=[[1.0, 2.0, 3.0], [4.0, 5.0, 6.0]])
+    for one, other in ("ab", "bc"):
+        system.connect(f"{one}.y", f"{other}.u", scale=0.5)
+        system.connect(f"{one}.m", f"{other}.n")
+        system.connect(f"{one}.off", f"{other}.on")
+    result = both(system, threads=threads)
+    assert [result[f"c.y[{i},{j}]"][-1] for i in (1, 2) for j in (1, 2, 3)] == [2.0, 4.0, 6.0, 8.0, 10.0, 12.0]
+
+
+def test_part_of_an_array_after_all_of_it(plain, instantiated):
+    """The kernel set it past the channels of Python: what stands beside the part is asked of the FMU."""
+    system = System(stop_time=1.0, step=0.25, order=["a", "b"])
+    system.add("a", plain, u=[[1.0, 2.0, 3.0], [4.0, 5.0, 6.0]])
+    system.add("b", plain)
+    system.connect("a.y", "b.u")
+    master = instantiated(system)
+    assert master.run(0.0, 0.25, 4, 1, lambda steps, rows: True)
+    b = master.slaves["b"]
+    b.channel("Real", ["u[1,1]"]).set([0.5])
+    assert b.channel("Real", ["y[1,1]", "y[1,2]"]).get() == [1.0, 8.0]
+    for slave in master.slaves.values():
+        slave.free()
+
+
+@pytest.mark.parametrize("what", ["part", "event", "threshold", "text"])
+def test_what_is_left_to_python(third, plain, by_hand, used, what):
+    """A part of an array, an event that changes a number of 64 bits, one that is compared beyond doubles, texts."""
+    system = System(stop_time=1.0, step=0.25)
+    model = {"part": plain, "text": str(by_hand(3, name="texts.fmu"))}.get(what, third)
+    system.add("a", model)
+    system.add("b", model)
+    if what == "part":
+        system.connect("a.y[1,1]", "b.u[1,2]")
+    elif what == "event":
+        system.events.append(Event("a.o64", "override", 0.5, value=3))
+    elif what == "threshold":
+        system.connect("a.o64", "b.on", threshold=2.0**60)
+    result = run(system)
+    assert result.status == "completed"
+    assert not used
+
+
+def test_types_of_several_widths_one_of_which_is_set_in_part(both, third, used):
+    """Numbers of several widths are one kind here, and several calls for the FMU; each alone goes to the kernel."""
+    system = System(stop_time=1.0, step=0.25)
+    system.add("a", third, i8=5, ui32=9)
+    system.add("b", third)
+    system.connect("a.o8", "b.ui32")
+    system.connect("a.uo32", "b.i8")
+    result = both(system)
+    assert (result["b.uo32"][-1], result["b.o8"][-1]) == (5.0, 9.0)
+
+
+def test_calls_of_several_types_are_those_of_all_or_none():
+    """A channel that is none of an FMU's in this process is nobody's call."""
+    assert parts_of(MixedChannel([(object(), (0, 1))], 2)) is None
