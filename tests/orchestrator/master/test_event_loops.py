@@ -22,7 +22,7 @@ def both(monkeypatch):
         used, threads = [], None
         with monkeypatch.context() as patch:
             loop = compiled.CompiledLoop.run
-            patch.setattr(compiled.CompiledLoop, "run", lambda *args: used.append(1) or loop(*args))
+            patch.setattr(compiled.CompiledLoop, "run", lambda *args, **how: used.append(1) or loop(*args, **how))
             fast = execute(system)
         assert used
         with monkeypatch.context() as patch:
