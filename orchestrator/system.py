@@ -171,9 +171,8 @@ class Provenance:
         default_preset: the one that means the file as it stands.
         modified: whether anything was changed beyond file and preset, so that known values are not judged.
         command: the words after ``orchestrate run`` that give this system; empty where no options do: Python made it.
-        notes: what options have decided, for the user of a run.
         rescaled_from: the step in s before `--step` changed it: every sample time equal to it follows the step.
-        notes: what a user should know of how it was read.
+        notes: what a user should know of how it was read, and of what options have decided.
         origins: where things were written, for messages: by ``"train[1]"``, ``"train[1].speed"`` (a start value),
             ``"instances.train[1].step"`` (an option of an instance), ``"instances.train[1].build.carriages"`` (a build
             argument that a preset or an option gave), ``"simulation.step"``,
@@ -191,7 +190,6 @@ class Provenance:
     default_preset: str | None = field(default=None, compare=False)
     modified: bool = field(default=False, compare=False)
     command: tuple[str, ...] = field(default=(), compare=False)
-    notes: tuple[str, ...] = field(default=(), compare=False)
     rescaled_from: float | None = field(default=None, compare=False)
     name: str = field(default="system", compare=False)
     path: str = field(default="", compare=False)

@@ -111,5 +111,4 @@ def check_once_per_process(system: System, interfaces: Mapping[str, Interface]) 
 def isolation_notes(system: System, models: Mapping[str, Model]) -> list[str]:
     """What a user should know of it."""
     plain = [name for name, x in system.instances.items() if x.isolate and not is_isolated(models[name], x)]
-    told = [f"not isolated, because plain components run in this process: {', '.join(plain)}"] if plain else []
-    return [*system.provenance.notes, *told]
+    return [f"not isolated, because plain components run in this process: {', '.join(plain)}"] if plain else []
