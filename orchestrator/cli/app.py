@@ -87,6 +87,7 @@ def options(
 
 app.command()(answering(runs.run))
 app.command("list")(answering(scenarios.list_all, "list"))
+app.command("import")(answering(scenarios.import_ssp, "import"))
 for command in (
     scenarios.check,
     runs.plot,

@@ -1,9 +1,13 @@
-"""The commands of ``orchestrate`` that look at scenarios without running them: list, check."""
+"""The commands of ``orchestrate`` that are about scenarios and do not run them: list, check, import."""
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
 
+import typer
+
+from .. import world
 from .documents import Answer
 from .options import Algorithm, Preset, Quiet, Scenario, Set, Step, Stop, Swap, Trust, With, load_system
 
@@ -61,6 +65,29 @@ def check(
         lambda: check_document(system, checked, stepping, study),
         lambda: show_check(system, checked, [*stepping, *study], quiet),
     )
+
+
+def import_ssp(
+    archive: Annotated[str, typer.Argument(metavar="SSP", help="An .ssp archive, or a bare .ssd file.")],
+    output: Annotated[Path, typer.Option("--output", "-o", help="The scenario to write, such as platoon.toml.")],
+    *,
+    variant: Annotated[
+        str | None, typer.Option(help="A system structure of the archive other than the default, by file or name.")
+    ] = None,
+    quiet: Quiet = False,
+) -> Answer:
+    """Make a scenario of an SSP, to read and to change; its FMUs go to a folder beside it.
+
+    What a user should know of how it was read stands in the scenario's first lines.
+    """
+    from ..scenario import import_ssp as make
+    from .documents import written
+
+    folder = output.with_name(f"{output.stem}_fmus")
+    world.mkdir(output.parent, parents=True, exist_ok=True)
+    text = make(f"{archive}#{variant}" if variant else archive, folder, output.parent)
+    world.write_text(output, text, encoding="utf-8")
+    return written([output], quiet)
 
 
 def _delays(system: System) -> list[str]:

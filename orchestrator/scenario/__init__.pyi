@@ -1,5 +1,5 @@
 from .changes import split_assignment
-from .loading import dump, load
+from .loading import dump, import_ssp, load
 from .patterns import NAME
 from .shipped import MODELS, Listed, listed, presets_of, raw, shipped
 from .toml_source import Source, parse_value
@@ -16,6 +16,7 @@ __all__ = [
     "changed",
     "dump",
     "import_notes",
+    "import_ssp",
     "is_structural",
     "listed",
     "load",

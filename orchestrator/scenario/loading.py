@@ -126,6 +126,25 @@ def _system_of_ssp(name: str, changes: _Changes) -> System:
     return system
 
 
+def import_ssp(name: str, fmus: Path, folder: Path) -> str:
+    """The scenario that an SSP makes, with notes on how it was read as comments.
+
+    Args:
+        name: of the archive; a variant follows after a ``#``.
+        fmus: where its FMUs are put.
+        folder: where the scenario will stand.
+
+    Raises:
+        ScenarioError: with everything that is wrong with the archive.
+    """
+    system = read_system(name, fmus)
+    for instance in system.instances.values():
+        instance.model = Path(os.path.relpath(instance.model, folder)).as_posix()
+    lines = [f"imported from {name}", *system.provenance.notes]
+    comments = "".join(f"# {part}\n" for line in lines for part in line.splitlines())
+    return f"{comments}\n{dump(system)}"
+
+
 def loads(text: str, path: str | os.PathLike[str] = "scenario.toml", **changes: Any) -> System:
     """Like `load`, from a text; `path` is what messages call it and what relative paths in it are relative to."""
     return _system(Source(text, os.fspath(path)), Path(path), _Changes(**changes))

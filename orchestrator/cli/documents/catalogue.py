@@ -17,6 +17,7 @@ from .written import FilesDocument
 DOCUMENTS: dict[str, Any] = {
     "run": RunDocument,
     "list": ListDocument,
+    "import": FilesDocument,
     "check": CheckDocument,
     "plot": FilesDocument,
     "convert": FilesDocument,

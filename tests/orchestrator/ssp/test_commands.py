@@ -64,3 +64,19 @@ def test_the_commands(passing, tmp_path, capsys):
     assert call(["run", passing, "-o", str(tmp_path / "out"), "--quiet", "--no-figures"]) == 0
     assert (tmp_path / "out" / "run.json").is_file()
     assert call(["check", f"{passing}#None"]) == 2
+
+
+def test_a_scenario_of_an_archive(passing, tmp_path, capsys):
+    """It loads to what the archive does, FMUs from beside it; another variant by its name."""
+    target = tmp_path / "new" / "made.toml"
+    assert call(["import", passing, "-o", str(target)]) == 0
+    assert capsys.readouterr().out == f"{target}\n"
+    made, read = load(target), load(passing)
+    assert target.read_text(encoding="utf-8").startswith(f"# imported from {passing}\n# ")
+    fmu = tmp_path / "new" / "made_fmus" / "resources" / "pass.fmu"
+    assert {one.model for one in made.instances.values()} == {str(fmu)}
+    assert made.connections == read.connections
+    assert made.stepping == read.stepping
+    assert [one.start for one in made.instances.values()] == [one.start for one in read.instances.values()]
+    assert call(["import", passing, "-o", str(target), "--variant", "Four", "--quiet"]) == 0
+    assert load(target).instances["first"].start["u"] == 4.0
