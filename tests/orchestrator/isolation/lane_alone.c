@@ -1,0 +1,135 @@
+/* Both sides of a lane in one process, as threads, so that a sanitizer sees them: two instances in one lane hand on what
+   they count. The argument is how long either side watches, in ns. */
+
+#include "serving.c"
+
+#include <stdio.h>
+#include <string.h>
+
+/* Python has no part in it. */
+Lane *lane_in(const Py_buffer *memory, Py_ssize_t offset)
+{
+    (void)memory;
+    (void)offset;
+    return NULL;
+}
+int add_riding(PyObject *made)
+{
+    (void)made;
+    return 0;
+}
+
+enum { STEPS = 20000, INSTANCES = 2, HEAD = 64, ROOM = 64 };
+
+typedef struct {
+    double u, x;
+    int m, n;
+} Model;
+
+static int set_real(void *c, const unsigned *vr, size_t count, const double *values)
+{
+    (void)vr;
+    (void)count;
+    ((Model *)c)->u = values[0];
+    return 0;
+}
+static int get_real(void *c, const unsigned *vr, size_t count, double *values)
+{
+    (void)vr;
+    (void)count;
+    values[0] = ((Model *)c)->x;
+    return 0;
+}
+static int set_whole(void *c, const unsigned *vr, size_t count, const int *values)
+{
+    (void)vr;
+    (void)count;
+    ((Model *)c)->m = values[0];
+    return 0;
+}
+static int get_whole(void *c, const unsigned *vr, size_t count, int *values)
+{
+    (void)vr;
+    (void)count;
+    values[0] = ((Model *)c)->n;
+    return 0;
+}
+static int do_step(void *c, double time, double length, int is_final)
+{
+    Model *it = c;
+    (void)is_final;
+    it->x = it->u + 1.0;
+    it->n = it->m + 1;
+    return time + length > STEPS + 1.0 ? 3 : 0; /* one step more than there are */
+}
+
+static struct {
+    Lane lane;
+    double memory[INSTANCES][(HEAD + ROOM) / sizeof(double)];
+} shared __attribute__((aligned(64)));
+
+static void *host(void *service)
+{
+    ride(service);
+    return NULL;
+}
+
+typedef int (*Step)(void *, double, double, int);
+typedef int (*SetR)(void *, const unsigned *, size_t, const double *);
+typedef int (*GetR)(void *, const unsigned *, size_t, double *);
+typedef int (*SetI)(void *, const unsigned *, size_t, const int *);
+typedef int (*GetI)(void *, const unsigned *, size_t, int *);
+
+#define UNTIL_HEARD(call) \
+    do { \
+        status = (call); \
+    } while (status == SILENT)
+
+int main(int count, char **arguments)
+{
+    Model models[INSTANCES] = {{0}};
+    Operation operations[INSTANCES][N_KINDS];
+    Guest guests[INSTANCES];
+    uintptr_t functions[N_KINDS] = {(uintptr_t)set_real, (uintptr_t)set_whole, (uintptr_t)do_step, (uintptr_t)get_real,
+                                    (uintptr_t)get_whole};
+    int64_t spin = count > 1 ? atol(arguments[1]) : 0;
+    LaneObject road = {.lane = &shared.lane, .line = -1, .moment = spin < 1000 ? 5000 : 1000000000};
+    RiderObject riders[INSTANCES];
+    Seat seats[INSTANCES][N_KINDS];
+    road.memory.buf = &shared;
+    road.spin.most = road.spin.now = spin;
+    for (uint32_t k = 0; k < INSTANCES; k++) {
+        Py_ssize_t head = (char *)shared.memory[k] - (char *)&shared;
+        guests[k] = (Guest){.memory = (char *)&shared, .notes = (int64_t *)shared.memory[k]};
+        guests[k].operations.buf = operations[k];
+        guests[k].operations.len = sizeof operations[k];
+        riders[k] = (RiderObject){.road = &road, .head = head, .number = k, .gives = 1};
+        for (uint32_t n = 0; n < N_KINDS; n++) {
+            uint64_t offset = (uint64_t)head + HEAD + 8 * n;
+            operations[k][n] = (Operation){n, functions[n], (uintptr_t)&models[k], 0, 1, offset, n + 1};
+            seats[k][n] = (Seat){.rider = &riders[k], .number = n, .offset = (Py_ssize_t)offset};
+        }
+    }
+    Service service = {.lane = &shared.lane, .guests = guests, .count = INSTANCES, .spin = {spin, spin}};
+    pthread_t thread;
+    pthread_create(&thread, NULL, host, &service);
+    double x = 0.0;
+    int n = 0, status;
+    for (int k = 0; k < STEPS; k++) {
+        for (int j = 0; j < INSTANCES; j++) {
+            UNTIL_HEARD(((SetR)lane_functions[SET_REALS])(&seats[j][SET_REALS], NULL, 1, &x));
+            UNTIL_HEARD(((SetI)lane_functions[SET_INTEGERS])(&seats[j][SET_INTEGERS], NULL, 1, &n));
+            UNTIL_HEARD(((Step)lane_functions[STEP])(&seats[j][STEP], k, 1.0, 1));
+            UNTIL_HEARD(((GetR)lane_functions[GET_REALS])(&seats[j][GET_REALS], NULL, 1, &x));
+            UNTIL_HEARD(((GetI)lane_functions[GET_INTEGERS])(&seats[j][GET_INTEGERS], NULL, 1, &n));
+        }
+    }
+    UNTIL_HEARD(((Step)lane_functions[STEP])(&seats[1][STEP], STEPS + 1.0, 1.0, 1));
+    UNTIL_HEARD(((GetR)lane_functions[GET_REALS])(&seats[1][GET_REALS], NULL, 1, &x));
+    uint32_t ticket;
+    while (!post(&road, (Entry){.what = LEAVE}, 1, &ticket)) {
+    }
+    pthread_join(thread, NULL);
+    printf("%g %d %d\n", x, n, status);
+    return !(x == INSTANCES * STEPS && n == INSTANCES * STEPS && status == 3);
+}
