@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Iterable, Iterator
+from collections.abc import Collection, Iterable, Iterator
+from fnmatch import fnmatchcase
 from typing import NamedTuple
 
 INDEX = r"(-?\d{1,9})(?!\d)"
@@ -183,3 +184,14 @@ def _at_end(variable: str) -> list[re.Match[str]]:
 
 def _numbers(groups: Iterable[re.Match[str]]) -> tuple[int, ...]:
     return tuple(int(number) for group in groups for number in group[1].split(","))
+
+
+def matching(names: Iterable[str], patterns: Collection[str]) -> list[str]:
+    """The names that any of some patterns fits: ``*`` and ``?`` stand for letters, and brackets for themselves.
+
+    Args:
+        names: of signals, in whose order they are given back.
+        patterns: such as ``train*.speed``.
+    """
+    plain = [pattern.replace("[", "[[]") for pattern in patterns]
+    return [name for name in names if any(fnmatchcase(name, pattern) for pattern in plain)]

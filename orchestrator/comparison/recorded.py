@@ -7,7 +7,6 @@ import json
 import math
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import asdict
-from fnmatch import fnmatchcase
 from pathlib import Path
 
 import numpy as np
@@ -15,6 +14,7 @@ import numpy as np
 from .. import world
 from ..errors import ScenarioError
 from ..figures import remove_drawn
+from ..names import matching
 from ..problems import suggestion
 from ..run import RESULT_ENDINGS, Results
 from .deviations import Deviation, RecordedComparison, Tested
@@ -80,15 +80,10 @@ def _loaded(path: Path) -> Results:
 def _chosen(reference: Results, patterns: Collection[str], name: str) -> list[str]:
     """The signals of the reference that patterns ask for; in names brackets are what they are, and no patterns."""
     for pattern in patterns:
-        if not _matching(reference, [pattern]):
+        if not matching(reference, [pattern]):
             near = suggestion(pattern, reference)
             raise ScenarioError(f"{name} has no signal {pattern}" + (f"; {near}" if near else ""))
-    return _matching(reference, patterns or ["*"])
-
-
-def _matching(names: Collection[str], patterns: Collection[str]) -> list[str]:
-    plain = [pattern.replace("[", "[[]") for pattern in patterns]
-    return [name for name in names if any(fnmatchcase(name, pattern) for pattern in plain)]
+    return matching(reference, patterns or ["*"])
 
 
 def _is_number(results: Results, name: str) -> bool:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections import Counter
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -14,7 +14,7 @@ from ..figures import check_figures, remarked
 from ..fmi import Interface, Kind, Model, Workspace, load_models
 from ..isolation import check_isolation, check_once_per_process, isolation_notes
 from ..master import ALGORITHMS, check_coupling, check_events, describe_coupling
-from ..names import SignalName
+from ..names import SignalName, matching
 from ..problems import Problem, suggestion
 from ..scenario import import_notes, untrusted_code
 from ..system import System
@@ -101,13 +101,36 @@ def check(system: System, workspace: Workspace, kind: Kind = "auto", *, trusted:
     problems += judge.requirement_problems + judge.metric_problems
     if not judge.metric_problems:
         problems += check_values(judged.published, judged.references, judge.indices, system.provenance.presets)
-    problems += check_figures(system.judged.figures, names, every_step)
+    recorded, told = _recorded(system, names)
+    problems += told + check_figures(system.judged.figures, names, every_step)
     if problems:
         raise ScenarioError(problems)
+    system, undrawn = _without_unrecorded(system, [*recorded, *parameters.intersection(names)], every_step)
     order = derive_order(list(system.instances), wiring.links, system.stepping.order)
-    large = tell_size(system, sum(name not in parameters for name in names))
-    notes = [*left_out, *([large] if large else []), *_notes(system, models, wiring, order)]
+    large = tell_size(system, sum(name not in parameters for name in recorded))
+    notes = [*left_out, *undrawn, *([large] if large else []), *_notes(system, models, wiring, order)]
     return Checked(system, models, wiring, order, tuple(notes), judge, large)
+
+
+def _recorded(system: System, names: Collection[str]) -> tuple[Collection[str], list[Problem]]:
+    """The signals that are recorded, and what is wrong with the patterns that say so."""
+    patterns = system.stepping.record_only
+    problems = [
+        Problem("simulation.record_only", f"no signal is called {pattern!r}", suggestion(pattern, names))
+        for pattern in patterns
+        if not matching(names, [pattern])
+    ]
+    return matching(names, patterns) if patterns else names, problems
+
+
+def _without_unrecorded(system: System, drawable: Collection[str], every_step: bool) -> tuple[System, list[str]]:
+    """A system without the figures that need more than is recorded, and a note that names them."""
+    figures = system.judged.figures
+    kept = [x for x in figures if not system.stepping.record_only or not check_figures([x], drawable, every_step)]
+    if len(kept) == len(figures):
+        return system, []
+    names = ", ".join(repr(figure.get("title")) for figure in figures if figure not in kept)
+    return system.changed(figures=kept), [f"not drawn, because what they show is not recorded (record_only): {names}"]
 
 
 def _without_the_missing(

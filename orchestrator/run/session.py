@@ -17,6 +17,7 @@ from ..fmi import Interface, Kind, Slave
 from ..fmi.guard import run_guarded
 from ..isolation import become_known
 from ..master import ALGORITHMS, Master, Rows
+from ..names import matching
 from ..times import slack
 from . import record as record_file
 from .assembly import assembled
@@ -220,7 +221,7 @@ class Session:
             identity=identity,
             before=self._before,
             expected=0 if ALGORITHMS[system.stepping.algorithm].varies_step else self._count + 1,
-            only=None if crew is None else crew.only,
+            only=self._only(master.signals),
         )
         if begin is None or directory is None:
             first = [[system.stepping.start_time, *master.values]]
@@ -249,8 +250,9 @@ class Session:
 
     @property
     def _judged(self) -> Collection[str] | None:
-        """The signals that metrics and requirements look at; None where every point is a result."""
-        if self._row_every == (0.0 if ALGORITHMS[self.system.stepping.algorithm].varies_step else 1.0):
+        """The signals that metrics and requirements look at; None where every point of all is a result."""
+        every_point = self._row_every == (0.0 if ALGORITHMS[self.system.stepping.algorithm].varies_step else 1.0)
+        if every_point and (self._crew is not None or not self.system.stepping.record_only):
             return None
         return self.checked.judge.needed_signals if self._crew is None else self._crew.kept
 
@@ -263,16 +265,17 @@ class Session:
         told_every, kept_every = (row_every, 1) if varies else (1, int(row_every))
         observe = self._observer(master, Due(kept_every, count), -1 if varies else count)
         assert self._recording is not None
-        table = None if varies else self._recording.lend()
+        table = None if varies or (self._crew is None and system.stepping.record_only) else self._recording.lend()
         begin, before = world.perf_counter(), master.steps
-        pacer = self._pacer = self._make_pacer(master.time)
+        if self.job.real_time is not None:
+            self._pacer = Pacer(self.job.real_time, master.time, lambda: self.interruption.is_asked_for)
+        pacer = self._pacer
         try:
             while True:
                 late = slack(system.stepping.step, system.stepping.start_time, master.time)
                 passed = math.floor((master.time - system.stepping.start_time + late) / system.stepping.step)
                 until = min(count, (passed // stride + 1) * stride)
-                if pacer is not None:
-                    until = min(until, passed + pacer.due(master.time, system.stepping.step))
+                until = min(until, passed + (pacer.due(master.time, system.stepping.step) if pacer else stride))
                 points = {"first": master.steps, "until": until}
                 times = system.stepping.start_time, system.stepping.step
                 if not master.run(*times, count, told_every, observe, **points, table=table):
@@ -286,9 +289,11 @@ class Session:
         finally:
             self.seconds.update(stepping=world.perf_counter() - begin, steps=master.steps - before)
 
-    def _make_pacer(self, time: float) -> Pacer | None:
-        real_time = self.job.real_time
-        return None if real_time is None else Pacer(real_time, time, lambda: self.interruption.is_asked_for)
+    def _only(self, signals: Sequence[str]) -> Collection[str] | None:
+        """The signals that are kept; None for all."""
+        if self._crew is not None:
+            return self._crew.only
+        return {*matching(signals, self.system.stepping.record_only)} if self.system.stepping.record_only else None
 
     def _observer(self, master: Master, due: Due, count: int) -> Callable[[int, Rows], bool]:
         assert self._recording is not None

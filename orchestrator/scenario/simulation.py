@@ -20,6 +20,7 @@ SIMULATION_KEYS = (
     "start_time",
     "algorithm",
     "record",
+    "record_only",
     "seed",
     "order",
     "extrapolation",
@@ -58,11 +59,22 @@ def read_simulation(entries: Mapping[str, Entry], origin: str, problems: list[Pr
     for key, (valid, what) in _CHOICES.items():
         if key in entries:
             values[key] = choice(entries[key], problems, valid, what)
+    if "record_only" in entries:
+        values["record_only"] = _patterns(entries["record_only"], problems)
     if "seed" in entries:
         values["seed"] = read_seed(entries["seed"], problems)
     if len(problems) == before:
         problems += _grid(entries, values)
     return values | _numerics(entries, problems)
+
+
+def _patterns(entry: Entry, problems: list[Problem]) -> list[str]:
+    """Which signals are recorded."""
+    value = entry.value
+    if isinstance(value, list) and value and all(isinstance(each, str) and each for each in value):
+        return list(value)
+    problems.append(entry.problem("is not a list of names", 'write record_only = ["train*.speed", "cruise[1].force"]'))
+    return []
 
 
 def read_seed(entry: Entry, problems: list[Problem]) -> int:

@@ -35,8 +35,8 @@ def _lines(system: System) -> Iterator[str]:
     yield from ("", "[simulation]")
     keys = ("start_time", "stop_time", "step", "algorithm", "record")
     yield from _assignments({key: getattr(stepping, key) for key in keys} | {"seed": system.seed})
-    yield from _assignments({"order": system.stepping.order or None})
-    others = [key for key in SIMULATION_KEYS if key not in (*keys, "seed", "order", "tolerances")]
+    yield from _assignments({key: getattr(stepping, key) or None for key in ("order", "record_only")})
+    others = [key for key in SIMULATION_KEYS if key not in (*keys, "seed", "order", "record_only", "tolerances")]
     yield from _assignments(
         {key: value for key in others if (value := getattr(stepping, key)) != getattr(Stepping, key)}
     )

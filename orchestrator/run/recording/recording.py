@@ -64,7 +64,7 @@ class Recording:
             )
             self._recorders.append(recorder)
             self._picks.append(None if chosen is None else [0, *(n + 1 for n in picked)])
-        self._is_lent = False
+        self._is_lent, self._names = False, names
 
     def lend(self) -> Table | None:
         """Where every point can be written at once, if one place does: then arrays that are seen are of there."""
@@ -133,7 +133,7 @@ class Recording:
         if len(self._recorders) == 1:
             return results
         told = (results.step, results.completed, results.stop_time, results.units, results.parameters)
-        return Seen(self._recorders[1].columns(), results.names(), *told)
+        return Seen(self._recorders[1].columns(), self._names, *told)
 
 
 def check_stored(directory: Path, record: Mapping[str, Any], marks: Sequence[Sequence[int]]) -> list[int]:

@@ -80,7 +80,8 @@ class Watching:
         """
         self._look()
         found = list(self._crossings.findings())
-        everything = self._system.stepping.record in (None, self._system.stepping.step)
+        stepping = self._system.stepping
+        everything = stepping.record in (None, stepping.step) and not stepping.record_only
         count = recorded.points
         first = max(0, count - _LAST)
         last = Part(recorded, recorded.part(first, count), first)
