@@ -106,6 +106,9 @@ def gap(speed: float, reserve: float) -> float:
 
 
 def gains(law: str, speed: float, reserve: float) -> dict[str, float]:
+    if law in ("DistributedMpc", "TimeHeadwayCruise"):  # of predictive_campaign.py
+        policy = {"time_headway": (gap(speed, reserve) - STANDSTILL) / speed}
+        return policy | ({"gap_margin": 0.0} if law == "DistributedMpc" else {"acceleration_limit": BRAKING})
     if law == "FixedDistanceCruise":
         policy = {"desired_gap": gap(speed, reserve)}
     else:
@@ -127,7 +130,8 @@ def system_of(
     for i in range(2, drawn.trains + 1):
         position = -(i - 1) * gap(drawn.speed, reserve)
         system.add(f"train[{i}]", "PointMassTrain", position=position, speed=drawn.speed, **brakes)
-        system.add(f"cruise[{i}]", drawn.law, has_ahead=True, has_behind=i < drawn.trains, **tuned)
+        plans = {"has_plan": True} if drawn.law == "DistributedMpc" and i > 2 else {}
+        system.add(f"cruise[{i}]", drawn.law, has_ahead=True, has_behind=i < drawn.trains, **tuned, **plans)
         system.connect("target.value", f"cruise[{i}].target_speed")
         system.connect(f"cruise[{i}].force", f"train[{i}].force")
         for name in ("position", "speed"):
@@ -162,7 +166,12 @@ def _connect(system: System, drawn: Draw, sender: int, hearer: int, perfect: boo
         losses = {"burst_end": end, "burst_begin": end * drawn.loss / (1.0 - drawn.loss)}
     radio = f"radio_{side}[{hearer}]"
     late = {"refresh": drawn.refresh, "delay": drawn.delay, "jitter": drawn.jitter}
-    system.add(radio, "RadioLink", **late, **losses)
+    plans = drawn.law == "DistributedMpc" and 1 < sender < hearer
+    build = {"values": 11, "unit": "m/s2"} if plans else {}
+    system.add(radio, "RadioLink", build, **late, **losses)
+    if plans:
+        system.connect(f"cruise[{sender}].plan", f"{radio}.sent_values")
+        system.connect(f"{radio}.heard_values", f"{target}_plan")
     system.connect(f"channel[{min(sender, hearer)}].sending", f"{radio}.sending")
     system.connect(f"{radio}.age", f"{target}_age")
     for name in ("position", "speed"):

@@ -20,7 +20,7 @@ OUTAGES = Table("outage", [Column("begin", "s"), Column("end", "s", after="begin
 
 
 class RadioLink(Component):
-    """A one-way radio link that repeats a train's position and speed, late and not always.
+    """A one-way radio link that repeats a train's position and speed, and further numbers, late and not always.
 
     A message leaves every ``refresh`` seconds and is on its way for ``delay`` plus a uniform share of ``jitter``. It is
     lost with probability ``loss`` while the channel is good, ``burst_loss`` while it is bad; before each message the
@@ -44,10 +44,13 @@ class RadioLink(Component):
     )
 
     messages = Size(16, description="how many messages can be under way")
+    values = Size(0, minimum=0, description="how many further numbers a message carries, such as those of a plan")
+    unit = Data("1", description="unit of the further numbers")
     outages = Data([], convert=OUTAGES.read, description=f"{OUTAGES.description}: then every message is lost")
 
     sent_position = Input("m", description="position the sender reports")
     sent_speed = Input("m/s", description="speed the sender reports")
+    sent_values = Input(unit, 0.0, shape=(values,), optional=True, description="further numbers the sender reports")
     sending = Input("1", True, optional=True, description="whether the sender transmits")
     interference = Input("1", 0.0, optional=True, description="further probability of a loss, in either state")
 
@@ -82,22 +85,26 @@ class RadioLink(Component):
     overrun = Memory("1", False, output=True, description="whether a message was forgotten under way")
     last_position = Memory("m", 0.0, description="position in the message heard last")
     last_speed = Memory("m/s", 0.0, description="speed in the message heard last")
+    last_values = Memory(unit, 0.0, shape=(values,), description="further numbers in the message heard last")
     last_time = Memory("s", 0.0, description="when the message heard last was sent")
     arrivals = Memory("s", _NEVER, shape=(messages,), description="arrival times of the last messages, newest first")
     times = Memory("s", 0.0, shape=(messages,), description="when they were sent")
     positions = Memory("m", 0.0, shape=(messages,), description="positions in them")
     speeds = Memory("m/s", 0.0, shape=(messages,), description="speeds in them")
+    numbers = Memory(unit, 0.0, shape=(messages, values), description="further numbers in them")
 
     position = Output("m", description="position received last")
     speed = Output("m/s", description="speed received last")
+    heard_values = Output(unit, shape=(values,), description="further numbers received last")
     age = Output("s", description="age of what was received last")
 
     def initial(self) -> Values:
-        return {"last_position": self.sent_position, "last_speed": self.sent_speed, "last_time": self.time}
+        start = {"last_position": self.sent_position, "last_speed": self.sent_speed, "last_time": self.time}
+        return start | {"last_values": self.sent_values}
 
     def outputs(self) -> Values:
-        sent, position, speed = self._heard()
-        return {"position": position, "speed": speed, "age": self.time - sent}
+        sent, position, speed, *values = self._heard()
+        return {"position": position, "speed": speed, "heard_values": values, "age": self.time - sent}
 
     def update(self) -> Values:
         due = self._due()
@@ -105,7 +112,10 @@ class RadioLink(Component):
         rows["speeds"] = self.sent_speed
         oldest = self.arrivals[-1]
         forgotten = logical_and(oldest > self.time + _ROUNDING, oldest < _NEVER)
-        sent, position, speed = self._heard()
+        sent, position, speed, *values = self._heard()
+        numbers = [
+            self._shifted(column, newest, due) for column, newest in zip(self.numbers.T, self.sent_values, strict=True)
+        ]
         return {
             "number": where(due, self._count(), self.number),
             "bad": where(due, self._turns_bad(), self.bad),
@@ -113,6 +123,8 @@ class RadioLink(Component):
             "last_time": sent,
             "last_position": position,
             "last_speed": speed,
+            "last_values": values,
+            "numbers": [list(row) for row in zip(*numbers, strict=True)] if numbers else self.numbers,
             **{name: self._shifted(getattr(self, name), newest, due) for name, newest in rows.items()},
         }
 
@@ -136,15 +148,15 @@ class RadioLink(Component):
             silent = logical_or(silent, logical_and(now >= begin, now < end))
         return where(logical_or(lost, silent), _NEVER, self.time + self.delay + self.jitter * self.haste)
 
-    def _heard(self) -> tuple[Any, Any, Any]:
-        """Time of sending, position and speed of the newest message that has arrived."""
+    def _heard(self) -> list[Any]:
+        """Time of sending, position, speed and further numbers of the newest message that has arrived."""
         now = self.time + _ROUNDING
-        heard = (self.last_time, self.last_position, self.last_speed)
-        columns = zip(self.arrivals, self.times, self.positions, self.speeds, strict=True)
-        for arrival, *message in reversed(list(columns)):
-            heard = _choose(arrival <= now, message, heard)
+        heard = [self.last_time, self.last_position, self.last_speed, *self.last_values]
+        columns = zip(self.arrivals, self.times, self.positions, self.speeds, self.numbers, strict=True)
+        for arrival, time, position, speed, numbers in reversed(list(columns)):
+            heard = _choose(arrival <= now, [time, position, speed, *numbers], heard)
         arrived = logical_and(self._due(), self._arrival() <= now)
-        return _choose(arrived, (self.time, self.sent_position, self.sent_speed), heard)
+        return _choose(arrived, [self.time, self.sent_position, self.sent_speed, *self.sent_values], heard)
 
     def _shifted(self, column: Any, newest: Any, due: Any) -> list[Any]:
         """A column with a message put in at its head where one is due."""
@@ -152,6 +164,5 @@ class RadioLink(Component):
         return [where(due, new, old) for new, old in zip(moved, column, strict=True)]
 
 
-def _choose(condition: Any, then: Sequence[Any], otherwise: Sequence[Any]) -> tuple[Any, Any, Any]:
-    sent, position, speed = (where(condition, a, b) for a, b in zip(then, otherwise, strict=True))
-    return sent, position, speed
+def _choose(condition: Any, then: Sequence[Any], otherwise: Sequence[Any]) -> list[Any]:
+    return [where(condition, a, b) for a, b in zip(then, otherwise, strict=True)]

@@ -85,8 +85,8 @@ class DistributedMpc(GuardedCruise):
     speed_limit = Parameter("m/s", 100.0, tunable=True, minimum=0.1, description="highest speed")
     acceleration_limit = Parameter("m/s2", 0.6, tunable=True, minimum=1e-3, description="largest acceleration")
     jerk_limit = Parameter("m/s3", 0.5, tunable=True, minimum=1e-3, description="largest jerk, either way")
-    traction_limit = Parameter("N", 400e3, tunable=True, minimum=1.0, description="largest traction force")
-    power_limit = Parameter("W", 8.8e6, tunable=True, minimum=1.0, description="largest traction power")
+    traction_limit = Parameter("N", 600e3, tunable=True, minimum=1.0, description="largest traction force")
+    power_limit = Parameter("W", 60e6, tunable=True, minimum=1.0, description="largest traction power")
     gap_weight = Parameter("1/m2", 2e-3, tunable=True, minimum=0.0, description="weight of the gap's error")
     follow_weight = Parameter(
         "s2/m2", 0.5, tunable=True, minimum=0.0, description="weight of the speed difference to the train ahead"

@@ -171,3 +171,21 @@ def test_interference_loses_a_share_of_what_would_arrive():
     assert rows == pytest.approx(by_hand(200, loss=0.6))
     rows, _ = listen(RadioLink(interference=1.0))
     assert (rows[:, 0] == sender(0.0)[0]).all()
+
+
+def test_further_numbers_come_in_the_message_of_their_moment():
+    """Those that stand still beside those of the position: each is the position times its number, whenever heard."""
+    radio = Simulation(RadioLink(values=3, unit="m", messages=4, delay=0.25, jitter=0.1, loss=0.3, seed=5))
+    radio.set("sent_values", [1e3, 2e3, 3e3])
+    radio.set("sent_position", 1e3)
+    radio.initialize()
+    radio.start()
+    heard = []
+    for k in range(60):
+        position = 1e3 + 7.0 * k
+        radio.set("sent_position", position)
+        radio.set("sent_values", [n * position for n in (1.0, 2.0, 3.0)])
+        radio.step(STEP)
+        heard.append(radio.get("position"))
+        assert radio.get("heard_values").tolist() == [n * heard[-1] for n in (1.0, 2.0, 3.0)]
+    assert len(set(heard)) > 20
