@@ -4,8 +4,8 @@
 
 The draws are those of `radio_campaign.py`: a train ahead that stops without a word, trains at virtual-coupling
 distances, a radio that is late, loses messages and is out when it matters. Every draw is simulated under each law, with
-its fallback, without and with the guard, and with the same radio luck. The train that stops tells no plan; the trains behind it tell
-theirs by the same messages, where the law has one. The exit code is 1 when a margin goes negative under
+its fallback, without and with the guard, and with the same radio luck. The train that stops tells no plan; the trains
+behind it tell theirs by the same messages, where the law has one. The exit code is 1 when a margin goes negative under
 `DistributedMpc` with its guard.
 """
 
@@ -44,8 +44,8 @@ def table(found: Sequence[radio_campaign.Outcome], laws: Sequence[str]) -> Itera
         worst = min(mine, key=lambda x: x.margin)
         met = sum(x.gap <= radio_campaign.STANDSTILL - 20.0 for x in mine)
         yield (
-            f"| {law} | {variant} | {len(mine)} | {(margins < 0.0).sum()} | {margins.min():.1f} | {low:.1f} | {median:.1f} "
-            f"| {met} | {worst.drawn.number}, train {worst.train} |"
+            f"| {law} | {variant} | {len(mine)} | {(margins < 0.0).sum()} | {margins.min():.1f} | {low:.1f} "
+            f"| {median:.1f} | {met} | {worst.drawn.number}, train {worst.train} |"
         )
 
 
