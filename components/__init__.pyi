@@ -34,7 +34,7 @@ from .lookup.table import Lookup
 from .simulate import Simulation, simulate
 from .supervision.etcs import EtcsSupervision
 from .supervision.etcs_driver import EtcsDriver
-from .supervision.line_timetable import LineTimetable
+from .supervision.line_timetable import LineTimetable, ProfileTimetable
 from .supervision.moving_block import MovingBlock
 from .supervision.protection import Protection
 from .supervision.timetable import Timetable
@@ -93,6 +93,7 @@ __all__ = [
     "PdIlc",
     "PidAto",
     "PointMassTrain",
+    "ProfileTimetable",
     "Protection",
     "RadioLink",
     "RangePotentialCruise",

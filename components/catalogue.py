@@ -29,7 +29,7 @@ from .environment.sensor import Sensor
 from .environment.sinusoid import Sinusoid
 from .supervision.etcs import EtcsSupervision
 from .supervision.etcs_driver import EtcsDriver
-from .supervision.line_timetable import LineTimetable
+from .supervision.line_timetable import LineTimetable, ProfileTimetable
 from .supervision.moving_block import MovingBlock
 from .supervision.protection import Protection
 from .supervision.timetable import Timetable
@@ -77,6 +77,7 @@ CATALOGUE: dict[str, type[Component]] = {
         LearningEnergy,
         Timetable,
         LineTimetable,
+        ProfileTimetable,
         Protection,
         EtcsSupervision,
         EtcsDriver,

@@ -25,7 +25,7 @@ _PRESENT = sys.stdlib_module_names | {"numpy", __package__.partition(".")[0]}
 """What every component file may import."""
 
 _SHIPPED = Path(models.__file__ or "").resolve().parent
-_DATA_FOLDERS = ("lines", "rolling_stock")
+_DATA_FOLDERS = ("lines", "profiles", "rolling_stock")
 """Of the shipped data, relative to the scenarios."""
 
 _MOST = 1 << 24
@@ -115,12 +115,12 @@ def _imported_modules(file: Path) -> Iterator[str]:
 
 
 def names_data(value: Any) -> bool:
-    """Whether a build argument names a data file: a text that ends in ``.json``, ``.railml``, ``.xml`` or ``.onnx``."""
+    """Whether a value names a data file: one ending in ``.json``, ``.csv``, ``.railml``, ``.xml`` or ``.onnx``."""
     return isinstance(value, str) and value.endswith(DATA_SUFFIXES)
 
 
 def data_file(name: str, folder: Path | None = None) -> Path:
-    """The data file of a name: in a folder, the current one by default, or else a line or a train that is shipped."""
+    """The data file of a name: in a folder, the current one by default, or else one that is shipped."""
     own, shipped = (folder or Path()) / name, _SHIPPED / name
     return shipped if not own.exists() and Path(name).parts[0] in _DATA_FOLDERS and shipped.is_file() else own
 

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+import itertools
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from typing import Any, NamedTuple
 
@@ -47,6 +48,22 @@ class Profile:
         for phase in phases:
             self._continue(phase.begin, phase.jerk)
             self._continue(phase.begin + phase.duration, 0.0)
+
+    @classmethod
+    def through(cls, rows: Sequence[tuple[float, float, float]]) -> Profile:
+        """The motion of one constant jerk from each row to the next, which leads through all.
+
+        Args:
+            rows: time in s from 0 on and rising, position in m, speed in m/s.
+        """
+        made = cls(rows[0][2], ())
+        made.times, made.motions = [], []
+        for (t0, x0, v0), (t1, x1, v1) in itertools.pairwise(rows):
+            length = t1 - t0
+            jerk = 12.0 * (0.5 * (v0 + v1) * length - (x1 - x0)) / length**3
+            made.times.append(t0)
+            made.motions.append(Motion(x0, v0, (v1 - v0) / length - 0.5 * jerk * length, jerk))
+        return made
 
     def _continue(self, time: float, jerk: float) -> None:
         """Change to another jerk at a time."""

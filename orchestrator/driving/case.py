@@ -38,6 +38,7 @@ class Wish(NamedTuple):
     deceleration: float | None
     jerk: float
     regeneration: bool
+    reserve: float
     intervals: int
     tolerance: float
 
@@ -55,6 +56,7 @@ WISH = Table(
         Column("deceleration", "m/s2", default=None, within=(0.0, 5.0), note="for comfort; 0 is no limit"),
         Column("jerk", "m/s3", default=0.0, within=(0.0, 10.0), note="change of the force over the mass; 0: no limit"),
         Column("regeneration", type=bool, default=True),
+        Column("reserve", default=0.0, within=(0.0, 0.5), note="share of forces and powers left to a controller"),
         Column("intervals", type=int, default=60, within=(10, 2000), note="of the first mesh"),
         Column("tolerance", default=1e-5, within=(1e-9, 0.1), note="relative change of the objective to stop at"),
     ],

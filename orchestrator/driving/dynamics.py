@@ -36,8 +36,11 @@ class Dynamics:
         self.case = case
         self.acceleration = _acceleration(case.component)
         brake = train.regeneration if wish.regeneration else train.regeneration._replace(force=0.0)
-        self.forces = dict(zip(FORCES, (train.traction.force, brake.force, train.friction_brake), strict=True))
-        self.powers = dict(zip(FORCES, (train.traction.power, brake.power, np.inf), strict=True))
+        share = 1.0 - wish.reserve
+        forces = (train.traction.force, brake.force, train.friction_brake)
+        powers = (train.traction.power, brake.power, np.inf)
+        self.forces = {name: share * force for name, force in zip(FORCES, forces, strict=True)}
+        self.powers = {name: share * power for name, power in zip(FORCES, powers, strict=True)}
         self.costs = dict(zip(FORCES, (1.0 / train.traction.efficiency, -brake.efficiency, 0.0), strict=True))
         self.slowest = min(wish.start_speed, wish.end_speed)
         steps = [speed for _, speed in case.line.limits.steps]

@@ -137,10 +137,11 @@ def _first_mesh(dynamics: Dynamics) -> Floats:
     ends = _ENDS[reach > _ENDS]
     fixed = np.array([x for x in dynamics.breaks() if begin < x < end])
     nodes = np.unique(np.concatenate([[begin, end], fixed]))
-    for candidate in (*dynamics.slopes(), *(begin + ends), *(end - ends), *even):
-        near = 0.25 * (even[1] - even[0]) if candidate in even else 1.0
-        if begin < candidate < end and np.abs(nodes - candidate).min() >= near:
-            nodes = np.sort(np.append(nodes, candidate))
+    spacing = 0.25 * (even[1] - even[0])
+    for candidates, near in (((*(begin + ends), *(end - ends)), 1.0), ((*dynamics.slopes(), *even), spacing)):
+        for candidate in candidates:
+            if begin < candidate < end and np.abs(nodes - candidate).min() >= near:
+                nodes = np.sort(np.append(nodes, candidate))
     return nodes
 
 

@@ -96,6 +96,17 @@ def test_a_data_file_that_cannot_be_used(tmp_path, text, complaint):
         build("Line", {"line": str(path)})
 
 
+def test_a_table_is_rows_by_the_names_in_its_first_line(tmp_path):
+    path = tmp_path / "profile.csv"
+    path.write_text("position,time,speed\n0,0,0\n2,2,2\n4.0,4e0,0\n", encoding="utf-8")
+    plan = build_with(resolve("ProfileTimetable"), {"profile": str(path)}).profile
+    assert (plan.duration, plan.distance) == (9.0, 4.0)
+    for wrong in ("position,time,speed\n0,0,0\n1,2\n", "position,time,speed\n0,0,0\n1,2;5,3\n"):
+        path.write_text(wrong, encoding="utf-8")
+        with pytest.raises(ComponentError, match=r"profile: .*profile.csv: line 3 is not a number for each column"):
+            build_with(resolve("ProfileTimetable"), {"profile": str(path)})
+
+
 def test_a_vast_data_file_is_not_read(tmp_path):
     path = tmp_path / "line.json"
     with path.open("wb") as stream:

@@ -23,6 +23,7 @@ def test_gains_and_limits_may_change_in_a_run_and_masses_may_not():
         "Line",
         "LineTimetable",
         "LineTrain",
+        "ProfileTimetable",
         "ReferenceProfile",
         "ActuatorFaults",
         "Timetable",

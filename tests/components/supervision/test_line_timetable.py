@@ -1,7 +1,7 @@
 """The timetable over a line: cycles, references and limits."""
 
 import pytest
-from railcosim.components import LineTimetable, Simulation
+from railcosim.components import ComponentError, LineTimetable, ProfileTimetable, Simulation
 
 SERVICE = {"acceleration": 1.0, "deceleration": 1.0, "jerk": 1.0, "margin": 2.0, "dwell": 5.0}
 LINE = {
@@ -38,3 +38,55 @@ def test_its_reference_moves_as_its_acceleration_says():
         timetable.step(0.1)
         assert timetable.get("reference_speed") == pytest.approx(speed, abs=1e-9)
         speed += 0.1 * timetable.get("reference_acceleration")
+
+
+def _columns(timetable, names, count, step):
+    simulation = Simulation(timetable)
+    simulation.initialize()
+    simulation.start()
+    rows = []
+    for _ in range(count):
+        simulation.step(step)
+        rows.append([simulation.get(name) for name in names])
+    return list(zip(*rows, strict=True))
+
+
+def test_a_profile_is_met_row_by_row_and_led_from_and_to_rest():
+    rows = [{"position": x, "time": t, "speed": v} for t, x, v in ((7.0, 100.0, 2.0), (11.0, 116.0, 6.0))]
+    rows += [{"position": 146.0, "time": 16.0, "speed": 6.0}, {"position": 157.0, "time": 18.5, "speed": 3.0}]
+    rows += [{"position": 160.0, "time": 20.5, "speed": 0.0}]  # not at one deceleration: 1.2, then 1.5 m/s2
+    names = ("trip", "trip_time", "reference_position", "reference_speed", "reference_acceleration")
+    timetable = ProfileTimetable(
+        profile=rows, sample_time=0.5, wait=1.0, mean_acceleration=False, line=LINE, train={"mass": 1e4}
+    )
+    trip, time, x, v, a = _columns(timetable, names, 44, 0.5)
+    at = {t: k for k, t in enumerate(time) if trip[k] == 1}
+    assert (x[at[0.0]], v[at[0.0]], a[at[0.0]]) == (98.0, 0.0, 1.0)  # 1 m/s2 for two seconds to the first row
+    for row, t in zip(rows, (2.0, 6.0, 11.0, 13.5, 15.5), strict=True):
+        assert (x[at[t]], v[at[t]]) == pytest.approx((row["position"], row["speed"]), abs=1e-9)
+    assert max(at) == 20.5  # 5 s more
+    assert (x[at[20.5]], v[at[20.5]]) == (160.0, 0.0)
+    for k in range(at[0.0], at[15.0]):
+        assert x[k + 1] - x[k] == pytest.approx(0.25 * (v[k] + v[k + 1]), abs=0.03)
+
+
+def test_a_profile_that_ends_on_the_way_is_led_to_rest():
+    timetable = ProfileTimetable(sample_time=0.5, wait=1.0)
+    time, x, v = _columns(timetable, ("trip_time", "reference_position", "reference_speed"), 143, 0.5)
+    stop = next(k for k, t in enumerate(time) if t > 1.0 and v[k] == 0.0)
+    assert x[stop] == pytest.approx(1001.5, abs=0.01)  # 1 m/s on, at about 1 m/s2
+    assert time[stop] == pytest.approx(70.5, abs=0.51)
+
+
+@pytest.mark.parametrize(
+    ("rows", "told"),
+    [
+        ([(0.0, 0.0, 1.0)], "has at least two rows"),
+        ([(0.0, 0.0, 2.0), (10.0, 5.0, 2.0)], "begins at 2 m/s without a change of speed that leads to rest"),
+        ([(0.0, 0.0, 0.0), (10.0, 5.0, 4.0)], "ends at 4 m/s without"),
+        ([(0.0, 0.0, 1.0), (0.0, 5.0, 4.0)], "'position' must exceed 0"),
+    ],
+)
+def test_profiles_of_no_trip(rows, told):
+    with pytest.raises(ComponentError, match=told):
+        ProfileTimetable(profile=[dict(zip(("position", "time", "speed"), row, strict=True)) for row in rows])

@@ -104,6 +104,13 @@ def test_without_regeneration_it_costs_more(rows):
     assert optimum.solution.forces["regeneration"].max() == 0.0
 
 
+def test_a_reserve_is_left_of_forces_and_powers(rows):
+    optimum, (_, _, v, traction, _) = rows("reserve=0.1")
+    assert traction.max() <= 0.9 * 100e3 + 1e-2
+    assert (traction * v).max() <= 0.9 * 1.2e6 * (1.0 + 1e-6)
+    assert optimum.solution.energy > rows()[0].solution.energy
+
+
 def test_forces_change_no_faster_than_a_jerk_limit(rows):
     optimum, _ = rows("jerk=0.1")
     times, net = optimum.solution.times.ravel(), optimum.solution.net.ravel()
