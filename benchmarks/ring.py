@@ -2,6 +2,7 @@
 
     python benchmarks/ring.py                  # native FMUs of a component: checks every value, Runge-Kutta
     python benchmarks/ring.py --light          # the same FMU with the least library there can be: the hardest case
+    python benchmarks/ring.py --whole          # `run(system)`, set-up and all, up to the arrays: 20 million FMU steps
     python benchmarks/ring.py --line 1000      # that many trains with as many controllers, 350 s
 
 CPU time of the stepping per FMU step, all threads together, in microseconds; in parentheses the ratio to the bare C
@@ -115,6 +116,28 @@ class OursToDisk(Ours):
         self.recorder.close()
 
 
+class OursWhole:
+    """From a `System` to arrays: `run`, set-up and all."""
+
+    def __init__(self, ring: Ring) -> None:
+        self.ring, self.outcome, self.share = ring, None, 0.0
+        run(system_of(ring), stop_time=STEP)  # what is loaded once
+
+    def run(self, steps: int) -> None:
+        self.outcome = None
+        gc.collect()
+        forget_peak()
+        before = resident()
+        outcome = run(system_of(self.ring), stop_time=steps * STEP)
+        arrays = [outcome.time, *(outcome[name] for name in outcome)]
+        self.share = (peak() - before) * 1024 / sum(array.nbytes for array in arrays)
+        self.outcome = outcome
+
+    def values(self) -> list[float]:
+        """How much memory the run took beyond what there was, in what it has recorded."""
+        return [self.share]
+
+
 class BareLoop:
     """The C loop of ring.c over the same instances."""
 
@@ -157,7 +180,7 @@ def serve(pipe: Any, name: str, ring: Ring) -> None:
     os.dup2(os.open(os.devnull, os.O_WRONLY), 1)  # some peers' libraries chat
     try:
         begin, before = time.process_time(), resident()
-        candidate: Candidate = (CANDIDATES | {"disk": OursToDisk})[name](ring)
+        candidate: Candidate = (CANDIDATES | {"disk": OursToDisk, "whole": OursWhole})[name](ring)
         pipe.send((time.process_time() - begin, resident() - before))
         while True:
             command, steps = pipe.recv()
@@ -175,6 +198,20 @@ def resident() -> float:
     """Memory of this process in KB, as Linux tells it."""
     statm = Path("/proc/self/statm")
     return int(statm.read_text().split()[1]) * resource.getpagesize() / 1024 if statm.exists() else 0.0
+
+
+def forget_peak() -> None:
+    """Let `peak` begin anew, where Linux can."""
+    forget = Path("/proc/self/clear_refs")
+    if forget.exists():
+        forget.write_text("5")
+
+
+def peak() -> float:
+    """The most memory of this process since then in KB, as Linux tells it."""
+    status = Path("/proc/self/status")
+    lines = status.read_text().splitlines() if status.exists() else []
+    return next((float(line.split()[1]) for line in lines if line.startswith("VmHWM")), 0.0)
 
 
 @dataclass
@@ -300,6 +337,27 @@ def disk(path: Path, counts: list[int], options: argparse.Namespace) -> None:
         stream.close()
 
 
+def whole(path: Path, counts: list[int], options: argparse.Namespace) -> None:
+    """A run from its `System` to arrays beside the bare loop, which steps instances that are there, and records."""
+    print("| N | steps | bare C loop, CPU s | run(system), CPU s | ratio | memory to what is recorded |")
+    print("| --- | --- | --- | --- | --- | --- |")
+    for n in counts:
+        ring = Ring(path, n, options.total // n)
+        workers = {name: start(name, ring) for name in (BARE, "whole")}
+        costs: dict[str, list[float]] = {name: [] for name in workers}
+        memory = 0.0
+        for _ in range(options.repetitions):
+            for name, worker in workers.items():
+                seconds, values = worker.ask("run", ring.steps)
+                costs[name].append(seconds)
+                memory = values[0] if name == "whole" else memory
+        bare, mine = (statistics.median(found) for found in costs.values())
+        ratio = statistics.median(b / a for a, b in zip(*costs.values(), strict=True))
+        print(f"| {n} | {ring.steps} | {bare:.3f} | {mine:.3f} | {ratio:.2f} | {memory:.2f} |", flush=True)
+        for worker in workers.values():
+            worker.close()
+
+
 def line(count: int, repetitions: int) -> None:
     """Trains, each with a controller, one behind the other: 350 s at 0.1 s, recorded each second."""
     system = System(stop_time=350.0, step=0.1, record=1.0)
@@ -358,6 +416,8 @@ def main() -> None:
     parser.add_argument("--budget", type=float, default=3.0, help="CPU seconds of a repetition of a slow candidate")
     parser.add_argument("--light", action="store_true", help="with the least FMU there can be")
     parser.add_argument("--only", action="append", help="part of a candidate's name; may be given again")
+    parser.add_argument("--whole", action="store_true", help="whole runs, from a system to arrays, instead of stepping")
+    parser.add_argument("--total", type=int, default=20_000_000, help="FMU steps of a whole run")
     parser.add_argument("--line", type=int, help="so many trains and controllers instead of the ring")
     options = parser.parse_args()
     if options.line:
@@ -369,6 +429,9 @@ def main() -> None:
     with tempfile.TemporaryDirectory() as folder:
         path = build(f"{HERE / 'lag.py'}:Lag", {}, kind="native")
         path = light(path, Path(folder)) if options.light else path
+        if options.whole:
+            whole(path, options.count or [8, 64, 256, 1024], options)
+            return
         table(path, counts, names, options)
         disk(path, counts, options)
 

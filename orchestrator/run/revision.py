@@ -10,7 +10,7 @@ from ..fmi import Interface, Kind, Workspace
 from ..master import check_events
 from ..scenario import changed
 from ..system import System
-from ..wiring import Wiring, find_starts
+from ..wiring import Known, Wiring, find_starts
 from .checking import Checked, check
 
 _KEPT = 64
@@ -74,7 +74,8 @@ class Revision:
             is_reseeded = made.seed != known.system.seed and "seed" in starts[name]
             if instance is self._system.instances[name] is known.system.instances[name] and not is_reseeded:
                 continue
-            starts[name] = find_starts(made, instance, interfaces[name], scratch)
+            before = Known(known.system.instances[name].start, known.wiring.starts[name])
+            starts[name] = find_starts(made, instance, interfaces[name], scratch, before)
             if _alters_more(interfaces[name], known.wiring.starts[name], starts[name]):
                 return None
         wiring = replace(known.wiring, starts=starts, left=known.wiring.left | scratch.left)

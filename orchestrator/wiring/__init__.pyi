@@ -3,7 +3,7 @@ from .inputs import unmet_samples
 from .links import Link, Wiring, described, is_direct
 from .order import Order, derive_order
 from .resolution import wire
-from .starts import as_text, bounded, find_starts
+from .starts import Known, as_text, bounded, find_starts
 from .topology import describe_topology
 from .trains import Control, Following, Quantity, Train, find_controls, find_followings, find_trains
 from .units import convert
@@ -11,6 +11,7 @@ from .units import convert
 __all__ = [
     "Control",
     "Following",
+    "Known",
     "Link",
     "Order",
     "Quantity",

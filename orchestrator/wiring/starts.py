@@ -7,7 +7,7 @@ import itertools
 import math
 from collections.abc import Mapping
 from functools import lru_cache
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -20,8 +20,32 @@ from ..system import Instance, System
 from .links import Wiring
 
 
-def find_starts(system: System, instance: Instance, interface: Interface, wiring: Wiring) -> dict[str, Any]:
-    """The start values of one instance by scalar variable; what is wrong with them is noted in the wiring."""
+class Known(NamedTuple):
+    """Start values of an instance as they were given once, without fault, and what they are by scalar variable."""
+
+    given: Mapping[str, Any]
+    values: Mapping[str, Any]
+
+    def holds(self, name: str, given: Any) -> bool:
+        """Whether a variable is given the same again."""
+        before = self.given.get(name)
+        return before is given or (
+            type(before) is type(given) and isinstance(given, float | int | str) and before == given
+        )
+
+
+def find_starts(
+    system: System, instance: Instance, interface: Interface, wiring: Wiring, known: Known | None = None
+) -> dict[str, Any]:
+    """The start values of one instance by scalar variable; what is wrong with them is noted in the wiring.
+
+    Args:
+        system: the instance's.
+        instance: whose they are.
+        interface: its model's.
+        wiring: where problems, notes and what is left out go.
+        known: those of the same instance of a system that has the same names of start values, if there is one.
+    """
     values: dict[str, Any] = {}
     dropped = []
     hidden = _overridden(system, instance, interface)
@@ -30,6 +54,9 @@ def find_starts(system: System, instance: Instance, interface: Interface, wiring
             continue
         held = interface.start_name(name)
         scalars = interface.scalars(held)
+        if known is not None and scalars is not None and known.holds(name, given):
+            values.update((scalar, known.values[scalar]) for scalar in scalars)
+            continue
         signal = SignalName(instance.name, name)
         origin = system.provenance.origins.get(str(signal), instance.origin)
         if scalars is None and instance.swapped:

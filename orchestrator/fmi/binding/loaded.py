@@ -12,7 +12,7 @@ import struct
 from abc import abstractmethod
 from collections import deque
 from collections.abc import Iterator, Mapping, Sequence
-from contextlib import contextmanager
+from contextlib import contextmanager, nullcontext
 from pathlib import Path
 from typing import Any, ClassVar
 
@@ -146,20 +146,25 @@ class LoadedSlave(Stepping):
 
     def call_once(self, name: str, *arguments: Any) -> None:
         """Make a call of those that an instance gets once in a run: time enough to look at all that it may change."""
-        if self.interface.own_kind == "native":  # which changes nothing, and need not be looked at: see `watch`
-            self.call(name, *arguments)
-            return
         with self._carefully():
             self.call(name, *arguments)
 
     @contextmanager
     def _carefully(self) -> Iterator[None]:
         """Put back what the instance changes meanwhile, and note which threads it starts."""
+        if self._is_tame:
+            yield
+            return
         before = threads()
         with kept(self.tell):
             yield
         if self._library is not None:
             self._library.own(threads() - before)
+
+    @property
+    def _is_tame(self) -> bool:
+        """Whether it is one of our own, which changes nothing, and need not be looked at: see `watch`."""
+        return self.interface.own_kind == "native"
 
     def tell(self, what: str) -> None:
         """Note what it has changed of what all share."""
@@ -340,7 +345,7 @@ class LoadedSlave(Stepping):
         An FMU made with pythonfmu 0.7 has dropped its Python objects by then, and drops them again when freed: the
         process would crash.
         """
-        with kept(self.tell):
+        with nullcontext() if self._is_tame else kept(self.tell):
             if not self._dead and self._library is not None:
                 try:
                     self.function(self.FREE)(self.pointer)

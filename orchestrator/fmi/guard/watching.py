@@ -53,6 +53,8 @@ if sys.platform.startswith("linux"):
     _CLOSE.restype, _CLOSE.argtypes = ctypes.c_int, (ctypes.c_void_p,)
 
 _LIVING: dict[int, Owner] = {}
+_NUMBERS: dict[int, list[int]] = {}
+"""Of each owner, by its own number, those that stand for it."""
 _FUNCTIONS: dict[int, str] = {}
 """The functions of loaded libraries by their address."""
 _WILLS: list[Callable[[FmuError], None]] = []
@@ -194,13 +196,15 @@ def noted(owner: Owner, call: str) -> Iterator[None]:
 def introduce(number: int, owner: Owner, model: str) -> None:
     """Say for which instance a number stands in the notes: its address."""
     _LIVING[number] = owner
+    _NUMBERS.setdefault(id(owner), []).append(number)
     NOTES.tell(number, owner.name, model)
 
 
 def dismiss(owner: Owner) -> None:
     """Forget an instance."""
-    for number in [number for number, each in _LIVING.items() if each is owner]:
-        del _LIVING[number]
+    for number in _NUMBERS.pop(id(owner), ()):
+        if _LIVING.get(number) is owner:
+            del _LIVING[number]
     if not _LIVING:
         NOTES.forget()
         for address, function in _FUNCTIONS.items():  # the library of an instance that was lost stays loaded
