@@ -32,7 +32,7 @@ DATA = ROOT / "build" / "coverage"
 GRANTED = ROOT / "tests" / "uncovered.txt"
 KERNEL = [
     ROOT / "orchestrator" / "master" / "native" / name
-    for name in ("fmi3.c", "kernel.c", "plan.c", "stepping.c", "team.c")
+    for name in ("fmi3.c", "growth.c", "kernel.c", "plan.c", "stepping.c", "team.c")
 ]
 RUNTIME = sorted((ROOT / "fmus" / "runtime").glob("*.c"))
 LOOP_TESTS = [

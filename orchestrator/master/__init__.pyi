@@ -1,6 +1,7 @@
 from .algebraic_loops import find_loops
 from .algorithms import ALGORITHMS, Explicit, Operation
 from .checking import check_coupling, check_threads, describe_coupling
+from .compiled import Sieve
 from .event_check import check_events
 from .initialization import settle
 from .loop import Master
@@ -14,6 +15,7 @@ __all__ = [
     "Operation",
     "Rows",
     "Settings",
+    "Sieve",
     "Table",
     "check_coupling",
     "check_events",

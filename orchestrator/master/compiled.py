@@ -68,6 +68,10 @@ _CHANGES = np.dtype(
 _OPERATION = np.dtype([(name, "i4") for name in ("kind", "index", "period", "phase", "is_watched")])
 _PLACE = np.dtype([(name, "i8") for name in ("begin", "failed", "status")])
 
+_SWING = np.dtype(
+    [(name, "f8") for name in ("peak", "last", "from", "size")] + [(x, "i8") for x in ("way", "rises", "is_begun")]
+)
+
 _OWN = [each.itemsize for each in (_OPERATION, _CHANNEL, _INSTANCE, _ENTRY, _CHANGES, _PLACE)]
 _SIZES = (_OWN[0], 8, *_OWN[1:4], 4, 8, _OWN[4], 8, 8, 8, 8, _OWN[5], 8)
 """Of what the kernel's buffers hold, in bytes, in the order in which it takes them."""
@@ -75,7 +79,7 @@ _SIZES = (_OWN[0], 8, *_OWN[1:4], 4, 8, _OWN[4], 8, 8, 8, 8, _OWN[5], 8)
 
 def _check_layout(found: int) -> None:
     """Raise unless the kernel was compiled from the sources that stand beside this file."""
-    if found != reduce(lambda total, size: 31 * total + size & 0x7FFFFFFF, _SIZES, NOTE_SIZE):
+    if found != reduce(lambda total, size: 31 * total + size & 0x7FFFFFFF, _SIZES, NOTE_SIZE + _SWING.itemsize):
         raise RuntimeError(
             "the compiled step loop (orchestrator/master/kernel) is of another version than its Python files: install "
             "the package again (`pip install -e . --no-deps` in a checkout)"
@@ -380,3 +384,33 @@ def _rows_due(done: int, block: int, every: int, count: int) -> int:
     """How many of the next steps are recorded: every so many, and the last."""
     end = done + block
     return end // every - done // every + int(end == count and count % every != 0)
+
+
+class Sieve:
+    """Tells signals that may be growing from all others, as they come.
+
+    Without the kernel none is told from others.
+
+    Args:
+        count: of the signals.
+    """
+
+    def __init__(self, count: int) -> None:
+        self._swings = np.zeros(count, _SWING)
+
+    def see(self, number: int, values: NDArray[np.float64]) -> None:
+        """Take the next values of a signal in, shape (T,)."""
+        if HAS_KERNEL:
+            kernel.look(self._swings, number, np.ascontiguousarray(values))
+
+    def may_grow(self, rises: int, visible: NDArray[np.float64], large: NDArray[np.float64]) -> NDArray[np.bool_]:
+        """Which of them may be growing.
+
+        Args:
+            rises: how many of the last swings must each have been larger than the one before.
+            visible: above which the last of these must be, shape (count,).
+            large: else what they must have exceeded, shape (count,).
+        """
+        swings = self._swings
+        grows = (swings["rises"] >= rises) & (swings["size"] > visible)
+        return np.asarray(grows | (swings["peak"] > large) | (not HAS_KERNEL))

@@ -3,6 +3,7 @@ from typing import Any
 HAS_THREADS: int
 LAYOUT: int
 
+def look(swings: Any, number: int, values: Any) -> None: ...
 def watch(address: int) -> None: ...
 def run(
     operations: Any,

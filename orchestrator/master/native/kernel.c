@@ -6,8 +6,9 @@
    and takes over between blocks for progress, flushing and interruption.
 
    This file is what Python sees of it; plan.c makes a plan of Python's arrays, stepping.c takes the steps, team.c with
-   several threads. */
+   several threads. growth.c looks at what came of them. */
 
+#include "growth.h"
 #include "plan.h"
 
 #include <stdint.h>
@@ -110,6 +111,32 @@ static PyObject *run(PyObject *module, PyObject *arguments)
     return result;
 }
 
+PyDoc_STRVAR(look_doc,
+    "look(swings, number, values): take the next values of a signal in, whose swings are those of this number.");
+
+static PyObject *look(PyObject *module, PyObject *arguments)
+{
+    Py_buffer swings, values;
+    Py_ssize_t number;
+    PyObject *result = NULL;
+    (void)module;
+    if (!PyArg_ParseTuple(arguments, "w*ny*:look", &swings, &number, &values)) {
+        return NULL;
+    }
+    size_t count = (size_t)swings.len / sizeof(Swing);
+    if (number < 0 || (size_t)number >= count || (uintptr_t)swings.buf % sizeof(double) != 0 ||
+        (uintptr_t)values.buf % sizeof(double) != 0) {
+        PyErr_SetString(PyExc_ValueError, "kernel: there are no such swings, or values that are not aligned");
+    } else {
+        see_values((Swing *)swings.buf + number, values.buf, (size_t)values.len / sizeof(double));
+        Py_INCREF(Py_None);
+        result = Py_None;
+    }
+    PyBuffer_Release(&swings);
+    PyBuffer_Release(&values);
+    return result;
+}
+
 static PyObject *watch(PyObject *module, PyObject *arguments)
 {
     unsigned long long address;
@@ -123,6 +150,7 @@ static PyObject *watch(PyObject *module, PyObject *arguments)
 
 static PyMethodDef methods[] = {
     {"run", run, METH_VARARGS, run_doc},
+    {"look", look, METH_VARARGS, look_doc},
     {"watch", watch, METH_VARARGS, "watch(address): call FMUs with the guard that stands there."},
     {NULL, NULL, 0, NULL},
 };

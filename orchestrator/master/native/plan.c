@@ -3,6 +3,7 @@
    Runs of like calls become groups: what is the same for a whole group stands in registers, and what is left of a call is
    the instance and a place. */
 
+#include "growth.h"
 #include "plan.h"
 
 #include <stdint.h>
@@ -275,7 +276,7 @@ int make_room(Block *block, const Plan *plan, const Py_buffer *buffers, Py_ssize
 
 uint32_t layout(void)
 {
-    uint32_t sum = sizeof(Note);
+    uint32_t sum = sizeof(Note) + sizeof(Swing);
     for (int n = 0; n < N_BUFFERS; n++) {
         sum = (31 * sum + (uint32_t)buffer_sizes[n]) & 0x7fffffffU;
     }

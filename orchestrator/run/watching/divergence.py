@@ -9,7 +9,7 @@ it shows in `swings` that become larger and larger up to the end, which no coupl
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import TypeAlias
 
@@ -19,13 +19,13 @@ from numpy.typing import NDArray
 from ...errors import FmuError
 from ...evaluation import Part
 from ...fmi import Interface
-from ...master import ALGORITHMS, find_loops
+from ...master import ALGORITHMS, Sieve, find_loops
 from ...names import SignalName
 from ...system import System
 from ...times import digits
 from ...wiring import Link, circles, graph_of
 from .finding import Finding
-from .swings import find_swings
+from .swings import FEWEST_RISES, VISIBLE, find_swings
 from .tail import Tail
 
 Array = NDArray[np.float64]
@@ -62,6 +62,8 @@ def explain_divergence(
     links: Sequence[Link],
     seen: Sequence[Points],
     error: object = None,
+    *,
+    suspects: Collection[str] | None = None,
 ) -> Finding | None:
     """What coupling diverges and what to do about it, if one does.
 
@@ -71,6 +73,7 @@ def explain_divergence(
         links: its scalar connections.
         seen: the run's signals: all that was recorded, or every point at its end.
         error: what the run failed of, if it did.
+        suspects: the signals that may be growing; None for all.
     """
     if ALGORITHMS[
         system.stepping.algorithm
@@ -78,7 +81,7 @@ def explain_divergence(
         return None
     failed = isinstance(error, FmuError)
     for inner in _cycles(links):
-        sources = dict.fromkeys(link.source for link in inner)
+        sources = dict.fromkeys(x.source for x in inner if suspects is None or str(x.source) in suspects)
         for signals in seen:
             found = dict(_growing(sources, interfaces, signals, failed=failed))
             if found:
@@ -103,6 +106,29 @@ def sources_in_cycles(
         for link in (link for inner in _cycles(links) for link in inner):
             if interfaces[link.source.instance].variables[link.source.variable].type == "Real":
                 yield link.source
+
+
+class Suspicion:
+    """Tells signals that may be growing from all others while a run goes: `explain_divergence` need not look at these.
+
+    Args:
+        sources: of which every point is shown. interfaces: of the instances.
+    """
+
+    def __init__(self, sources: Iterable[SignalName], interfaces: Mapping[str, Interface]) -> None:
+        variables = {str(each): interfaces[each.instance].variables[each.variable] for each in sources}
+        self._names = list(variables)
+        self._sizes = np.array([abs(variable.nominal or 1.0) for variable in variables.values()])
+        self._sieve = Sieve(len(self._names))
+
+    def see(self, number: int, values: Array) -> None:
+        """Take the next values of one of them in, shape (T,)."""
+        self._sieve.see(number, values)
+
+    def suspects(self) -> list[str]:
+        """The signals that may be growing."""
+        found = self._sieve.may_grow(FEWEST_RISES, VISIBLE * self._sizes, _ALL * self._sizes)
+        return [self._names[k] for k in np.flatnonzero(found)]
 
 
 def _finding(found: Mapping[str, Growth], signals: Points, how: str, advice: str) -> Finding:

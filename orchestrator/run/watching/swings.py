@@ -10,11 +10,13 @@ from numpy.typing import NDArray
 
 _FEWEST = 5
 """Swings, each larger than the last, that are no accident."""
+FEWEST_RISES = _FEWEST - 2
+"""How many of the last swings of such a signal are larger than the one before, whenever one has begun to look at it."""
 _ALL = 20.0
 """Growth from the first of them to the last: a loop that is only badly damped has calmed down by then."""
 _EVEN = 0.5
 """How much of the growth of the first half the second must have: resonance, which is linear, slows down."""
-_VISIBLE = 1e-3
+VISIBLE = 1e-3
 """Of a usual size: what happens to rounding errors is not worth a word."""
 
 
@@ -37,7 +39,7 @@ def find_swings(values: NDArray[Any], size: float = 1.0) -> Swings | None:
     values = values[np.isfinite(values)]
     turns = _turns(values)
     sizes = np.abs(np.diff(values[turns]))
-    if len(sizes) < _FEWEST or not sizes[-1] > _VISIBLE * size:
+    if len(sizes) < _FEWEST or not sizes[-1] > VISIBLE * size:
         return None
     smaller = np.flatnonzero(~(sizes[1:] > sizes[:-1]))
     first = int(smaller[-1]) + 1 if smaller.size else 0

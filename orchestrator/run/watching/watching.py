@@ -7,6 +7,7 @@ from operator import itemgetter
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ...errors import ScenarioError
 from ...evaluation import Part, Signals
@@ -15,7 +16,7 @@ from ...master import Rows
 from ...system import System
 from ...wiring import Wiring
 from .crossings import Crossings
-from .divergence import Points, explain_divergence, sources_in_cycles
+from .divergence import Points, Suspicion, explain_divergence, sources_in_cycles
 from .finding import Finding
 from .rules import rules_of
 from .tail import POINTS, Tail
@@ -40,11 +41,15 @@ class Watching:
         self._system, self._interfaces, self._links = system, interfaces, wiring.links
         rules = rules_of(interfaces, wiring)
         ruled = dict.fromkeys(str(signal) for rule in rules for signal, _ in rule.quantity.terms)
-        coupled = dict.fromkeys(map(str, sources_in_cycles(system, interfaces, self._links)))
+        sources = dict.fromkeys(sources_in_cycles(system, interfaces, self._links))
+        coupled = [str(source) for source in sources]
         places = {name: k for k, name in enumerate(signals, 1)}
         self._ruled, self._coupled = (np.array([places[x] for x in names], np.intp) for names in (ruled, coupled))
         self._crossings = Crossings(rules, {name: k for k, name in enumerate(ruled)})
-        self._tail = Tail(list(coupled), system.stepping.step)
+        stepping = system.stepping
+        self._everything = stepping.record in (None, stepping.step) and not stepping.record_only
+        self._tail = Tail(coupled, system.stepping.step)
+        self._suspicion = Suspicion(sources, interfaces) if self._everything else None
         self._pick = itemgetter(0, *self._ruled.tolist(), *self._coupled.tolist())
         self._single: list[Sequence[Any]] = []
 
@@ -54,9 +59,7 @@ class Watching:
             return
         if isinstance(rows, np.ndarray):
             self._look()
-            last = rows[-POINTS:]
-            self._crossings.see(rows[:, 0], rows.take(self._ruled, axis=1))
-            self._tail.see(last[:, 0].copy(), last.take(self._coupled, axis=1))
+            self._take(rows[:, 0], rows, self._ruled, self._coupled)
             return
         self._single += map(self._pick, rows)
         if len(self._single) >= _BLOCK:
@@ -67,9 +70,22 @@ class Watching:
         if self._single:
             table = np.array(self._single, dtype=np.float64)
             self._single = []
-            end = 1 + len(self._ruled)
-            self._crossings.see(table[:, 0], np.ascontiguousarray(table[:, 1:end]))
-            self._tail.see(table[:, 0], table[:, end:])
+            places = np.arange(1, table.shape[1])
+            self._take(table[:, 0], table, *np.split(places, [len(self._ruled)]))
+
+    def _take(
+        self, time: NDArray[np.float64], rows: NDArray[np.float64], ruled: NDArray[np.intp], coupled: NDArray[np.intp]
+    ) -> None:
+        """Look at a block, whose columns these are."""
+        columns = rows.T
+        if len(ruled):
+            self._crossings.see(time, columns[ruled].T)
+        if self._suspicion is not None:
+            for number, place in enumerate(coupled.tolist()):
+                self._suspicion.see(number, columns[place])
+        else:
+            last = rows[-POINTS:]
+            self._tail.see(last[:, 0].copy(), last.take(coupled, axis=1))
 
     def findings(self, recorded: Signals, error: object = None) -> list[Finding]:
         """What was found, the gravest kind first, then by time.
@@ -80,13 +96,12 @@ class Watching:
         """
         self._look()
         found = list(self._crossings.findings())
-        stepping = self._system.stepping
-        everything = stepping.record in (None, stepping.step) and not stepping.record_only
         count = recorded.points
         first = max(0, count - _LAST)
         last = Part(recorded, recorded.part(first, count), first)
-        seen: tuple[Points, ...] = (last,) if everything else (last, self._tail)
-        diverging = explain_divergence(self._system, self._interfaces, self._links, seen, error)
+        seen: tuple[Points, ...] = (last,) if self._everything else (last, self._tail)
+        suspects = None if self._suspicion is None else self._suspicion.suspects()
+        diverging = explain_divergence(self._system, self._interfaces, self._links, seen, error, suspects=suspects)
         found += [] if diverging is None else [diverging]
         return sorted(found, key=lambda finding: (finding.rank, finding.since))
 
@@ -101,6 +116,7 @@ class Watching:
         Raises:
             ScenarioError: that is of another system.
         """
+        self._suspicion = None  # what came before is not seen again
         try:
             self._crossings.restore(saved)
         except (LookupError, TypeError, ValueError) as error:
