@@ -1,7 +1,7 @@
 from .algebraic_loops import find_loops
 from .algorithms import ALGORITHMS, Explicit, Operation
 from .checking import check_coupling, check_threads, describe_coupling
-from .compiled import Sieve
+from .compiled import HAS_KERNEL, SWING, note_swings
 from .event_check import check_events
 from .initialization import settle
 from .loop import Master
@@ -10,17 +10,19 @@ from .settings import Settings
 
 __all__ = [
     "ALGORITHMS",
+    "HAS_KERNEL",
+    "SWING",
     "Explicit",
     "Master",
     "Operation",
     "Rows",
     "Settings",
-    "Sieve",
     "Table",
     "check_coupling",
     "check_events",
     "check_threads",
     "describe_coupling",
     "find_loops",
+    "note_swings",
     "settle",
 ]

@@ -68,9 +68,10 @@ _CHANGES = np.dtype(
 _OPERATION = np.dtype([(name, "i4") for name in ("kind", "index", "period", "phase", "is_watched")])
 _PLACE = np.dtype([(name, "i8") for name in ("begin", "failed", "status")])
 
-_SWING = np.dtype(
+SWING = np.dtype(
     [(name, "f8") for name in ("peak", "last", "from", "size")] + [(x, "i8") for x in ("way", "rises", "is_begun")]
 )
+"""What the kernel notes of how a signal grows, as growth.h has it."""
 
 _OWN = [each.itemsize for each in (_OPERATION, _CHANNEL, _INSTANCE, _ENTRY, _CHANGES, _PLACE)]
 _SIZES = (_OWN[0], 8, *_OWN[1:4], 4, 8, _OWN[4], 8, 8, 8, 8, _OWN[5], 8)
@@ -79,7 +80,7 @@ _SIZES = (_OWN[0], 8, *_OWN[1:4], 4, 8, _OWN[4], 8, 8, 8, 8, _OWN[5], 8)
 
 def _check_layout(found: int) -> None:
     """Raise unless the kernel was compiled from the sources that stand beside this file."""
-    if found != reduce(lambda total, size: 31 * total + size & 0x7FFFFFFF, _SIZES, NOTE_SIZE + _SWING.itemsize):
+    if found != reduce(lambda total, size: 31 * total + size & 0x7FFFFFFF, _SIZES, NOTE_SIZE + SWING.itemsize):
         raise RuntimeError(
             "the compiled step loop (orchestrator/master/kernel) is of another version than its Python files: install "
             "the package again (`pip install -e . --no-deps` in a checkout)"
@@ -386,31 +387,7 @@ def _rows_due(done: int, block: int, every: int, count: int) -> int:
     return end // every - done // every + int(end == count and count % every != 0)
 
 
-class Sieve:
-    """Tells signals that may be growing from all others, as they come.
-
-    Without the kernel none is told from others.
-
-    Args:
-        count: of the signals.
-    """
-
-    def __init__(self, count: int) -> None:
-        self._swings = np.zeros(count, _SWING)
-
-    def see(self, number: int, values: NDArray[np.float64]) -> None:
-        """Take the next values of a signal in, shape (T,)."""
-        if HAS_KERNEL:
-            kernel.look(self._swings, number, np.ascontiguousarray(values))
-
-    def may_grow(self, rises: int, visible: NDArray[np.float64], large: NDArray[np.float64]) -> NDArray[np.bool_]:
-        """Which of them may be growing.
-
-        Args:
-            rises: how many of the last swings must each have been larger than the one before.
-            visible: above which the last of these must be, shape (count,).
-            large: else what they must have exceeded, shape (count,).
-        """
-        swings = self._swings
-        grows = (swings["rises"] >= rises) & (swings["size"] > visible)
-        return np.asarray(grows | (swings["peak"] > large) | (not HAS_KERNEL))
+def note_swings(swings: NDArray[np.void], number: int, values: NDArray[np.float64]) -> None:
+    """Take the next values of a signal in, whose `SWING` has this number; without the kernel nothing is noted."""
+    if HAS_KERNEL:
+        kernel.look(swings, number, np.ascontiguousarray(values))

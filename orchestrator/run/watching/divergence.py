@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 from ...errors import FmuError
 from ...evaluation import Part
 from ...fmi import Interface
-from ...master import ALGORITHMS, Sieve, find_loops
+from ...master import ALGORITHMS, HAS_KERNEL, SWING, find_loops, note_swings
 from ...names import SignalName
 from ...system import System
 from ...times import digits
@@ -119,16 +119,19 @@ class Suspicion:
         variables = {str(each): interfaces[each.instance].variables[each.variable] for each in sources}
         self._names = list(variables)
         self._sizes = np.array([abs(variable.nominal or 1.0) for variable in variables.values()])
-        self._sieve = Sieve(len(self._names))
+        self._swings = np.zeros(len(self._names), SWING)
 
     def see(self, number: int, values: Array) -> None:
         """Take the next values of one of them in, shape (T,)."""
-        self._sieve.see(number, values)
+        note_swings(self._swings, number, values)
 
     def suspects(self) -> list[str]:
-        """The signals that may be growing."""
-        found = self._sieve.may_grow(FEWEST_RISES, VISIBLE * self._sizes, _ALL * self._sizes)
-        return [self._names[k] for k in np.flatnonzero(found)]
+        """The signals that may be growing; all without the kernel."""
+        if not HAS_KERNEL:
+            return self._names
+        swings, sizes = self._swings, self._sizes
+        swinging = (swings["rises"] >= FEWEST_RISES) & (swings["size"] > VISIBLE * sizes)
+        return [self._names[k] for k in np.flatnonzero(swinging | (swings["peak"] > _ALL * sizes))]
 
 
 def _finding(found: Mapping[str, Growth], signals: Points, how: str, advice: str) -> Finding:

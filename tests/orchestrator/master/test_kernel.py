@@ -181,7 +181,7 @@ def test_what_is_not_an_array_is_refused(arguments):
 
 def test_swings_are_those_of_a_signal():
     """By hand: up to 2, down to -1, up to 4, where it stays; what is not finite is none of it."""
-    swings = np.zeros(2, compiled._SWING)
+    swings = np.zeros(2, compiled.SWING)
     for part in ([0.0, 1.0, np.nan, 2.0], [2.0, 0.5, -1.0], [], [np.inf, 3.0, 4.0, 4.0], [3.5]):
         compiled.kernel.look(swings, 1, np.array(part))
     assert swings[1].tolist() == (4.0, 3.5, 4.0, 5.0, -1, 3, 1)
@@ -191,10 +191,10 @@ def test_swings_are_those_of_a_signal():
 @pytest.mark.parametrize(
     ("swings", "number", "values"),
     [
-        (np.zeros(2, compiled._SWING), 2, np.zeros(1)),
-        (np.zeros(2, compiled._SWING), -1, np.zeros(1)),
+        (np.zeros(2, compiled.SWING), 2, np.zeros(1)),
+        (np.zeros(2, compiled.SWING), -1, np.zeros(1)),
         (np.zeros(57, np.uint8)[1:], 0, np.zeros(1)),
-        (np.zeros(1, compiled._SWING), 0, np.zeros(9, np.uint8)[1:]),
+        (np.zeros(1, compiled.SWING), 0, np.zeros(9, np.uint8)[1:]),
     ],
 )
 def test_swings_that_are_not_there_are_refused(swings, number, values):

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from railcosim.orchestrator.master import compiled
 from railcosim.orchestrator.names import SignalName
+from railcosim.orchestrator.run.watching import divergence
 from railcosim.orchestrator.run.watching.divergence import Suspicion, find_growth
 from railcosim.orchestrator.run.watching.swings import find_swings
 
@@ -52,6 +53,7 @@ def test_nobody_who_grows_goes_unsuspected():
 
 def test_without_the_kernel_all_are_suspected(monkeypatch):
     monkeypatch.setattr(compiled, "HAS_KERNEL", False)
+    monkeypatch.setattr(divergence, "HAS_KERNEL", False)
     watched = suspicion(2)
     watched.see(0, np.zeros(3))
     assert watched.suspects() == ["a.x[0]", "a.x[1]"]
