@@ -18,7 +18,6 @@ import ctypes
 import gc
 import multiprocessing
 import os
-import resource
 import shutil
 import statistics
 import subprocess
@@ -33,6 +32,8 @@ from typing import Any
 
 import fmpy
 import numpy as np
+from line import line
+from memory import forget_peak, peak, resident
 from peers import PEERS, STEP, Candidate, Ring
 from railcosim.fmus.build import build
 from railcosim.orchestrator.fmi.archive import Workspace
@@ -194,26 +195,6 @@ def serve(pipe: Any, name: str, ring: Ring) -> None:
         pipe.send(f"{type(error).__name__}: {error}".splitlines()[0][:150])
 
 
-def resident() -> float:
-    """Memory of this process in KB, as Linux tells it."""
-    statm = Path("/proc/self/statm")
-    return int(statm.read_text().split()[1]) * resource.getpagesize() / 1024 if statm.exists() else 0.0
-
-
-def forget_peak() -> None:
-    """Let `peak` begin anew, where Linux can."""
-    forget = Path("/proc/self/clear_refs")
-    if forget.exists():
-        forget.write_text("5")
-
-
-def peak() -> float:
-    """The most memory of this process since then in KB, as Linux tells it."""
-    status = Path("/proc/self/status")
-    lines = status.read_text().splitlines() if status.exists() else []
-    return next((float(line.split()[1]) for line in lines if line.startswith("VmHWM")), 0.0)
-
-
 @dataclass
 class Worker:
     """The near end of a candidate's process."""
@@ -356,37 +337,6 @@ def whole(path: Path, counts: list[int], options: argparse.Namespace) -> None:
         print(f"| {n} | {ring.steps} | {bare:.3f} | {mine:.3f} | {ratio:.2f} | {memory:.2f} |", flush=True)
         for worker in workers.values():
             worker.close()
-
-
-def line(count: int, repetitions: int) -> None:
-    """Trains, each with a controller, one behind the other: 350 s at 0.1 s, recorded each second."""
-    system = System(stop_time=350.0, step=0.1, record=1.0)
-    for i in range(1, count + 1):
-        system.add(f"train[{i}]", "PointMassTrain", position=(count - i) * 17e3, speed=60.0)
-        system.add(f"cruise[{i}]", "ComfortCruise", has_ahead=i > 1, has_behind=i < count)
-    system.add("target", "Schedule", values=85.0)
-    for i in range(1, count + 1):
-        for name in ("position", "speed"):
-            system.connect(f"train[{i}].{name}", f"cruise[{i}].{name}")
-            if i > 1:
-                system.connect(f"train[{i - 1}].{name}", f"cruise[{i}].ahead_{name}")
-            if i < count:
-                system.connect(f"train[{i + 1}].{name}", f"cruise[{i}].behind_{name}")
-        system.connect("target.value", f"cruise[{i}].target_speed")
-        system.connect(f"cruise[{i}].force", f"train[{i}].force")
-    run(system, kind="native", stop_time=0.1)  # the FMUs are compiled, once
-    print("| instances | set-up s | stepping s | µs per FMU step | CPU s of all | MB |")
-    print("| --- | --- | --- | --- | --- | --- |")
-    for _ in range(repetitions):
-        begin = time.process_time()
-        seconds = run(system, kind="native").seconds
-        cpu, memory = time.process_time() - begin, resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024
-        cost = seconds["stepping"] / seconds["steps"] / len(system.instances) * 1e6
-        print(
-            f"| {len(system.instances)} | {seconds['setup']:.2f} | {seconds['stepping']:.2f} | {cost:.3f} | {cpu:.2f} "
-            f"| {memory:.0f} |",
-            flush=True,
-        )
 
 
 def light(path: Path, folder: Path) -> Path:
