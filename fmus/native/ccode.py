@@ -10,7 +10,7 @@ import hashlib
 import math
 import re
 from abc import ABC, abstractmethod
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from types import MappingProxyType
 from typing import Any, NamedTuple
 
@@ -167,9 +167,9 @@ def _body(
     calls = iter([written[each] for each in _CALL.findall(compiled.str(True))])
     steps = _steps(compiled, value, calls)
     inside: dict[Path, list[int]] = {}
-    asked_for = {n for step in steps for n in step.read}
-    for k, place in enumerate(_places(steps)):
-        if k in asked_for or steps[k].operation in _STATEMENTS:
+    wanted = _wanted(steps)
+    for k, place in enumerate(_places(steps, wanted)):
+        if k in wanted:
             inside.setdefault(place, []).append(k)
     definitions = list(dict.fromkeys(text for _, texts in called.values() for text in texts))
     return definitions, list(_lines((), inside, steps)), len(steps)
@@ -237,14 +237,23 @@ def _code(operation: int, read: tuple[int, ...], steps: Sequence[_Step]) -> str:
     return template.format(*numbers)
 
 
-def _places(steps: Sequence[_Step]) -> list[Path]:
+def _wanted(steps: Sequence[_Step]) -> set[int]:
+    """The steps that a result needs: of a look-up's derivative, which is nothing, no argument is."""
+    found: set[int] = set()
+    for k in reversed(range(len(steps))):
+        if k in found or steps[k].operation == ca.OP_OUTPUT:
+            found |= {k, *steps[k].read}
+    return found
+
+
+def _places(steps: Sequence[_Step], wanted: Collection[int]) -> list[Path]:
     """Where each step stands: inside all choices that alone ask for its value.
 
     What is not chosen is then not computed: a train that runs forwards does not pay for the equations of rolling back.
     """
     uses: list[list[Path]] = [[] for _ in steps]
     places: list[Path] = [()] * len(steps)
-    for k in reversed(range(len(steps))):
+    for k in sorted(wanted, reverse=True):
         operation, read, _ = steps[k]
         places[k] = here = _common(uses[k])
         for n in read:
