@@ -12,7 +12,7 @@ behind it tell theirs by the same messages, where the law has one. The exit code
 import argparse
 import itertools
 import sys
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import replace
 from pathlib import Path
 
@@ -25,11 +25,13 @@ VARIANTS = radio_campaign.SAFE
 LAWS = ("DistributedMpc", "TimeHeadwayCruise", *radio_campaign.LAWS)
 
 
-def outcomes(seed: int, numbers: Sequence[int], laws: Sequence[str]) -> Iterator[radio_campaign.Outcome]:
+def outcomes(
+    seed: int, numbers: Iterable[int], laws: Sequence[str], variants: Sequence[str] = VARIANTS
+) -> Iterator[radio_campaign.Outcome]:
     """Every draw under every law."""
     for number in numbers:
         for law in laws:
-            for variant in VARIANTS:
+            for variant in variants:
                 yield radio_campaign.simulate(replace(radio_campaign.draw(seed, number), law=law), variant)
 
 
