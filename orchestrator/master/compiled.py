@@ -30,6 +30,7 @@ except ImportError:  # installed without a C compiler
     kernel = None  # type: ignore[assignment]
 
 HAS_KERNEL = kernel is not None
+_look = getattr(kernel, "look", None)
 HAS_THREADS = HAS_KERNEL and bool(kernel.HAS_THREADS)
 _CHANGE = 3
 """The kernel's number for what an event does to values that have been read; the others are `Operation`."""
@@ -390,4 +391,4 @@ def _rows_due(done: int, block: int, every: int, count: int) -> int:
 def note_swings(swings: NDArray[np.void], number: int, values: NDArray[np.float64]) -> None:
     """Take the next values of a signal in, whose `SWING` has this number; without the kernel nothing is noted."""
     if HAS_KERNEL:
-        kernel.look(swings, number, np.ascontiguousarray(values))
+        _look(swings, number, np.ascontiguousarray(values))
