@@ -94,7 +94,7 @@ static void write_message(char *to, const char *end, const char *format, va_list
         size_t most = MAX_MESSAGE;
         format++;
         if (*format == '.') {
-            for (most = 0, format++; *format >= '0' && *format <= '9'; format++) {
+            for (most = 0, format++; *format <= '9'; format++) {
                 most = 10 * most + (size_t)(*format - '0');
             }
         }

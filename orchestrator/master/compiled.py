@@ -9,6 +9,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from ctypes import addressof
 from functools import reduce
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -30,7 +31,7 @@ except ImportError:  # installed without a C compiler
     kernel = None  # type: ignore[assignment]
 
 HAS_KERNEL = kernel is not None
-_look = getattr(kernel, "look", None)
+_look: Any = getattr(kernel, "look", None)
 HAS_THREADS = HAS_KERNEL and bool(kernel.HAS_THREADS)
 _CHANGE = 3
 """The kernel's number for what an event does to values that have been read; the others are `Operation`."""

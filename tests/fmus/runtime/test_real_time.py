@@ -143,10 +143,25 @@ def test_other_things_in_messages(load):
     assert "changed from 1 to -3" in fmu.said
 
 
-def test_a_message_is_cut_where_its_room_ends(load):
-    fmu = load(MIXED, profile="real-time")
-    assert fmu.SetReal((ctypes.c_uint * 1)(0), c_size_t(1), None) == ERROR
-    assert len(fmu.said) < 1024
+def test_a_message_is_cut_where_its_room_ends(load, write_component):
+    name = "y" * 1020
+    body = f"""
+from railcosim.components import Component, Input, Output
+
+class C(Component):
+    \"\"\"Divides.\"\"\"
+
+    u = Input("1", 1.0)
+    {name} = Output("1")
+
+    def outputs(self):
+        return {{"{name}": 1.0 / self.u}}
+"""
+    fmu = load(write_component(body), profile="real-time")
+    fmu.initialize()
+    assert fmu.set("u", 0.0) == OK
+    assert fmu.status_of_get(name) == ERROR
+    assert fmu.said == f"C: outputs: '{name}"[:1023]
 
 
 @linux

@@ -81,6 +81,11 @@ def test_late_steps_may_be_told_of_in_the_end_or_not_be_allowed(clock, caplog):
         paced(clock, [0.1], late="fail")
 
 
+def test_what_was_late_within_the_last_second_is_told_in_the_end(clock, caplog):
+    paced(clock, [0.1, 0.06])
+    assert [record.getMessage().partition(" was")[0] for record in caplog.records] == ["late: step 1", "late: step 2"]
+
+
 def test_delays_are_those_that_were_measured(clock):
     costs = 0.05 + np.random.default_rng(1).exponential(0.01, 500)
     released, report = paced(clock, costs, late="catch-up")
