@@ -16,7 +16,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from railcosim import models
+from railcosim import components, models
 from railcosim.components import CATALOGUE, Component, Simulation, simulate
 from railcosim.components.component import Slot
 from railcosim.components.declarations import Data, Input, Memory, Output, Parameter, Size, State
@@ -61,7 +61,7 @@ def page(cls: type[Component], catalogue: Mapping[str, type[Component]] = CATALO
 
 def family(cls: type[Component]) -> str:
     """The folder its equations stand in: trains, cruise, ato, supervision, environment."""
-    return cls.__module__.split(".")[-2]
+    return cls.__module__.removeprefix(f"{components.__name__}.").split(".")[0]
 
 
 def port(cls: type[Component]) -> type[Component] | None:

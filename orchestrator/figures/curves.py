@@ -72,6 +72,7 @@ def _entry(x: Any, text: str, label: str, entry: int, signals: Signals) -> list[
         else:
             y = np.atleast_2d(np.asarray(expression.evaluate(signals, index, **constants), dtype=np.float64))
             across = _across(x, signals, index, constants)
+            _check_rows(x, across, y, text)
             if isinstance(x, Mapping):
                 _check_swept(x, y, expression, signals, index)
             y = np.broadcast_to(y, (y.shape[0], across.shape[-1]))
@@ -142,6 +143,12 @@ def _across(x: Any, signals: Signals, index: int | None, constants: Mapping[str,
     if not values.ndim:
         raise ExpressionError(Problem("", f"x = '{x}' is a single number", "draw over a signal"))
     return values
+
+
+def _check_rows(x: Any, across: Array, y: Array, text: str) -> None:
+    if across.ndim > 1 and len(across) not in (1, len(y)):
+        what = f"x = '{x}' has {len(across)} rows and y = '{text}' has {len(y)}"
+        raise ExpressionError(Problem("", what, "draw over one signal, or over as many"))
 
 
 def _named(label: str, own: str, alone: bool, member: int) -> str:

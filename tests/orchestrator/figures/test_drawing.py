@@ -1,6 +1,7 @@
 """Figures as files: what was recorded is in them, and one that cannot be drawn costs no other."""
 
 import copy
+import re
 
 import matplotlib.image
 import numpy as np
@@ -89,12 +90,14 @@ def test_one_bad_figure_does_not_cost_the_others(tmp_path, recorded):
         {"title": "Mathematics", "y": ["target.value"], "y_label": r"$\nonsense{$"},
         {"title": "Varies", "y": ["target.value"], "bands": ["train[1].speed"]},
         {"title": "Stands", "y": ["target.value"], "x": "max(train[1].speed)"},
+        {"title": "Rows", "y": ["target.value"], "x": "train[:].speed"},
         {"title": "Good", "y": ["target.value"]},
     ]
     with pytest.raises(ScenarioError) as caught:
         draw(figures, recorded, tmp_path)
     assert [path.name for path in tmp_path.iterdir()] == ["good.png"]
-    first, second, third, fourth = map(str, caught.value.problems)
+    first, second, third, fourth, fifth = map(str, caught.value.problems)
+    assert re.search(r"x = 'train\[:\].speed' has \d+ rows and y = 'target.value' has 1; draw over one signal", fifth)
     assert "x = 'max(train[1].speed)' is a single number; draw over a signal" in fourth
     assert "figure 'Bad' was not drawn: " in first
     assert "did you mean 'target.value'?" in first

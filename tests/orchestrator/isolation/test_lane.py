@@ -7,10 +7,9 @@ import sysconfig
 from pathlib import Path
 
 import pytest
-from railcosim.orchestrator.isolation import lanes
 
 GCC = shutil.which("gcc")
-NATIVE = Path(lanes.__file__).with_name("native")
+NATIVE = Path(__file__).parents[3] / "orchestrator" / "isolation" / "native"
 pytestmark = [
     pytest.mark.skipif(not sys.platform.startswith("linux"), reason="there are no lanes here"),
     pytest.mark.skipif(GCC is None, reason="compiled by gcc here"),

@@ -25,8 +25,8 @@ SAID = "#live output"
 def opened(opened):
     """Opens a page as for those that are not live, and waits until it has simulated."""
 
-    def open_live(path, **how):
-        page = opened(path, **how)
+    def open_live(path, *how):
+        page = opened(path, *how)
         page.wait_for_selector("html[data-live]", timeout=60_000)
         return page
 
