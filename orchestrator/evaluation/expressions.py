@@ -71,7 +71,7 @@ class Expression:
         return self.uses_index and not any(
             isinstance(node, Temporal)
             or (isinstance(node, Reference) and node.stacked)
-            or (isinstance(node, Call) and self.functions[node.name].reduces)
+            or (isinstance(node, Call) and (node.name not in self.functions or self.functions[node.name].reduces))
             for node in walk(self.tree)
         )
 
