@@ -1,11 +1,12 @@
 from .algebraic_loops import find_loops
 from .algorithms import ALGORITHMS, Explicit, Operation
 from .checking import check_coupling, check_threads, describe_coupling
-from .compiled import HAS_KERNEL, SWING, note_swings
+from .compiled import HAS_KERNEL, note_swings
 from .event_check import check_events
 from .initialization import settle
 from .loop import Master
 from .observer import Rows, Table
+from .plan import SWING
 from .settings import Settings
 
 __all__ = [

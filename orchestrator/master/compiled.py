@@ -6,8 +6,6 @@ signals), steps are taken in Python with identical results.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from ctypes import addressof
 from functools import reduce
 from typing import Any
 
@@ -15,15 +13,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .. import world
-from ..fmi import Channel, Slave
-from ..fmi.binding import ElementsChannel, Fmi3Slave, FmuSlave, is_watched
+from ..fmi.binding import FmuSlave
 from ..fmi.guard import GUARD, NOTE_SIZE, NOTES, own_note, said
-from ..isolation import IsolatedChannel, IsolatedSlave, Ride, may_ride
-from .algorithms import Explicit, Operation
+from ..isolation import Ride
+from .algorithms import Explicit
 from .coupling import Coupling
-from .exchange import Change, Exchange
-from .flattening import TYPES, Wide, can_exchange, parts_of
 from .observer import Observer, Table
+from .plan import CHANGES, PLACE, SIZES, SWING, Plan
 
 try:
     from . import kernel
@@ -33,13 +29,7 @@ except ImportError:  # installed without a C compiler
 HAS_KERNEL = kernel is not None
 _look: Any = getattr(kernel, "look", None)
 HAS_THREADS = HAS_KERNEL and bool(kernel.HAS_THREADS)
-_CHANGE = 3
-"""The kernel's number for what an event does to values that have been read; the others are `Operation`."""
-_AS_IT_IS, _TRUE_ABOVE, _ROUNDED_UP = 0, 1, 2
-"""The kernel's numbers for what a threshold does."""
 _DISCARD = 2
-_NONE = 2**32 - 1
-"""What stands where there is no value reference, so that lists of other lengths are others."""
 _BLOCK_SECONDS = 0.05
 """Wall time a block is meant to take: short enough for Ctrl-C and a progress bar, long enough to cost nothing."""
 _GROWTH = 256
@@ -47,42 +37,10 @@ _GROWTH = 256
 _MOST_VALUES = 4_000_000
 """Numbers a block may record, so that its buffer stays small."""
 
-_CHANNEL = np.dtype(
-    [(name, "u8") for name in ("function", "component")]
-    + [(name, "i8") for name in ("begin", "count", "is_real", "type", "reference_count")]
-)
-_INSTANCE = np.dtype([("function", "u8"), ("component", "u8"), ("told", "u8")])
-_ENTRY = np.dtype(
-    [
-        ("place", "i8"),
-        ("age", "i8"),
-        ("change", "i8"),
-        ("scale", "f8"),
-        ("offset", "f8"),
-        ("whole", "i8"),
-        ("threshold", "f8"),
-        ("form", "i8"),
-    ]
-)
-_CHANGES = np.dtype(
-    [("active", "i8"), ("place", "i8"), ("is_real", "i8"), *((n, "f8") for n in ("scale", "offset", "slope", "since"))]
-)
-_OPERATION = np.dtype([(name, "i4") for name in ("kind", "index", "period", "phase", "is_watched")])
-_PLACE = np.dtype([(name, "i8") for name in ("begin", "failed", "status")])
-
-SWING = np.dtype(
-    [(name, "f8") for name in ("peak", "last", "from", "size")] + [(x, "i8") for x in ("way", "rises", "is_begun")]
-)
-"""What the kernel notes of how a signal grows, as growth.h has it."""
-
-_OWN = [each.itemsize for each in (_OPERATION, _CHANNEL, _INSTANCE, _ENTRY, _CHANGES, _PLACE)]
-_SIZES = (_OWN[0], 8, *_OWN[1:4], 4, 8, _OWN[4], 8, 8, 8, 8, _OWN[5], 8)
-"""Of what the kernel's buffers hold, in bytes, in the order in which it takes them."""
-
 
 def _check_layout(found: int) -> None:
     """Raise unless the kernel was compiled from the sources that stand beside this file."""
-    if found != reduce(lambda total, size: 31 * total + size & 0x7FFFFFFF, _SIZES, NOTE_SIZE + SWING.itemsize):
+    if found != reduce(lambda total, size: 31 * total + size & 0x7FFFFFFF, SIZES, NOTE_SIZE + SWING.itemsize):
         raise RuntimeError(
             "the compiled step loop (orchestrator/master/kernel) is of another version than its Python files: install "
             "the package again (`pip install -e . --no-deps` in a checkout)"
@@ -94,9 +52,6 @@ if HAS_KERNEL:
     if GUARD:
         kernel.watch(GUARD)
 
-_Entry = tuple[int, int, int, float, float, int, float, int]
-_Called = FmuSlave | Fmi3Slave | Ride
-
 
 class CompiledLoop:
     """An explicit algorithm's plan for the kernel."""
@@ -104,125 +59,15 @@ class CompiledLoop:
     @classmethod
     def of(cls, coupling: Coupling, algorithm: Explicit) -> CompiledLoop | None:
         """One that takes these steps, where the kernel is there and can do all that is asked for."""
-        able = kernel is not None and all(_can_be_called(x, coupling.exchange) for x in coupling.slaves.values())
-        mapped = any(link.mapping is not None for link in coupling.exchange.links)
-        held = not coupling.settings.stepping.extrapolation and coupling.loops is None and coupling.refresher is None
-        able = able and held and not mapped and can_exchange(coupling.exchange)
-        return cls(coupling, algorithm) if able else None
+        return cls(coupling, algorithm) if kernel is not None and Plan.is_able(coupling) else None
 
     def __init__(self, coupling: Coupling, algorithm: Explicit) -> None:
         self._coupling = coupling
         self._exchange = coupling.exchange
-        self._wide = Wide(coupling.exchange)
+        self.plan = Plan(coupling, algorithm, can_share=bool(kernel.HAS_THREADS))
         self._under_way: tuple[Table, Observer, float, float] | None = None
         self._note = 0
-        self._channels: list[tuple[int, ...]] = []
-        self._arrays: list[ElementsChannel] = []
-        self._entries: list[_Entry] = []
-        self._references: list[int] = []
-        self._operations: list[tuple[int, int, int, int]] = []
-        self._culprits: list[tuple[_Called | None, str]] = []
-        self._instances: list[tuple[int, int, int]] = []
-        self._changes: list[tuple[Change, int, bool]] = []
-        self._slaves = {name: _called(slave) for name, slave in coupling.slaves.items()}
-        self._rides = [slave for slave in self._slaves.values() if isinstance(slave, Ride)]
         self._whole = [place for place, kind in enumerate(self._exchange.kinds) if kind != "Real"]
-        is_shared = kernel.HAS_THREADS and algorithm.takes_threads
-        self.threads = max(1, min(coupling.settings.threads, len(self._slaves))) if is_shared else 1
-        ends: list[int] = []
-        for batch in algorithm.batches():
-            names = list(batch.names)
-            for share in np.array_split(names, self.threads) if self.threads > 1 else [names]:
-                self._add(list(share), batch.operations)
-                ends.append(len(self._operations))
-        self._plan = (
-            np.array(
-                [
-                    (*operation, isinstance(slave, FmuSlave) and is_watched(slave))
-                    for operation, (slave, _) in zip(self._operations, self._culprits, strict=True)
-                ],
-                _OPERATION,
-            ),
-            np.array(ends if self.threads > 1 else [len(self._operations)], dtype=np.int64),
-            np.array(self._channels, dtype=_CHANNEL),
-            np.array(self._instances, dtype=_INSTANCE),
-            np.array(self._entries, dtype=_ENTRY),
-            np.array(self._references, dtype=np.uint32),
-            self._wide.forms,
-        )
-
-    def _add(self, names: Sequence[str], operations: Sequence[Operation]) -> None:
-        add = {Operation.SET: self._add_sets, Operation.STEP: self._add_step, Operation.GET: self._add_gets}
-        for operation in operations:
-            for name in names:
-                add[operation](self._slaves[name], self._coupling.settings.rates.get(name, 1))
-
-    def _rank(self, operation: int) -> tuple[bool, int]:
-        """Where an operation of several that failed would stand without threads: all are set before any steps."""
-        return self._operations[operation][0] != Operation.SET, operation
-
-    def _add_operation(self, kind: int, index: int, culprit: tuple[_Called | None, str], due: tuple[int, int]) -> None:
-        self._operations.append((kind, index, *due))
-        self._culprits.append(culprit)
-
-    def _add_sets(self, slave: _Called, rate: int) -> None:
-        for feed in self._exchange.feeds[slave.name]:
-            entries = []
-            for k, source in enumerate(feed.sources):
-                age, slot = feed.ages[k], feed.changes[k] if feed.changes else None
-                threshold = feed.thresholds[k]
-                whole = _AS_IT_IS if threshold is None else _TRUE_ABOVE if feed.kind == "Boolean" else _ROUNDED_UP
-                change = -1 if slot is None else self._add_change(slot, -1, feed.is_real)
-                place = (source, -1 if age is None else age, change)
-                changed = feed.scales[k], feed.offsets[k], whole, threshold or 0.0
-                entries.append((*place, *changed, self._wide.form(source)))
-            self._add_channels(Operation.SET, slave, feed.channel, entries, feed.is_real, due=(rate, 0))
-
-    def _add_gets(self, slave: _Called, rate: int) -> None:
-        for part in self._exchange.yields[slave.name]:
-            due = (rate, 0 if part.direct else rate - 1)
-            whole = _TRUE_ABOVE if part.kind == "Boolean" else _AS_IT_IS
-            entries = [(place, -1, -1, 1.0, 0.0, whole, 0.0, 0) for place in range(part.begin, part.end)]
-            self._add_channels(Operation.GET, slave, part.channel, entries, part.is_real, due=due)
-            for place, change in self._exchange.output_changes.items():
-                if part.begin <= place < part.end:
-                    index = self._add_change(change, place, part.is_real)
-                    self._add_operation(_CHANGE, index, (None, "an event"), due)
-
-    def _add_change(self, change: Change, place: int, is_real: bool) -> int:
-        self._changes.append((change, place, is_real))
-        return len(self._changes) - 1
-
-    def _add_channels(
-        self,
-        kind: int,
-        slave: _Called,
-        channel: Channel,
-        entries: Sequence[_Entry],
-        is_real: bool,
-        *,
-        due: tuple[int, int],
-    ) -> None:
-        if isinstance(channel, ElementsChannel):
-            self._arrays.append(channel)
-        for own, places in parts_of(channel) or ():
-            call = own.calls[kind == Operation.GET]
-            self._add_operation(kind, len(self._channels), (slave, call), due)
-            if isinstance(slave, Ride):
-                assert isinstance(own, IsolatedChannel)
-                addresses = slave.add(own, is_get=kind == Operation.GET)
-            else:
-                addresses = slave.addresses(call)
-            what = len(self._entries), len(places), int(is_real), TYPES.get(own.kind, 0) * isinstance(slave, Fmi3Slave)
-            self._channels.append((*addresses, *what, len(own.references)))
-            self._entries += [entries[k] for k in places]
-            self._references += [*own.references, *[_NONE] * (len(places) - len(own.references))]
-
-    def _add_step(self, slave: _Called, rate: int) -> None:
-        call = FmuSlave.DO_STEP if isinstance(slave, Ride) else slave.DO_STEP
-        self._add_operation(Operation.STEP, len(self._instances), (slave, call), (rate, 0))
-        addresses = slave.add_step() if isinstance(slave, Ride) else slave.addresses(call)
-        self._instances.append((*addresses, addressof(slave.told) if isinstance(slave, Fmi3Slave) else 0))
 
     def run(
         self,
@@ -250,17 +95,17 @@ class CompiledLoop:
         coupling, exchange = self._coupling, self._exchange
         done, stop, count = points
         self._note = own_note()
-        places = np.zeros(self.threads, _PLACE)
+        places = np.zeros(self.plan.threads, PLACE)
         places["failed"] = -1
-        disturbed = np.zeros(len(self._operations), np.int64)
-        values = self._wide.packed(exchange.values)
+        disturbed = np.zeros(len(self.plan.operations), np.int64)
+        values = self.plan.wide.packed(exchange.values)
         history, newest = self._unrolled(len(values))
         changes = np.array(
             [
                 (slot.active, place, is_real, slot.scale, slot.offset, slot.slope, slot.since)
-                for slot, place, is_real in self._changes
+                for slot, place, is_real in self.plan.changes
             ],
-            dtype=_CHANGES,
+            dtype=CHANGES,
         )
         goes_on, block = True, 1
         most = max(1, _MOST_VALUES // (len(values if table is None else table.kept) + 1)) * every
@@ -270,11 +115,11 @@ class CompiledLoop:
             into = Table(range(len(values)), due) if table is None else table
             cells = into.room(due)
             self._under_way = into, observe, start_time, step
-            for ride in self._rides:
+            for ride in self.plan.rides:
                 ride.begin()
             begin = world.perf_counter()
             taken, written, newest = kernel.run(
-                *(*self._plan, changes, into.kept, values, history, newest, cells, into.count, places, disturbed),
+                *(*self.plan.arrays, changes, into.kept, values, history, newest, cells, into.count, places, disturbed),
                 *(every, start_time, step, done, block, count),
             )
             seconds = world.perf_counter() - begin
@@ -282,7 +127,7 @@ class CompiledLoop:
             done += taken
             self._tell_disturbers(disturbed, done, places)
             coupling.steps, coupling.time = done, start_time + done * step
-            exchange.values[:] = self._wide.unpacked(values)
+            exchange.values[:] = self.plan.wide.unpacked(values)
             for place in self._whole:  # the kernel's values are all doubles
                 exchange.values[place] = int(exchange.values[place])
             if taken:
@@ -293,7 +138,7 @@ class CompiledLoop:
             block = max(1, int(taken * min(_BLOCK_SECONDS / max(seconds, 1e-9), _GROWTH)))
         for slave in coupling.slaves.values():
             slave.time = start_time + done * step
-        for array in self._arrays:
+        for array in self.plan.channels:
             array.forget()
         return goes_on
 
@@ -313,11 +158,11 @@ class CompiledLoop:
 
     def _tell_disturbers(self, disturbed: NDArray[np.int64], done: int, places: NDArray[np.void]) -> None:
         """Note who did it, in a step that was left up to what failed first: without threads there is nothing after."""
-        failed = min((self._rank(n) for n in places["failed"].tolist() if n >= 0), default=None)
+        failed = min((self.plan.rank(n) for n in places["failed"].tolist() if n >= 0), default=None)
         for operation in np.flatnonzero(disturbed).tolist():
-            slave = self._culprits[operation][0]
+            slave = self.plan.culprits[operation][0]
             if isinstance(slave, FmuSlave) and (
-                disturbed[operation] <= done or (failed is not None and self._rank(operation) <= failed)
+                disturbed[operation] <= done or (failed is not None and self.plan.rank(operation) <= failed)
             ):
                 slave.mend()
                 disturbed[operation] = 0
@@ -326,18 +171,19 @@ class CompiledLoop:
         """The recorded points that delayed connections look back on, as the kernel's ring, and its newest row."""
         kept = list(self._exchange.history)
         rows = [*[kept[0]] * (self._exchange.depth - len(kept)), *kept] if kept else []
-        packed = np.array([self._wide.packed(row) for row in rows], dtype=np.float64)
+        packed = np.array([self.plan.wide.packed(row) for row in rows], dtype=np.float64)
         return packed.reshape(len(rows), width), max(0, len(rows) - 1)
 
     def _roll(self, history: NDArray[np.float64], newest: int) -> None:
         if len(history):
-            self._exchange.history.extend(map(self._wide.unpacked, np.roll(history, -newest - 1, axis=0)))
+            self._exchange.history.extend(map(self.plan.wide.unpacked, np.roll(history, -newest - 1, axis=0)))
 
     def _go_on(self, places: NDArray[np.void], time: float, step: float) -> None:
         """After the first failure of a step let its part of the step go on; those after it wait for their turn."""
         failed: list[int] = places["failed"].tolist()
         if max(failed) >= 0:
-            part = min((n for n, operation in enumerate(failed) if operation >= 0), key=lambda n: self._rank(failed[n]))
+            waiting = (n for n, operation in enumerate(failed) if operation >= 0)
+            part = min(waiting, key=lambda n: self.plan.rank(failed[n]))
             again = self._recover(failed[part], int(places[part]["status"]), time, step)
             places[part] = failed[part] + (not again), -1, 0
 
@@ -346,9 +192,9 @@ class CompiledLoop:
 
         True where the operation that failed is to be done again.
         """
-        slave, call = self._culprits[failed]
+        slave, call = self.plan.culprits[failed]
         assert slave is not None
-        period, phase = self._operations[failed][2:]
+        period, phase = self.plan.operations[failed][2:]
         when = time + (period - phase) * step if "Get" in call else time
         if isinstance(slave, Ride):
             if not 0 <= status <= 1:
@@ -365,22 +211,6 @@ class CompiledLoop:
         slave.check(call, status)
         self._exchange.check_finite(owner)
         return False
-
-
-def _can_be_called(slave: Slave, exchange: Exchange) -> bool:
-    """Whether the kernel can call an instance, and set and read what is exchanged."""
-    if isinstance(slave, IsolatedSlave):
-        given = [part.channel for part in exchange.yields[slave.name]]
-        return may_ride(slave, [*(feed.channel for feed in exchange.feeds[slave.name]), *given])
-    return isinstance(slave, FmuSlave | Fmi3Slave) and not slave.rolls_back
-
-
-def _called(slave: Slave) -> _Called:
-    """What the kernel calls."""
-    if isinstance(slave, IsolatedSlave):
-        return slave.ride()
-    assert isinstance(slave, FmuSlave | Fmi3Slave)
-    return slave
 
 
 def _rows_due(done: int, block: int, every: int, count: int) -> int:

@@ -13,6 +13,7 @@ import numpy as np
 import pytest
 from railcosim.orchestrator.master import compiled
 from railcosim.orchestrator.master.compiled import CompiledLoop
+from railcosim.orchestrator.master.plan import CHANGES, PLACE, SWING
 from railcosim.orchestrator.master.settings import Settings
 
 MASTER = Path(__file__).parents[3] / "orchestrator" / "master"
@@ -44,11 +45,11 @@ NAMES = (
 def arguments(workspace, odd, ring, instantiated):
     """What the kernel is called with for a ring, by name."""
     master = instantiated(ring(odd, 3))
-    plan = [array.copy() for array in CompiledLoop(master.coupling, master.algorithm)._plan]
+    plan = [array.copy() for array in CompiledLoop(master.coupling, master.algorithm).plan.arrays]
     values = np.array(master.values)
-    changes = np.zeros(1, compiled._CHANGES)
+    changes = np.zeros(1, CHANGES)
     table, kept = np.empty((len(values) + 1, 8)), np.arange(len(values))
-    places = np.array([(0, -1, 0)], compiled._PLACE)
+    places = np.array([(0, -1, 0)], PLACE)
     disturbed = np.zeros(len(plan[0]), np.int64)
     state = values, np.tile(values, (2, 1)), 1, table, 0, places, disturbed
     given = [*plan, changes, kept, *state, 1, 0.0, 0.25, 0, 4, 4]
@@ -181,7 +182,7 @@ def test_what_is_not_an_array_is_refused(arguments):
 
 def test_swings_are_those_of_a_signal():
     """By hand: up to 2, down to -1, up to 4, where it stays; what is not finite is none of it."""
-    swings = np.zeros(2, compiled.SWING)
+    swings = np.zeros(2, SWING)
     for part in ([0.0, 1.0, np.nan, 2.0], [2.0, 0.5, -1.0], [], [np.inf, 3.0, 4.0, 4.0], [3.5]):
         compiled.kernel.look(swings, 1, np.array(part))
     assert swings[1].tolist() == (4.0, 3.5, 4.0, 5.0, -1, 3, 1)
@@ -191,10 +192,10 @@ def test_swings_are_those_of_a_signal():
 @pytest.mark.parametrize(
     ("swings", "number", "values"),
     [
-        (np.zeros(2, compiled.SWING), 2, np.zeros(1)),
-        (np.zeros(2, compiled.SWING), -1, np.zeros(1)),
+        (np.zeros(2, SWING), 2, np.zeros(1)),
+        (np.zeros(2, SWING), -1, np.zeros(1)),
         (np.zeros(57, np.uint8)[1:], 0, np.zeros(1)),
-        (np.zeros(1, compiled.SWING), 0, np.zeros(9, np.uint8)[1:]),
+        (np.zeros(1, SWING), 0, np.zeros(9, np.uint8)[1:]),
     ],
 )
 def test_swings_that_are_not_there_are_refused(swings, number, values):
@@ -225,10 +226,10 @@ def test_memory_and_threads_that_cannot_be_had(tmp_path, odd, ring, instantiated
         master = instantiated(ring(odd, 3))
         master.coupling.settings = Settings(threads=threads)
         values = np.array(master.values)
-        plan = CompiledLoop(master.coupling, master.algorithm)._plan
-        table, places = np.empty((len(values) + 1, 4)), np.array([(0, -1, 0)] * threads, compiled._PLACE)
+        plan = CompiledLoop(master.coupling, master.algorithm).plan.arrays
+        table, places = np.empty((len(values) + 1, 4)), np.array([(0, -1, 0)] * threads, PLACE)
         kept, history = np.arange(len(values)), np.tile(values, (2, 1))
-        state = np.zeros(0, compiled._CHANGES), kept, values, history, 1, table, 0, places
+        state = np.zeros(0, CHANGES), kept, values, history, 1, table, 0, places
         for left.value in range(20):
             try:
                 found = kernel.run(*plan, *state, np.zeros(len(plan[0]), np.int64), 1, 0.0, 0.25, 0, 4, 4)

@@ -8,7 +8,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from railcosim.orchestrator.fmi.guard import watching
-from railcosim.orchestrator.master import compiled
+from railcosim.orchestrator.master import compiled, plan
 from railcosim.orchestrator.run.execution import execute, run
 from railcosim.orchestrator.system import Event, System
 
@@ -179,7 +179,7 @@ def test_everyone_who_changes_how_numbers_are_rounded_is_told(agree):
 
 def test_like_calls_of_unwatched_instances_are_made_in_one(agree, monkeypatch):
     """Also where one of them discards its step in the midst; what is due at other times, or of others, stands apart."""
-    monkeypatch.setattr(compiled, "is_watched", lambda slave: False)
+    monkeypatch.setattr(plan, "is_watched", lambda slave: False)
     system = doing([0, 40, 0, 40, 41, 0, 0, 0])
     for k, step in enumerate([0.5, None, 0.5, 1.5]):
         system.instances[f"odd[{4 + k}]"].step = step
