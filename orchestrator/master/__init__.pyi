@@ -6,7 +6,7 @@ from .event_check import check_events
 from .initialization import settle
 from .loop import Master
 from .observer import Rows, Table
-from .plan import SWING
+from .plans import SWING
 from .settings import Settings
 
 __all__ = [

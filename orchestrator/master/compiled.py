@@ -19,7 +19,7 @@ from ..isolation import Ride
 from .algorithms import Explicit
 from .coupling import Coupling
 from .observer import Observer, Table
-from .plan import CHANGES, PLACE, SIZES, SWING, Plan
+from .plans import CHANGES, PLACE, SIZES, SWING, Plan
 
 try:
     from . import kernel

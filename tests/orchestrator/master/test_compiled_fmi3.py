@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from railcosim.orchestrator.fmi.binding import MixedChannel
 from railcosim.orchestrator.master import compiled
-from railcosim.orchestrator.master.flattening import parts_of
+from railcosim.orchestrator.master.plans.flattening import parts_of
 from railcosim.orchestrator.run.execution import run
 from railcosim.orchestrator.system import Event, System
 

@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 from railcosim.orchestrator.master import compiled
 from railcosim.orchestrator.master.compiled import CompiledLoop
-from railcosim.orchestrator.master.plan import CHANGES, PLACE, SWING
+from railcosim.orchestrator.master.plans import CHANGES, PLACE, SWING
 from railcosim.orchestrator.master.settings import Settings
 
 MASTER = Path(__file__).parents[3] / "orchestrator" / "master"

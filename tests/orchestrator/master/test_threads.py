@@ -8,7 +8,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from railcosim.orchestrator.fmi.guard import watching
-from railcosim.orchestrator.master import compiled, plan
+from railcosim.orchestrator.master import compiled
+from railcosim.orchestrator.master.plans import plan
 from railcosim.orchestrator.run.execution import execute, run
 from railcosim.orchestrator.system import Event, System
 

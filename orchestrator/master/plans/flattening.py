@@ -11,10 +11,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ..fmi import Channel
-from ..fmi.binding import ElementsChannel, FmuChannel, MixedChannel
-from ..isolation import IsolatedChannel
-from .exchange import Exchange
+from ...fmi import Channel
+from ...fmi.binding import ElementsChannel, FmuChannel, MixedChannel
+from ...isolation import IsolatedChannel
+from ..exchange import Exchange
 
 _NUMBERS = "Float64", "Float32", "Int8", "UInt8", "Int16", "UInt16", "Int32", "UInt32", "Int64", "UInt64", "Boolean"
 TYPES = {name: number for number, name in enumerate(_NUMBERS, 1)} | {"Enumeration": 9}

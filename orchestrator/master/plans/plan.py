@@ -7,12 +7,12 @@ from ctypes import addressof
 
 import numpy as np
 
-from ..fmi import Channel, Slave
-from ..fmi.binding import ElementsChannel, Fmi3Slave, FmuSlave, is_watched
-from ..isolation import IsolatedChannel, IsolatedSlave, Ride, may_ride
-from .algorithms import Explicit, Operation
-from .coupling import Coupling
-from .exchange import Change, Exchange
+from ...fmi import Channel, Slave
+from ...fmi.binding import ElementsChannel, Fmi3Slave, FmuSlave, is_watched
+from ...isolation import IsolatedChannel, IsolatedSlave, Ride, may_ride
+from ..algorithms import Explicit, Operation
+from ..coupling import Coupling
+from ..exchange import Change, Exchange
 from .flattening import TYPES, Wide, can_exchange, parts_of
 
 _CHANGE = 3
