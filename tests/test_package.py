@@ -104,6 +104,7 @@ def test_the_wheel_runs_beside_folders_of_the_same_names(installed: Path, foreig
     assert outside == {}
 
 
+@pytest.mark.long
 def test_the_command_line_of_the_wheel_finds_its_scenarios(installed: Path, foreign: Path) -> None:
     """The command an entry point runs, from the foreign folder, models and all."""
     names = {path.stem for path in (ROOT / "models").glob("*.toml")}
@@ -125,6 +126,7 @@ def test_every_package_is_listed_and_typed() -> None:
     assert all((ROOT / name / "py.typed").is_file() for name in FOLDERS)
 
 
+@pytest.mark.long
 def test_the_wheel_holds_every_module_every_scenario_and_the_type_markers(wheel: Path) -> None:
     names = set(zipfile.ZipFile(wheel).namelist())
     data = {path for path in (ROOT / "models").rglob("*") if path.suffix in (".toml", ".json")}
@@ -134,6 +136,7 @@ def test_the_wheel_holds_every_module_every_scenario_and_the_type_markers(wheel:
     assert not [name for name in names if name.startswith(("tests", "docs", "benchmarks", "railcosim/tests"))]
 
 
+@pytest.mark.long
 def test_the_wheel_holds_what_fmus_are_made_of(wheel: Path) -> None:
     """The C runtime, and what else lies beside the modules of ``fmus``: licences, pictures."""
     names = set(zipfile.ZipFile(wheel).namelist())

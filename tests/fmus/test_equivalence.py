@@ -312,7 +312,7 @@ def test_plain_python_and_both_kinds_of_fmu_agree_to_the_last_bit(path, argument
 )
 @every_component
 def test_they_agree_on_many_more_runs(path, arguments, examples, repeatable):
-    large = path in ("CoupledSubwayTrain", "SubwayTrain", "DistributedMpc")  # of which each takes seconds
+    large = path.endswith("Train") or path == "DistributedMpc"  # of which each takes seconds
 
     @checked(examples // 5 if large else examples, derandomize=repeatable)
     @given(scripts(resolve(path)(**arguments)))

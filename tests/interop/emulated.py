@@ -27,8 +27,9 @@ TYPES = ("Real", "Integer", "Boolean")
 
 
 def components():
-    """Every component of the catalogue."""
-    return sorted(CATALOGUE)
+    """Every component of the catalogue: each fourth in the long tier, the others in the campaign."""
+    tiers = (pytest.mark.long, *3 * [pytest.mark.campaign])
+    return [pytest.param(name, marks=tiers[k % len(tiers)]) for k, name in enumerate(sorted(CATALOGUE))]
 
 
 def require(found, what):

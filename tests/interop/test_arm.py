@@ -29,7 +29,6 @@ def machines(tmp_path_factory):
     return here, emulated.Machine("aarch64-linux", [QEMU, "-L", str(ROOT)], folder)
 
 
-@pytest.mark.long
 @pytest.mark.parametrize("name", emulated.components())
 def test_arm_gives_the_same_trajectory(name, machines):
     emulated.compare(name, *machines)

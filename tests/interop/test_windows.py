@@ -27,7 +27,6 @@ def machines(tmp_path_factory):
     return emulated.Machine("linux64", [], folder), emulated.Machine("win64", [WINE], folder, own)
 
 
-@pytest.mark.long
 @pytest.mark.parametrize("name", emulated.components())
 def test_windows_gives_the_same_trajectory(name, machines):
     emulated.compare(name, *machines)

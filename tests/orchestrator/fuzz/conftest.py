@@ -18,7 +18,7 @@ def explore(request):
 
     def examine(rule, *strategies, quick, deep):
         @settings(
-            max_examples={"quick": quick, "long": deep // 4, "deep": deep}[request.param],
+            max_examples={"quick": quick, "long": deep // 10, "deep": deep}[request.param],
             derandomize=request.param != "deep",
             database=None,
             deadline=60_000,  # ms: the largest scenario takes 0.6 s, and what may not take long takes for ever
