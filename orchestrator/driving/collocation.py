@@ -189,7 +189,8 @@ class _Transcription:
         self.speeds = ca.sqrt(self.inside)
         self.net = self.forces["traction"] - self.forces["regeneration"] - self.forces["friction"]
         speeds, net = self.speeds, self.net
-        each = [dynamics.acceleration(float(x), speeds[k], net[k]) for k, x in enumerate(self.places.ravel())]
+        here = dynamics.here(self.places.ravel()[None, :])
+        each = [dynamics.law(here[:, k], speeds[k], net[k]) for k in range(self.places.size)]
         self.accelerations = ca.vertcat(*each)
         self.roughness = ca.sumsqr((net[1:] - net[:-1]) / self.force)
         weights = ca.DM((self.lengths[:, None] * _B).ravel())

@@ -27,6 +27,8 @@ class Dynamics:
 
     Attributes:
         acceleration: a CasADi function from place (m), speed (m/s) and force (N) to m/s2: the train's equations.
+        here, law: the same in two, from places to what they mean to the train, shape (k,), and from that, speed and
+            force to m/s2: the line's tables are looked up once, not in each derivative that IPOPT asks for.
         forces, powers: the most of each of `FORCES`, N and W. top_speed: m/s. slowest: m/s.
         most_acceleration, most_deceleration: for comfort, m/s2; infinite where there is no limit.
     """
@@ -34,7 +36,7 @@ class Dynamics:
     def __init__(self, case: Case) -> None:
         wish, train = case.wish, case.train
         self.case = case
-        self.acceleration = _acceleration(case.component)
+        self.acceleration, self.here, self.law = _acceleration(case.component)
         brake = train.regeneration if wish.regeneration else train.regeneration._replace(force=0.0)
         share = 1.0 - wish.reserve
         forces = (train.traction.force, brake.force, train.friction_brake)
@@ -74,7 +76,7 @@ class Dynamics:
         return sorted({x for at in self.case.line.positions for x in (at, at + self.case.train.length)})
 
 
-def _acceleration(train: Component) -> Any:
+def _acceleration(train: Component) -> tuple[Any, Any, Any]:
     found = expressions(train)
     variables = scalar_variables(train)
     motion = {name: ca.SX.sym(name) for name in ("position", "speed", "force")}
@@ -86,4 +88,10 @@ def _acceleration(train: Component) -> Any:
     with simplification(True):
         given = [ca.vertcat(*values), ca.DM.zeros(2)]
         rate = ca.substitute([found.derivatives[at]], [found.values, found.clock], given)[0]
-        return ca.Function("acceleration", list(motion.values()), [rate])
+        position, speed, force = motion.values()
+        law, names, found_here = ca.extract_parametric(rate, position)
+        return (
+            ca.Function("acceleration", [position, speed, force], [rate]),
+            ca.Function("here", [position], [ca.vertcat(*found_here)]),
+            ca.Function("law", [ca.vertcat(*names), speed, force], [law]),
+        )
