@@ -25,6 +25,8 @@ _STEPS = 8
 """Of RK4 over an interval."""
 _GENTLE = 0.2
 """m/s2: of the guess to begin with."""
+_NEAR = 1.0
+"""m: no two nodes of the first mesh are nearer, but for limits."""
 _ENDS = np.array([3.0, 10.0, 30.0, 100.0, 300.0])
 """m from both ends: where a train is slow, its time asks for short intervals."""
 
@@ -129,7 +131,10 @@ def _changing(dynamics: Dynamics, solution: Solution) -> NDArray[np.bool_]:
 
 
 def _first_mesh(dynamics: Dynamics) -> Floats:
-    """Even intervals, short ones at the ends, nodes where limits change, and the line if there is room."""
+    """Nodes where limits change and the line does, short intervals at the ends, and even ones where there is room.
+
+    A slope that begins within an interval is no polynomial there, and halving would only slowly come near to it.
+    """
     case = dynamics.case
     begin, end = case.begin, case.end
     even = np.linspace(begin, end, case.wish.intervals + 1)
@@ -138,7 +143,7 @@ def _first_mesh(dynamics: Dynamics) -> Floats:
     fixed = np.array([x for x in dynamics.breaks() if begin < x < end])
     nodes = np.unique(np.concatenate([[begin, end], fixed]))
     spacing = 0.25 * (even[1] - even[0])
-    for candidates, near in (((*(begin + ends), *(end - ends)), 1.0), ((*dynamics.slopes(), *even), spacing)):
+    for candidates, near in (((*dynamics.slopes(), *(begin + ends), *(end - ends)), _NEAR), (even, spacing)):
         for candidate in candidates:
             if begin < candidate < end and np.abs(nodes - candidate).min() >= near:
                 nodes = np.sort(np.append(nodes, candidate))

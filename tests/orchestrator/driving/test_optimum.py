@@ -126,3 +126,32 @@ def test_a_mesh_that_is_fine_enough_stays(rows):
 def test_nothing_drives_up_a_wall(hop):
     with pytest.raises(ScenarioError, match=r"hop: IPOPT finds no driving that keeps all limits \(.*\); look whether"):
         optimise(hop("line.sections=[{ position = 0.0, gradient = 0.12 }]"))
+
+
+def test_a_hilly_line_under_a_jerk_limit_is_driven_as_scipy_integrates_it(hop, tmp_path):
+    solution = optimise(hop("jerk=0.3", "intervals=40", "tolerance=1e-3")).solution
+    x, t, v, traction, brake = np.loadtxt(write_profile(tmp_path, solution), delimiter=",", skiprows=1, unpack=True)
+    force = traction - brake
+
+    def height(place):
+        return np.interp(place, [0.0, 800.0, 1500.0, 2500.0], [0.0, 0.0, 7.0, -3.0])
+
+    def over_time(now, state):
+        place, speed = state
+        slope = 120e3 * 9.81 * (height(place) - height(place - 60.0)) / 60.0  # the mean under the train
+        resistance = 2400.0 + 60.0 * speed + 6.0 * speed**2
+        return [speed, (np.interp(now, t, force) - resistance - slope) / (120e3 * 1.1)]
+
+    run = solve_ivp(over_time, (0.0, t[-1]), [0.0, 1.0], rtol=1e-8, atol=1e-8, max_step=1.0, t_eval=t)
+    assert run.y[0] == pytest.approx(x, abs=2.0)  # forces between rows are straight lines here
+    assert run.y[1] == pytest.approx(v, abs=0.03)
+    assert t[-1] == pytest.approx(190.0, abs=1e-3)
+    assert np.abs(np.diff(force) / np.diff(t)).max() <= 0.3 * 120e3 * 1.03  # as below
+    electric = np.where((x > 400.0) & (x < 520.0), 0.0, np.minimum(60e3, 1.2e6 / v))
+    energy = trapezoid(traction / 0.9 - 0.8 * np.minimum(brake, electric), x)
+    assert energy == pytest.approx(solution.energy, rel=3e-3)
+
+
+def test_slopes_begin_on_the_mesh(hop):
+    nodes = optimise(hop("line.neutral_sections=[]", tolerance=0.1)).solution.nodes
+    assert {800.0, 860.0, 1500.0, 1560.0} <= set(nodes)
