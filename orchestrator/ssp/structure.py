@@ -201,7 +201,8 @@ class StructureReader:
     def _connection(self, document: Document, node: Any) -> Connection:
         if node.get("startIndices") or node.get("endIndices"):
             raise ScenarioError(Problem(document.place(node), "it connects parts of arrays, which is not supported"))
-        start = node.get("startElement"), node.get("startConnector", "")
-        end = node.get("endElement"), node.get("endConnector", "")
+        # OMSimulator writes an empty name where the standard leaves the attribute out: the system itself.
+        start = node.get("startElement") or None, node.get("startConnector", "")
+        end = node.get("endElement") or None, node.get("endConnector", "")
         transformation = read_transformation(document, node)
         return Connection(start, end, is_suppressed(node), transformation, document.place(node))

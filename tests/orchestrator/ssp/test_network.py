@@ -30,6 +30,15 @@ def test_nested_systems_are_passed_through(read):
     assert any("giver.g is giver_g, taker.inner.t is taker_inner_t" in note for note in found.provenance.notes)
 
 
+def test_an_empty_name_is_that_of_the_system(read):
+    """As in public archives that OMSimulator wrote, such as pwmtest of its test suite."""
+    named = connection("i", "t.u").replace("<ssd:Connection ", '<ssd:Connection startElement="" ')
+    assert 'startElement=""' in named
+    inner = system(component("t"), named, connectors(i="input"), name="inner")
+    found = read(system(inner + component("g"), connection("g.y", "inner.i")))
+    assert wires(found) == {"inner_t.u": ("g.y", None, 0.0)}
+
+
 def test_names_that_a_scenario_cannot_write(read):
     names = ["class", "1a", "a b", "a_b", "x.y"]
     found = read(system("".join(component(name) for name in names)))
