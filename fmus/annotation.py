@@ -9,7 +9,7 @@ from typing import Any
 
 from lxml import etree
 
-from .kinds import NOTE_OF_KIND, FmuKind
+from .kinds import NOTE_OF_KIND, FmiVersion, FmuKind
 
 TOOL = "railcosim"
 
@@ -54,8 +54,8 @@ class Annotation:
     sampled: bool = False
 
 
-def write(annotation: Annotation, root: Any) -> None:
-    """Add the annotation to a model description that has none."""
+def write(annotation: Annotation, root: Any, fmi: FmiVersion = "2") -> None:
+    """Add the annotation to a model description that has none, where this version of FMI has it."""
     step = annotation.recommended_step
     fields = {
         "name": annotation.component,
@@ -75,8 +75,11 @@ def write(annotation: Annotation, root: Any) -> None:
         "recommendedStep": "" if step is None else repr(float(step)),
         "sampled": "true" if annotation.sampled else "",
     }
-    tool = etree.SubElement(etree.SubElement(root, "VendorAnnotations"), "Tool", name=TOOL)
-    etree.SubElement(tool, "component", **{name: value for name, value in fields.items() if value})
+    if fmi == "2":
+        parent = etree.SubElement(etree.SubElement(root, "VendorAnnotations"), "Tool", name=TOOL)
+    else:
+        parent = etree.SubElement(etree.SubElement(root, "Annotations"), "Annotation", type=TOOL)
+    etree.SubElement(parent, "component", **{name: value for name, value in fields.items() if value})
 
 
 def read(root: Any) -> Annotation | None:
@@ -85,7 +88,8 @@ def read(root: Any) -> Annotation | None:
     Raises:
         ValueError: build arguments that are not JSON, or a step that is no number.
     """
-    element = root.find(f"VendorAnnotations/Tool[@name='{TOOL}']/component")
+    places = (f"VendorAnnotations/Tool[@name='{TOOL}']", f"Annotations/Annotation[@type='{TOOL}']")
+    element = next((found for place in places if (found := root.find(f"{place}/component")) is not None), None)
     if element is None:
         return None
     step, arguments = element.get("recommendedStep"), json.loads(element.get("arguments", "{}"))

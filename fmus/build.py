@@ -25,7 +25,7 @@ from ..components.tracing import TracingError
 from . import native_fmu, python_fmu, toolchain
 from .description import write
 from .identity import source_digest
-from .kinds import FmuKind, PackagingKind, Profile
+from .kinds import FmiVersion, FmuKind, PackagingKind, Profile
 from .references import build_with, resolve
 from .toolchain import CompilerError
 
@@ -58,6 +58,7 @@ def build(
     platforms: Sequence[str] = (),
     folder: Path | None = None,
     profile: Profile = "standard",
+    fmi: FmiVersion = "2",
 ) -> Path:
     """The FMU of a component, built if the cache does not have it.
 
@@ -68,6 +69,7 @@ def build(
         platforms: of a native FMU, keys of `toolchain.PLATFORMS`; this machine's by default.
         folder: where a relative file path starts.
         profile: of a native FMU, what its C may do.
+        fmi: of a native FMU, the version of FMI.
 
     Returns:
         Path of the FMU in the user's cache; copy it to keep it.
@@ -76,19 +78,25 @@ def build(
         ComponentError: the component or its arguments are unusable, cannot be traced, or do not compile.
     """
     component = build_with(resolve(reference, folder), arguments)
-    return build_component(component, kind, platforms, profile)
+    return build_component(component, kind, platforms, profile, fmi)
 
 
 def build_component(
-    component: Component, kind: FmuKind = "python", platforms: Sequence[str] = (), profile: Profile = "standard"
+    component: Component,
+    kind: FmuKind = "python",
+    platforms: Sequence[str] = (),
+    profile: Profile = "standard",
+    fmi: FmiVersion = "2",
 ) -> Path:
     """The same for a component at hand; its values become the FMU's start values."""
-    name, digest = type(component).__name__, source_digest(component, kind, profile)
+    name, digest = type(component).__name__, source_digest(component, kind, profile, fmi)
     if kind == "python":
         return _keep(digest, name, lambda: python_fmu.contents(component, digest))
     chosen = toolchain.chosen(platforms)
     identity = hashlib.sha256(f"{digest} {toolchain.identity(chosen)}".encode()).hexdigest()
-    return _keep(identity, name, lambda: native_fmu.contents(component, digest, chosen, _zig_cache(), profile))
+    return _keep(
+        identity, name, lambda: native_fmu.contents(component, digest, chosen, _zig_cache(), profile=profile, fmi=fmi)
+    )
 
 
 def _zig_cache() -> Path:

@@ -16,17 +16,17 @@ from ..components.errors import ComponentError
 from .annotation import TOOL
 from .description import arguments
 from .embed import embedded_files
-from .kinds import FmuKind, Profile
+from .kinds import FmiVersion, FmuKind, Profile
 
 _FOLDER = Path(__file__).parent
 _MAKERS: dict[FmuKind, tuple[str, ...]] = {"python": (TOOL, "pythonfmu"), "native": (TOOL, "casadi")}
 _MADE_BY = (
-    *("*.py", "documentation/*.py", "host/*.py", "native/*.py"),
-    *("host/*.c", "host/*.txt", "host/*.xml", "resources/*.png", "resources/*.txt", "runtime/*.[ch]"),
+    *("*.py", "description/*.py", "documentation/*.py", "host/*.py", "native/*.py"),
+    *("host/*.c", "host/*.txt", "host/*.xml", "resources/*.png", "resources/*.txt", "runtime/**/*.[ch]"),
 )
 
 
-def source_digest(component: Component, kind: FmuKind, profile: Profile = "standard") -> str:
+def source_digest(component: Component, kind: FmuKind, profile: Profile = "standard", fmi: FmiVersion = "2") -> str:
     """Hash of what an FMU is made from, without making it: sources, values, and everything that packages them.
 
     Raises:
@@ -34,7 +34,7 @@ def source_digest(component: Component, kind: FmuKind, profile: Profile = "stand
     """
     files, module = embedded_files(type(component))
     parts = {name: text.encode() for name, text in files.items()}
-    how = kind if profile == "standard" else f"{kind} {profile}"
+    how = f"{kind} {profile} FMI {fmi}"
     parts["/"] = f"{how} {module} {type(component).__qualname__} {given_values(component)}".encode()
     parts["/packaging"] = _packaging(kind)
     return digest_of(parts)

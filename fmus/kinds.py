@@ -12,6 +12,8 @@ Kind = Literal["auto", "native", "python", "plain"]
 """What a user asks for where a system is to run: ``"plain"`` is Python objects without packaging."""
 Profile = Literal["standard", "real-time"]
 """What a native FMU's C may do: ``"real-time"`` is no file, no memory taken after instantiation, no printf."""
+FmiVersion = Literal["2", "3"]
+"""The version of FMI that an FMU is written in: 2.0 or 3.0."""
 ModelKind = Literal["fmu", "native", "python", "plain"]
 """What a model is: ``"fmu"`` a file that the user gave, the others made here of a component."""
 

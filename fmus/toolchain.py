@@ -8,7 +8,7 @@ Folders below ``binaries/``: FMI 2.0 knows ``linux64``, ``win64`` and ``darwin64
 other machines FMI 2.0.5 refers to the platform tuples of FMI 3.0, hence ``aarch64-linux``. Importers differ: on an Arm
 Mac they look into ``darwin64``, which therefore holds a universal library; on Arm Linux FMPy 0.3 and OpenModelica look
 into ``linux64``, where an FMU for both machines has the x86 library. An FMU built for Arm Linux alone therefore carries
-its library under both names.
+its library under both names. FMI 3.0 has the tuples alone.
 
 A web page is a platform, too: ``wasm32-wasi`` holds a WebAssembly module that exports the FMI functions, ``malloc`` and
 ``free``, and is to be started by ``_initialize``. Since a page has no function of C to give as a logger, it asks
@@ -35,6 +35,7 @@ from pathlib import Path
 import fmpy
 
 from ..components.errors import ComponentError, nearest
+from .kinds import FmiVersion
 
 FLAGS = (
     *("-std=c11", "-O2", "-ffp-contract=off", "-fno-builtin-pow", "-fvisibility=hidden", "-g0"),
@@ -53,12 +54,14 @@ class Platform:
 
     Attributes:
         folder: below ``binaries/``.
+        tuples: what FMI 3.0 calls it there; a universal library stands under both names.
         suffix: of the library.
         targets: what ziglang calls it; several are joined to one universal library.
         options: for ziglang, beside `FLAGS`.
     """
 
     folder: str
+    tuples: tuple[str, ...]
     suffix: str
     targets: tuple[str, ...]
     options: tuple[str, ...]
@@ -66,11 +69,19 @@ class Platform:
 
 _EXPORTS = tuple(f"-Wl,--export{what}" for what in ("-dynamic", "=malloc", "=free"))
 PLATFORMS = {
-    "linux64": Platform("linux64", ".so", ("x86_64-linux-gnu.2.17",), ("-shared", "-fPIC", "-lm")),
-    "win64": Platform("win64", ".dll", ("x86_64-windows-gnu",), ("-shared",)),
-    "darwin64": Platform("darwin64", ".dylib", ("x86_64-macos.11.0", "aarch64-macos.11.0"), ("-shared", "-fPIC")),
-    "aarch64-linux": Platform("aarch64-linux", ".so", ("aarch64-linux-gnu.2.17",), ("-shared", "-fPIC", "-lm")),
-    "wasm": Platform("wasm32-wasi", ".wasm", ("wasm32-wasi",), ("-mexec-model=reactor", *_EXPORTS)),
+    "linux64": Platform("linux64", ("x86_64-linux",), ".so", ("x86_64-linux-gnu.2.17",), ("-shared", "-fPIC", "-lm")),
+    "win64": Platform("win64", ("x86_64-windows",), ".dll", ("x86_64-windows-gnu",), ("-shared",)),
+    "darwin64": Platform(
+        "darwin64",
+        ("x86_64-darwin", "aarch64-darwin"),
+        ".dylib",
+        ("x86_64-macos.11.0", "aarch64-macos.11.0"),
+        ("-shared", "-fPIC"),
+    ),
+    "aarch64-linux": Platform(
+        "aarch64-linux", ("aarch64-linux",), ".so", ("aarch64-linux-gnu.2.17",), ("-shared", "-fPIC", "-lm")
+    ),
+    "wasm": Platform("wasm32-wasi", ("wasm32-wasi",), ".wasm", ("wasm32-wasi",), ("-mexec-model=reactor", *_EXPORTS)),
 }
 SYSTEMS = tuple(name for name in PLATFORMS if name != "wasm")
 """What ``all`` means: those that an importer runs on."""
@@ -104,8 +115,10 @@ def chosen(names: Iterable[str]) -> tuple[str, ...]:
     return tuple(name for name in PLATFORMS if name in wanted or ("all" in wanted and name in SYSTEMS))
 
 
-def folders(platforms: Iterable[str]) -> dict[str, tuple[str, ...]]:
+def folders(platforms: Iterable[str], fmi: FmiVersion = "2") -> dict[str, tuple[str, ...]]:
     """For each of an FMU's platforms, the folders below ``binaries/`` that hold its library."""
+    if fmi == "3":
+        return {name: PLATFORMS[name].tuples for name in platforms}
     found: dict[str, tuple[str, ...]] = {name: (PLATFORMS[name].folder,) for name in platforms}
     if "aarch64-linux" in found and "linux64" not in found:
         found["aarch64-linux"] += ("linux64",)

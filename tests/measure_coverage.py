@@ -34,7 +34,7 @@ KERNEL = [
     ROOT / "orchestrator" / "master" / "native" / name
     for name in ("fmi3.c", "growth.c", "kernel.c", "plan.c", "stepping.c", "team.c")
 ]
-RUNTIME = sorted((ROOT / "fmus" / "runtime").glob("*.c"))
+RUNTIME = sorted((ROOT / "fmus" / "runtime").rglob("*.c"))
 LOOP_TESTS = [
     *(f"tests/orchestrator/master/test_compiled{name}.py" for name in ("", "_blocks", "_fmi3")),
     *("tests/orchestrator/master/test_kernel.py", "tests/orchestrator/master/test_threads.py"),

@@ -140,7 +140,7 @@ def test_the_wheel_holds_every_module_every_scenario_and_the_type_markers(wheel:
 def test_the_wheel_holds_what_fmus_are_made_of(wheel: Path) -> None:
     """The C runtime, and what else lies beside the modules of ``fmus``: licences, pictures."""
     names = set(zipfile.ZipFile(wheel).namelist())
-    files = {path for folder in ("runtime", "resources") for path in (ROOT / "fmus" / folder).glob("*.*")}
+    files = {path for folder in ("runtime", "resources") for path in (ROOT / "fmus" / folder).rglob("*.*")}
     wanted = {f"railcosim/{path.relative_to(ROOT).as_posix()}" for path in files if path.suffix not in (".py", ".pyc")}
     assert wanted - names == set()
 

@@ -12,7 +12,7 @@ from ...components.component import Component
 from ...components.declarations import Input, Output, Parameter, State, Tape
 from ...components.errors import ComponentError
 from ...components.tracing import feedthrough, start_name
-from ..kinds import Profile
+from ..kinds import FmiVersion, Profile
 from ..variables import ScalarVariable, scalar_variables
 from .ccode import number
 from .trace import Traced
@@ -33,7 +33,9 @@ _MAX_TEXT = 1024
 """Bytes of a text with its end, as in ``instance.h``."""
 
 
-def model_header(component: Component, traced: Traced, guid: str, profile: Profile = "standard") -> str:
+def model_header(
+    component: Component, traced: Traced, guid: str, profile: Profile = "standard", fmi: FmiVersion = "2"
+) -> str:
     """``model.h`` of a component.
 
     Args:
@@ -41,6 +43,7 @@ def model_header(component: Component, traced: Traced, guid: str, profile: Profi
         traced: its equations as C; their functions bear the model's name.
         guid: as the model description has it.
         profile: what the runtime may do.
+        fmi: in 3.0 the value reference of an array's first element means all of it.
     """
     name = type(component).__name__
     variables = scalar_variables(component)
@@ -92,7 +95,7 @@ def model_header(component: Component, traced: Traced, guid: str, profile: Profi
         *(f"#define {key} {value}\n" for key, value in constants.items()),
         "".join(f"#if !defined({k})\n#define {k} {n}\n#endif\n" for k, n in _tape_room(component).items()),
         "".join(f"#define MODEL_{f.upper()} {name}_{f}\n" for f in _EQUATIONS),
-        _array("const Variable model_variables", [_variable(v, component, numbers) for v in variables]),
+        _array("const Variable model_variables", [_variable(v, component, numbers, fmi) for v in variables]),
         _array("const int model_real_inputs", [str(v.reference) for v in real_inputs], "0"),
         _array("const char *const model_texts", [_text(v, component) for v in texts], '""'),
         _array("const Noise model_noises", _noises(component, layout.noise[0], references), "{0, 0, 0, 0, false}"),
@@ -124,7 +127,7 @@ def held_outputs(component: Component) -> list[bool]:
     return [any(direct[s] for s in slot.scalars) for slot in component.of(Output) for _ in slot.scalars]
 
 
-def _variable(v: ScalarVariable, component: Component, numbers: Mapping[int, int]) -> str:
+def _variable(v: ScalarVariable, component: Component, numbers: Mapping[int, int], fmi: FmiVersion) -> str:
     """``numbers`` are those of texts and of real inputs among their like, by value reference."""
     declaration = v.slot.declaration
     low = "-INFINITY" if declaration.minimum is None else number(declaration.minimum)
@@ -135,7 +138,8 @@ def _variable(v: ScalarVariable, component: Component, numbers: Mapping[int, int
     among = numbers.get(v.reference, -1)
     text, real_input = (among, -1) if v.slot.type is str else (-1, among)
     kinds = f"{_TYPES[v.slot.type]}, {_role(v)}"
-    return f"{{{_quoted(v.name)}, {kinds}, {start}, {low}, {high}, {text}, {real_input}}}"
+    size = 1 if fmi == "2" or v.element is None else 0 if v.element else len(v.slot.scalars)
+    return f"{{{_quoted(v.name)}, {kinds}, {start}, {low}, {high}, {text}, {real_input}, {size}}}"
 
 
 def _role(v: ScalarVariable) -> str:

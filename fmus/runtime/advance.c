@@ -7,15 +7,15 @@
 static const double NEAR_SAMPLE = 1e-3;
 
 /* One sample: outputs with the old memory, then the next memory, tape row and re-initialised states. */
-static fmi2Status sample(Instance *s, double period, double elapsed)
+static Status sample(Instance *s, double period, double elapsed)
 {
 #if N_TAPE > 0
-    if (tape_follow(s) != fmi2OK) {
-        return fmi2Error;
+    if (tape_follow(s) != STATUS_OK) {
+        return STATUS_ERROR;
     }
 #endif
-    if (evaluate(s, elapsed, true) != fmi2OK) {
-        return fmi2Error;
+    if (evaluate(s, elapsed, true) != STATUS_OK) {
+        return STATUS_ERROR;
     }
     memcpy(s->held, s->values + FIRST_OUTPUT, N_OUTPUTS * sizeof(double));
     double *next = s->scratch, *row = next + N_MEMORY, *again = row + N_TAPE;
@@ -23,8 +23,8 @@ static fmi2Status sample(Instance *s, double period, double elapsed)
 #if N_MEMORY + N_TAPE + N_REINITIALISED > 0
     call_equations(s, MODEL_UPDATE, next);
 #endif
-    if (check_results(s, "update", FIRST_MEMORY, N_MEMORY, next) != fmi2OK) {
-        return fmi2Error;
+    if (check_results(s, "update", FIRST_MEMORY, N_MEMORY, next) != STATUS_OK) {
+        return STATUS_ERROR;
     }
     for (int k = 0; k < N_TAPE; k++) {
         if (!isfinite(row[k])) {
@@ -36,13 +36,13 @@ static fmi2Status sample(Instance *s, double period, double elapsed)
 #endif
     for (int k = 0; k < N_REINITIALISED; k++) {
         int target = model_reinitialised[k];
-        if (check_results(s, "update", target, 1, again + k) != fmi2OK) {
-            return fmi2Error;
+        if (check_results(s, "update", target, 1, again + k) != STATUS_OK) {
+            return STATUS_ERROR;
         }
         s->values[target] = again[k];
     }
     memcpy(s->values + FIRST_MEMORY, next, N_MEMORY * sizeof(double));
-    return fmi2OK;
+    return STATUS_OK;
 }
 
 /* When the sample of this number is due: counted, never summed up. */
@@ -81,18 +81,18 @@ static double resume(Instance *s)
 }
 
 /* The states from one time to another; from sample to sample that is the period, whatever the roundings of the two. */
-static fmi2Status move_states(Instance *s, double begin, double from, double to)
+static Status move_states(Instance *s, double begin, double from, double to)
 {
     double length = to - from;
     if (from == sample_due(s, s->taken - 1.0) && to == sample_due(s, s->taken)) {
         length = s->values[SAMPLE_TIME];
     }
-    return length > 0.0 ? integrate(s, from, from - begin, length) : fmi2OK;
+    return length > 0.0 ? integrate(s, from, from - begin, length) : STATUS_OK;
 }
 #endif
 
 /* A communication step on the sample clock. */
-static fmi2Status follow_clock(Instance *s, double begin, double length)
+static Status follow_clock(Instance *s, double begin, double length)
 {
     double period = s->values[SAMPLE_TIME], end = begin + length;
     double near = NEAR_SAMPLE * (length < period ? length : period);
@@ -106,15 +106,15 @@ static fmi2Status follow_clock(Instance *s, double begin, double length)
     for (; due < end - near; due = sample_due(s, s->taken)) {
         double elapsed = due > begin + near ? due - begin : 0.0;
 #if N_STATES > 0
-        if (move_states(s, begin, from, due) != fmi2OK) {
-            return fmi2Error;
+        if (move_states(s, begin, from, due) != STATUS_OK) {
+            return STATUS_ERROR;
         }
         from = due;
 #endif
         s->time = due;
         move_inputs(s, elapsed);
-        if (sample(s, period, elapsed) != fmi2OK) {
-            return fmi2Error;
+        if (sample(s, period, elapsed) != STATUS_OK) {
+            return STATUS_ERROR;
         }
         s->taken += 1.0;
     }
@@ -124,8 +124,8 @@ static fmi2Status follow_clock(Instance *s, double begin, double length)
     if (between && !moving) {
         keep_base(s, from);
     }
-    if (move_states(s, begin, from, reached) != fmi2OK) {
-        return fmi2Error;
+    if (move_states(s, begin, from, reached) != STATUS_OK) {
+        return STATUS_ERROR;
     }
     reached = reached > from ? reached : from;
     if (between && moving) {
@@ -133,31 +133,31 @@ static fmi2Status follow_clock(Instance *s, double begin, double length)
     }
 #endif
     s->reached = s->time = reached;
-    return fmi2OK;
+    return STATUS_OK;
 }
 #endif
 
 /* One communication step from `begin`. */
-static fmi2Status advance(Instance *s, double begin, double length)
+static Status advance(Instance *s, double begin, double length)
 {
     s->time = begin;
-    if (start_inputs(s, length) != fmi2OK) {
-        return fmi2Error;
+    if (start_inputs(s, length) != STATUS_OK) {
+        return STATUS_ERROR;
     }
 #if IS_SAMPLED
     bool clocked = s->values[SAMPLE_TIME] > 0.0;
-    if (clocked && follow_clock(s, begin, length) != fmi2OK) {
-        return fmi2Error;
+    if (clocked && follow_clock(s, begin, length) != STATUS_OK) {
+        return STATUS_ERROR;
     }
-    if (!clocked && sample(s, length, 0.0) != fmi2OK) {
-        return fmi2Error;
+    if (!clocked && sample(s, length, 0.0) != STATUS_OK) {
+        return STATUS_ERROR;
     }
 #else
     bool clocked = false;
 #endif
     if (!clocked) {
-        if (integrate(s, begin, 0.0, length) != fmi2OK) {
-            return fmi2Error;
+        if (integrate(s, begin, 0.0, length) != STATUS_OK) {
+            return STATUS_ERROR;
         }
         s->time = begin + length;
     }
@@ -165,8 +165,8 @@ static fmi2Status advance(Instance *s, double begin, double length)
     stop_inputs(s);
     s->fresh = false;
 #if IS_SAMPLED && HAS_HELD
-    if (refresh(s) != fmi2OK) {
-        return fmi2Error;
+    if (refresh(s) != STATUS_OK) {
+        return STATUS_ERROR;
     }
     for (int k = 0; k < N_OUTPUTS; k++) {
         if (model_held[k]) {
@@ -174,5 +174,5 @@ static fmi2Status advance(Instance *s, double begin, double length)
         }
     }
 #endif
-    return fmi2OK;
+    return STATUS_OK;
 }

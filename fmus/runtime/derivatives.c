@@ -1,22 +1,21 @@
-/* The FMI 2.0 function for directional derivatives: of real outputs and rates, and in initialization mode of what the
-   initial equations compute. */
+/* Directional derivatives: of real outputs and rates, and in initialization mode of what the initial equations compute. */
 
 /* Where a real unknown stands among the results of the equations: outputs first, then rates; -1 if it is neither. */
-static int unknown_place(fmi2ValueReference reference)
+static int unknown_place(Reference reference)
 {
     int place = (int)reference - FIRST_OUTPUT;
-    if (place >= 0 && place < N_OUTPUTS && model_variables[reference].type == TYPE_REAL) {
+    if (place >= 0 && place < N_OUTPUTS && model_variables[reference].type == TYPE_REAL && elements(reference) > 0) {
         return place;
     }
     return is_rate(reference, TYPE_REAL) ? (int)(N_OUTPUTS + (reference - N_VARIABLES)) : -1;
 }
 
 /* A state or memory that is shown as an output depends on itself alone. */
-static bool is_kept(fmi2ValueReference reference)
+static bool is_kept(Reference reference)
 {
     int state = (int)reference - FIRST_STATE, memory = (int)reference - FIRST_MEMORY;
     bool kept = (state >= 0 && state < N_STATES) || (memory >= 0 && memory < N_MEMORY);
-    return kept && model_variables[reference].type == TYPE_REAL;
+    return kept && model_variables[reference].type == TYPE_REAL && elements(reference) > 0;
 }
 
 /* The direction at the present values. In initialization mode states and memory move with their starts, and one that is
@@ -41,47 +40,65 @@ static void complete_direction(Instance *s)
     }
 }
 
-fmi2Status fmi2GetDirectionalDerivative(fmi2Component c, const fmi2ValueReference vUnknown_ref[], size_t nUnknown,
-                                        const fmi2ValueReference vKnown_ref[], size_t nKnown, const fmi2Real dvKnown[],
-                                        fmi2Real dvUnknown[])
+/* The direction of the knowns into the instance. */
+static Status take_direction(Instance *s, const Reference knowns[], size_t n_knowns, const double seed[], size_t n_seed,
+                             const char *call)
 {
-    Instance *s = enter(c, READABLE, "fmi2GetDirectionalDerivative");
-    if (s == NULL) {
-        return fmi2Error;
-    }
-    if ((nUnknown > 0 && (vUnknown_ref == NULL || dvUnknown == NULL)) ||
-        (nKnown > 0 && (vKnown_ref == NULL || dvKnown == NULL))) {
-        return fail(s, "fmi2GetDirectionalDerivative: NULL for an array");
-    }
-    if (refresh(s) != fmi2OK) {
-        return fmi2Error;
-    }
+    size_t used = 0;
     memset(s->direction, 0, sizeof s->direction);
-    for (size_t k = 0; k < nKnown; k++) {
-        const Variable *known = find(s, vKnown_ref[k], TYPE_REAL, "fmi2GetDirectionalDerivative");
+    for (size_t k = 0; k < n_knowns; k++) {
+        const Variable *known = find(s, knowns[k], TYPE_REAL, call);
         if (known == NULL) {
-            return fmi2Error;
+            return STATUS_ERROR;
         }
         if (known->role == ROLE_OUTPUT || (known->role == ROLE_KEPT && s->phase == PHASE_INITIALIZATION)) {
-            return fail(s, "fmi2GetDirectionalDerivative: %s is computed; it is no known", known->name);
+            return fail(s, "%s: %s is computed; it is no known", call, known->name);
         }
-        s->direction[vKnown_ref[k]] = dvKnown[k];
+        if (HAS_ARRAYS && elements(knowns[k]) > n_seed - used) {
+            return miscounted(s, n_seed, call);
+        }
+        for (size_t n = 0; n < elements(knowns[k]); n++) {
+            s->direction[knowns[k] + n] = seed[used++];
+        }
+    }
+    return HAS_ARRAYS && used != n_seed ? miscounted(s, n_seed, call) : STATUS_OK;
+}
+
+/* How the unknowns move when the knowns move along the seed. */
+static Status directional_derivative(void *c, const Reference unknowns[], size_t n_unknowns, const Reference knowns[],
+                                     size_t n_knowns, const double seed[], size_t n_seed, double sensitivity[],
+                                     size_t n_sensitivity, const char *call)
+{
+    Instance *s = enter(c, READABLE, call);
+    size_t used = 0;
+    if (s == NULL) {
+        return STATUS_ERROR;
+    }
+    if ((n_unknowns > 0 && (unknowns == NULL || sensitivity == NULL)) ||
+        (n_knowns > 0 && (knowns == NULL || seed == NULL))) {
+        return fail(s, "%s: NULL for an array", call);
+    }
+    if (refresh(s) != STATUS_OK || take_direction(s, knowns, n_knowns, seed, n_seed, call) != STATUS_OK) {
+        return STATUS_ERROR;
     }
     complete_direction(s);
 #if N_OUTPUTS + N_STATES > 0
     const double clock[2] = {s->time, s->step};
     MODEL_DIRECTIONAL(clock, s->values, s->direction, s->scratch);
 #endif
-    for (size_t k = 0; k < nUnknown; k++) {
-        int place = unknown_place(vUnknown_ref[k]);
-        if (place >= 0) {
-            dvUnknown[k] = s->scratch[place];
-        } else if (is_kept(vUnknown_ref[k])) {
-            dvUnknown[k] = s->direction[vUnknown_ref[k]];
-        } else {
-            return fail(s, "fmi2GetDirectionalDerivative: value reference %u is neither a real output nor a rate",
-                        vUnknown_ref[k]);
+    for (size_t k = 0; k < n_unknowns; k++) {
+        int place = unknown_place(unknowns[k]);
+        if (place < 0 && !is_kept(unknowns[k])) {
+            return fail(s, "%s: value reference %u is neither a real output nor a rate", call, unknowns[k]);
+        }
+        const double *from = place < 0 ? s->direction + unknowns[k] : s->scratch + place;
+        size_t count = elements(place < N_OUTPUTS ? unknowns[k] : (Reference)(FIRST_STATE + (place - N_OUTPUTS)));
+        if (HAS_ARRAYS && count > n_sensitivity - used) {
+            return miscounted(s, n_sensitivity, call);
+        }
+        for (size_t n = 0; n < count; n++) {
+            sensitivity[used++] = from[n];
         }
     }
-    return fmi2OK;
+    return HAS_ARRAYS && used != n_sensitivity ? miscounted(s, n_sensitivity, call) : STATUS_OK;
 }

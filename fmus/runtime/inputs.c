@@ -16,10 +16,10 @@ static double rise(const double *derivatives, double elapsed)
 }
 
 /* Note where the inputs start, and that none leaves the range of numbers on its way. */
-static fmi2Status start_inputs(Instance *s, double length)
+static Status start_inputs(Instance *s, double length)
 {
     if (!s->moving) {
-        return fmi2OK;
+        return STATUS_OK;
     }
     for (int n = 0; n < N_REAL_INPUTS; n++) {
         double bounds[MAX_ORDER];
@@ -32,7 +32,7 @@ static fmi2Status start_inputs(Instance *s, double length)
                         model_variables[model_real_inputs[n]].name, length);
         }
     }
-    return fmi2OK;
+    return STATUS_OK;
 }
 
 /* The inputs that move as they are `elapsed` seconds after the beginning of the communication step. */

@@ -3,28 +3,12 @@
 enum { LOG_ALL, LOG_ERROR, LOG_WARNING, LOG_EVENTS, N_LOG_CATEGORIES };
 static const char *const log_categories[N_LOG_CATEGORIES] = {"logAll", "logStatusError", "logStatusWarning", "logEvents"};
 
-/* The importer reads a message as a printf format, and #r12# in it as a reference to a variable: double both signs.
-   There is room for twice the longest message. */
-static void escape(const char *from, char to[2 * MAX_MESSAGE])
-{
-    size_t used = 0;
-    for (; *from != '\0'; from++) {
-        if (*from == '%' || *from == '#') {
-            to[used++] = *from;
-        }
-        to[used++] = *from;
-    }
-    to[used] = '\0';
-}
+/* Give a message to the importer, as its version of FMI wants it. */
+static void tell(const Listener *listener, const char *name, Status status, const char *category, const char *text);
 
-static void send(const Instance *s, fmi2Status status, int category, const char *text)
+static void send(const Instance *s, Status status, int category, const char *text)
 {
-    char escaped[2 * MAX_MESSAGE];
-    if (s->logger == NULL) {
-        return;
-    }
-    escape(text, escaped);
-    s->logger(s->environment, s->name, status, log_categories[category], escaped);
+    tell(&s->listener, s->name, status, log_categories[category], text);
 }
 
 #if REAL_TIME
@@ -116,11 +100,11 @@ static void write_message(char *to, const char *end, const char *format, va_list
 }
 #endif
 
-/* Say what is wrong; the result is fmi2Error, for the caller to return. The remedy belongs into the message. */
+/* Say what is wrong; the result is STATUS_ERROR, for the caller to return. The remedy belongs into the message. */
 #if defined(__GNUC__)
 __attribute__((format(printf, 2, 3)))
 #endif
-static fmi2Status fail(Instance *s, const char *format, ...)
+static Status fail(Instance *s, const char *format, ...)
 {
     va_list arguments;
     va_start(arguments, format);
@@ -132,20 +116,13 @@ static fmi2Status fail(Instance *s, const char *format, ...)
     vsnprintf(s->message + used, sizeof s->message - (size_t)used, format, arguments);
 #endif
     va_end(arguments);
-    send(s, fmi2Error, LOG_ERROR, s->message);
-    return fmi2Error;
-}
-
-/* The standard's answer to a question about the status that has none; nothing is wrong. */
-static fmi2Status no_status(const Instance *s, const char *text)
-{
-    send(s, fmi2Discard, LOG_WARNING, text);
-    return fmi2Discard;
+    send(s, STATUS_ERROR, LOG_ERROR, s->message);
+    return STATUS_ERROR;
 }
 
 static void tell_event(const Instance *s, const char *text)
 {
     if (s->debug) {
-        send(s, fmi2OK, LOG_EVENTS, text);
+        send(s, STATUS_OK, LOG_EVENTS, text);
     }
 }

@@ -79,7 +79,7 @@ static double random_number(bool normal, uint64_t seed, uint64_t stream, uint64_
 }
 
 /* Put the random numbers of the present time among the values. */
-static fmi2Status draw(Instance *s)
+static Status draw(Instance *s)
 {
     for (int n = 0; n < N_NOISES; n++) {
         const Noise *noise = &model_noises[n];
@@ -99,5 +99,5 @@ static fmi2Status draw(Instance *s)
             s->values[noise->first + k] = random_number(noise->normal, seed, stream, index);
         }
     }
-    return fmi2OK;
+    return STATUS_OK;
 }

@@ -12,7 +12,7 @@ static bool fits(Type type, double value)
 }
 
 /* Every result must be finite, and one that its variable can hold. */
-static fmi2Status check_results(Instance *s, const char *method, int first, int count, const double *result)
+static Status check_results(Instance *s, const char *method, int first, int count, const double *result)
 {
     for (int k = 0; k < count; k++) {
         const Variable *variable = &model_variables[first + k];
@@ -25,7 +25,7 @@ static fmi2Status check_results(Instance *s, const char *method, int first, int 
                         s->time, variable->type == TYPE_INTEGER ? "32-bit integer" : "boolean");
         }
     }
-    return fmi2OK;
+    return STATUS_OK;
 }
 
 #if N_TAPE > 0
@@ -49,14 +49,14 @@ static double trip_time_after(const Instance *s, double elapsed)
 #endif
 
 /* All outputs into the values, `elapsed` seconds after the inputs were read; at a sample the tape is at one of its own. */
-static fmi2Status evaluate(Instance *s, double elapsed, bool at_sample)
+static Status evaluate(Instance *s, double elapsed, bool at_sample)
 {
-    if (draw(s) != fmi2OK) {
-        return fmi2Error;
+    if (draw(s) != STATUS_OK) {
+        return STATUS_ERROR;
     }
 #if N_TAPE > 0
-    if (tape_read(s, trip_time_after(s, elapsed), at_sample) != fmi2OK) {
-        return fmi2Error;
+    if (tape_read(s, trip_time_after(s, elapsed), at_sample) != STATUS_OK) {
+        return STATUS_ERROR;
     }
 #else
     (void)elapsed;
@@ -64,12 +64,12 @@ static fmi2Status evaluate(Instance *s, double elapsed, bool at_sample)
 #endif
 #if N_OUTPUTS > 0
     call_equations(s, MODEL_OUTPUTS, s->scratch);
-    if (check_results(s, "outputs", FIRST_OUTPUT, N_OUTPUTS, s->scratch) != fmi2OK) {
-        return fmi2Error;
+    if (check_results(s, "outputs", FIRST_OUTPUT, N_OUTPUTS, s->scratch) != STATUS_OK) {
+        return STATUS_ERROR;
     }
     memcpy(s->values + FIRST_OUTPUT, s->scratch, N_OUTPUTS * sizeof(double));
 #endif
-    return fmi2OK;
+    return STATUS_OK;
 }
 
 /* States and memory to their start values, or their directions to those of their start values. */
@@ -88,58 +88,58 @@ static void forget_computed_starts(Instance *s)
     }
 }
 
-static fmi2Status compute_starts(Instance *s)
+static Status compute_starts(Instance *s)
 {
     forget_computed_starts(s);
     call_equations(s, MODEL_INITIAL, s->scratch);
     for (int k = 0; k < N_INITIAL; k++) {
         int target = model_initial_targets[k];
-        if (check_results(s, "initial", target, 1, s->scratch + k) != fmi2OK) {
-            return fmi2Error;
+        if (check_results(s, "initial", target, 1, s->scratch + k) != STATUS_OK) {
+            return STATUS_ERROR;
         }
         s->values[target] = s->scratch[k];
     }
-    return fmi2OK;
+    return STATUS_OK;
 }
 #endif
 
 /* Bring what follows from parameters, start values and inputs up to date with them. */
-static fmi2Status prepare(Instance *s)
+static Status prepare(Instance *s)
 {
     if (s->prepared) {
-        return fmi2OK;
+        return STATUS_OK;
     }
     take_starts(s->values);
-    if (draw(s) != fmi2OK) {
-        return fmi2Error;
+    if (draw(s) != STATUS_OK) {
+        return STATUS_ERROR;
     }
 #if N_INITIAL > 0
-    if (compute_starts(s) != fmi2OK) {
-        return fmi2Error;
+    if (compute_starts(s) != STATUS_OK) {
+        return STATUS_ERROR;
     }
 #endif
 #if N_TAPE > 0
-    if (tape_prepare(s) != fmi2OK) {
-        return fmi2Error;
+    if (tape_prepare(s) != STATUS_OK) {
+        return STATUS_ERROR;
     }
 #endif
     s->prepared = true;
-    return fmi2OK;
+    return STATUS_OK;
 }
 
 /* A parameter must lie within its declared bounds. */
-static fmi2Status check_bounds(Instance *s, const Variable *variable, double value)
+static Status check_bounds(Instance *s, const Variable *variable, double value)
 {
     if (variable->type != TYPE_STRING && (value < variable->minimum || value > variable->maximum)) {
         return fail(s, "%s = %g is outside [%g, %g]", variable->name, value, variable->minimum, variable->maximum);
     }
-    return fmi2OK;
+    return STATUS_OK;
 }
 
 #if N_STATES > 0
 /* Equal sub-steps no longer than max_step; `elapsed` is the time from the beginning of the communication step to that of
    the integration. */
-static fmi2Status integrate(Instance *s, double begin, double elapsed, double length)
+static Status integrate(Instance *s, double begin, double elapsed, double length)
 {
     double longest = s->values[MAX_STEP];
     double parts = longest > 0.0 && length > longest ? ceil(length / longest - 1e-9) : 1.0;
@@ -156,30 +156,30 @@ static fmi2Status integrate(Instance *s, double begin, double elapsed, double le
     return check_results(s, "derivatives", FIRST_STATE, N_STATES, s->values + FIRST_STATE);
 }
 #else
-static fmi2Status integrate(Instance *s, double begin, double elapsed, double length)
+static Status integrate(Instance *s, double begin, double elapsed, double length)
 {
     (void)s;
     (void)begin;
     (void)elapsed;
     (void)length;
-    return fmi2OK;
+    return STATUS_OK;
 }
 #endif
 
 /* Outputs as the present inputs make them; after an error the values stay as they are, to be looked at. */
-static fmi2Status refresh(Instance *s)
+static Status refresh(Instance *s)
 {
     if (s->phase == PHASE_ERROR) {
-        return fmi2OK;
+        return STATUS_OK;
     }
-    if (s->phase == PHASE_INITIALIZATION && prepare(s) != fmi2OK) {
-        return fmi2Error;
+    if (s->phase == PHASE_INITIALIZATION && prepare(s) != STATUS_OK) {
+        return STATUS_ERROR;
     }
-    if (!s->fresh && evaluate(s, 0.0, false) != fmi2OK) {
-        return fmi2Error;
+    if (!s->fresh && evaluate(s, 0.0, false) != STATUS_OK) {
+        return STATUS_ERROR;
     }
     s->fresh = true;
-    return fmi2OK;
+    return STATUS_OK;
 }
 
 /* Back to the state after instantiation. */

@@ -1,51 +1,52 @@
-/* Saved states and their FMI 2.0 functions: one flat block that can be copied, compared and moved to another process. */
+/* Saved states: one flat block that can be copied, compared and moved to another process. Each function is called as
+   `call` by the importer. */
 
 #if REAL_TIME
-static fmi2Status no_state(fmi2Component c, const char *function)
+static Status no_state(void *c, const char *call)
 {
-    Instance *s = enter(c, ANY_PHASE, function);
-    return s == NULL ? fmi2Error : fail(s, "%s: a real-time FMU saves no states: they take memory", function);
+    Instance *s = enter(c, ANY_PHASE, call);
+    return s == NULL ? STATUS_ERROR : fail(s, "%s: a real-time FMU saves no states: they take memory", call);
 }
 
-fmi2Status fmi2GetFMUstate(fmi2Component c, fmi2FMUstate *state)
-{
-    (void)state;
-    return no_state(c, "fmi2GetFMUstate");
-}
-
-fmi2Status fmi2SetFMUstate(fmi2Component c, fmi2FMUstate state)
+static Status get_state(void *c, void **state, const char *call)
 {
     (void)state;
-    return no_state(c, "fmi2SetFMUstate");
+    return no_state(c, call);
 }
 
-fmi2Status fmi2FreeFMUstate(fmi2Component c, fmi2FMUstate *state)
+static Status set_state(void *c, const void *state, const char *call)
 {
     (void)state;
-    return no_state(c, "fmi2FreeFMUstate");
+    return no_state(c, call);
 }
 
-fmi2Status fmi2SerializedFMUstateSize(fmi2Component c, fmi2FMUstate state, size_t *size)
+static Status free_state(void *c, void **state, const char *call)
+{
+    (void)state;
+    return no_state(c, call);
+}
+
+static Status size_of_state(void *c, const void *state, size_t *size, const char *call)
 {
     (void)state;
     (void)size;
-    return no_state(c, "fmi2SerializedFMUstateSize");
+    return no_state(c, call);
 }
 
-fmi2Status fmi2SerializeFMUstate(fmi2Component c, fmi2FMUstate state, fmi2Byte bytes[], size_t size)
+static Status serialize(void *c, const void *state, void *bytes, size_t size, const char *call)
 {
     (void)state;
     (void)bytes;
     (void)size;
-    return no_state(c, "fmi2SerializeFMUstate");
+    return no_state(c, call);
 }
 
-fmi2Status fmi2DeSerializeFMUstate(fmi2Component c, const fmi2Byte bytes[], size_t size, fmi2FMUstate *state)
+static Status deserialize(void *c, const void *bytes, size_t size, void **state, const char *call)
 {
     (void)bytes;
     (void)size;
     (void)state;
-    return no_state(c, "fmi2DeSerializeFMUstate");
+    return no_state(c, call);
 }
 #else
 
@@ -139,7 +140,7 @@ static void save_state(const Instance *s, State *state)
     }
 }
 
-static fmi2Status restore_state(Instance *s, const State *state)
+static Status restore_state(Instance *s, const State *state)
 {
     if (!is_ours(&state->head, state->head.size)) {
         return fail(s, "the saved state belongs to another model");
@@ -152,7 +153,7 @@ static fmi2Status restore_state(Instance *s, const State *state)
 #if N_TAPE > 0
     if (state->head.tape_rows == 0) {
         tape_free(&s->tape);
-    } else if (tape_allocate(s, state->head.tape_rows) != fmi2OK) {
+    } else if (tape_allocate(s, state->head.tape_rows) != STATUS_OK) {
         return broken(s); /* half of it is restored: nothing of that may be written at the end */
     }
     if (state->head.tape_rows > 0) {
@@ -176,17 +177,17 @@ static fmi2Status restore_state(Instance *s, const State *state)
     s->tape.trip = state->tape_trip;
     s->tape.first = state->tape_first;
     s->tape.last = state->tape_last;
-    return fmi2OK;
+    return STATUS_OK;
 }
 
-fmi2Status fmi2GetFMUstate(fmi2Component c, fmi2FMUstate *state)
+static Status get_state(void *c, void **state, const char *call)
 {
-    Instance *s = enter(c, ANY_PHASE, "fmi2GetFMUstate");
+    Instance *s = enter(c, ANY_PHASE, call);
     if (s == NULL) {
-        return fmi2Error;
+        return STATUS_ERROR;
     }
     if (state == NULL) {
-        return fail(s, "fmi2GetFMUstate: NULL instead of a place for the state");
+        return fail(s, "%s: NULL instead of a place for the state", call);
     }
     /* A state handed in is overwritten, and its memory reused where it fits. */
     State *block = (State *)*state;
@@ -198,75 +199,75 @@ fmi2Status fmi2GetFMUstate(fmi2Component c, fmi2FMUstate *state)
         }
     }
     save_state(s, block);
-    return fmi2OK;
+    return STATUS_OK;
 }
 
-fmi2Status fmi2SetFMUstate(fmi2Component c, fmi2FMUstate state)
+static Status set_state(void *c, const void *state, const char *call)
 {
-    Instance *s = enter(c, ANY_PHASE, "fmi2SetFMUstate");
+    Instance *s = enter(c, ANY_PHASE, call);
     if (s == NULL) {
-        return fmi2Error;
+        return STATUS_ERROR;
     }
-    return state == NULL ? fail(s, "fmi2SetFMUstate: NULL is no state") : restore_state(s, (const State *)state);
+    return state == NULL ? fail(s, "%s: NULL is no state", call) : restore_state(s, (const State *)state);
 }
 
-fmi2Status fmi2FreeFMUstate(fmi2Component c, fmi2FMUstate *state)
+static Status free_state(void *c, void **state, const char *call)
 {
-    Instance *s = enter(c, ANY_PHASE, "fmi2FreeFMUstate");
+    Instance *s = enter(c, ANY_PHASE, call);
     if (s == NULL) {
-        return fmi2Error;
+        return STATUS_ERROR;
     }
     if (state != NULL) {
         free(*state);
         *state = NULL;
     }
-    return fmi2OK;
+    return STATUS_OK;
 }
 
-fmi2Status fmi2SerializedFMUstateSize(fmi2Component c, fmi2FMUstate state, size_t *size)
+static Status size_of_state(void *c, const void *state, size_t *size, const char *call)
 {
-    Instance *s = enter(c, ANY_PHASE, "fmi2SerializedFMUstateSize");
+    Instance *s = enter(c, ANY_PHASE, call);
     if (s == NULL) {
-        return fmi2Error;
+        return STATUS_ERROR;
     }
     if (state == NULL || size == NULL) {
-        return fail(s, "fmi2SerializedFMUstateSize: NULL is no state");
+        return fail(s, "%s: NULL is no state", call);
     }
     *size = ((const State *)state)->head.size;
-    return fmi2OK;
+    return STATUS_OK;
 }
 
-fmi2Status fmi2SerializeFMUstate(fmi2Component c, fmi2FMUstate state, fmi2Byte bytes[], size_t size)
+static Status serialize(void *c, const void *state, void *bytes, size_t size, const char *call)
 {
-    Instance *s = enter(c, ANY_PHASE, "fmi2SerializeFMUstate");
+    Instance *s = enter(c, ANY_PHASE, call);
     if (s == NULL) {
-        return fmi2Error;
+        return STATUS_ERROR;
     }
     if (state == NULL || bytes == NULL) {
-        return fail(s, "fmi2SerializeFMUstate: NULL is no state");
+        return fail(s, "%s: NULL is no state", call);
     }
     size_t needed = ((const State *)state)->head.size;
     if (size < needed) {
-        return fail(s, "fmi2SerializeFMUstate: the state has %lu bytes, there is room for %lu", (unsigned long)needed,
+        return fail(s, "%s: the state has %lu bytes, there is room for %lu", call, (unsigned long)needed,
                     (unsigned long)size);
     }
     memcpy(bytes, state, needed);
-    return fmi2OK;
+    return STATUS_OK;
 }
 
-fmi2Status fmi2DeSerializeFMUstate(fmi2Component c, const fmi2Byte bytes[], size_t size, fmi2FMUstate *state)
+static Status deserialize(void *c, const void *bytes, size_t size, void **state, const char *call)
 {
-    Instance *s = enter(c, ANY_PHASE, "fmi2DeSerializeFMUstate");
+    Instance *s = enter(c, ANY_PHASE, call);
     StateHead head;
     if (s == NULL) {
-        return fmi2Error;
+        return STATUS_ERROR;
     }
     if (bytes == NULL || state == NULL || size < sizeof head) {
-        return fail(s, "fmi2DeSerializeFMUstate: %lu bytes are no saved state", (unsigned long)size);
+        return fail(s, "%s: %lu bytes are no saved state", call, (unsigned long)size);
     }
     memcpy(&head, bytes, sizeof head);
     if (!is_ours(&head, size)) {
-        return fail(s, "fmi2DeSerializeFMUstate: the bytes are no saved state of this model");
+        return fail(s, "%s: the bytes are no saved state of this model", call);
     }
     State *block = (State *)malloc(head.size);
     if (block == NULL) {
@@ -274,6 +275,6 @@ fmi2Status fmi2DeSerializeFMUstate(fmi2Component c, const fmi2Byte bytes[], size
     }
     memcpy(block, bytes, head.size);
     *state = block;
-    return fmi2OK;
+    return STATUS_OK;
 }
 #endif

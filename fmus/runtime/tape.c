@@ -9,12 +9,12 @@ static bool waiting(const Instance *s, double trip_time)
 }
 
 /* The sample along the trip into *index; -1 while waiting. Between samples it is the last one. */
-static fmi2Status tape_index(Instance *s, double trip_time, bool at_sample, int *index)
+static Status tape_index(Instance *s, double trip_time, bool at_sample, int *index)
 {
     const Tape *tape = &s->tape;
     *index = -1;
     if (waiting(s, trip_time)) {
-        return fmi2OK;
+        return STATUS_OK;
     }
     double place = trip_time / tape->sample_time;
     double n = at_sample ? rint(place) : floor(place + 0.01);
@@ -25,17 +25,17 @@ static fmi2Status tape_index(Instance *s, double trip_time, bool at_sample, int 
         return fail(s, "trip_time = %.17g s is past the end of the tape; raise tape_duration", trip_time);
     }
     *index = (int)n;
-    return fmi2OK;
+    return STATUS_OK;
 }
 
-static fmi2Status tape_read(Instance *s, double trip_time, bool at_sample)
+static Status tape_read(Instance *s, double trip_time, bool at_sample)
 {
-    if (tape_index(s, trip_time, at_sample, &s->tape.row) != fmi2OK) {
-        return fmi2Error;
+    if (tape_index(s, trip_time, at_sample, &s->tape.row) != STATUS_OK) {
+        return STATUS_ERROR;
     }
     const double *row = s->tape.row < 0 ? model_tape_start : s->tape.committed + (size_t)s->tape.row * N_TAPE;
     memcpy(s->values + FIRST_TAPE, row, N_TAPE * sizeof(double));
-    return fmi2OK;
+    return STATUS_OK;
 }
 
 /* The row of the sample whose outputs have just been computed. */
@@ -100,7 +100,7 @@ static bool keep_trip(Instance *s)
 }
 
 /* End a trip: if anything was recorded and is to be kept, the filtered rows become the ones that are read. */
-static fmi2Status tape_commit(Instance *s)
+static Status tape_commit(Instance *s)
 {
     Tape *tape = &s->tape;
     size_t size = (size_t)tape->rows * N_TAPE * sizeof(double);
@@ -116,11 +116,11 @@ static fmi2Status tape_commit(Instance *s)
             return fail(s, "tape_cutoff: the filter takes what was recorded beyond all numbers");
         }
     }
-    return fmi2OK;
+    return STATUS_OK;
 }
 
 /* Notice a new trip. */
-static fmi2Status tape_follow(Instance *s)
+static Status tape_follow(Instance *s)
 {
     Tape *tape = &s->tape;
     int trip = (int)s->values[TRIP];
@@ -130,7 +130,7 @@ static fmi2Status tape_follow(Instance *s)
         tape->trip = trip;
     }
     if (trip == tape->trip) {
-        return fmi2OK;
+        return STATUS_OK;
     }
     if (!waiting(s, trip_time)) {
         return fail(s, "the trip number changed from %d to %d at trip_time = %.17g s; it may change only while "
@@ -229,12 +229,12 @@ static bool read_rows(FILE *file, const Tape *tape)
            fgetc(file) == EOF;
 }
 
-static fmi2Status tape_load(Instance *s, const char *path)
+static Status tape_load(Instance *s, const char *path)
 {
     char expected[MAX_MESSAGE / 2], found[MAX_MESSAGE / 2];
     FILE *file = fopen(path, "rb");
     if (file == NULL) {
-        return errno == ENOENT ? fmi2OK /* nothing learned yet */ : fail(s, "tape_file: %.300s cannot be read", path);
+        return errno == ENOENT ? STATUS_OK /* nothing learned yet */ : fail(s, "tape_file: %.300s cannot be read", path);
     }
     tape_header(s, expected, sizeof expected);
     if (fgets(found, sizeof found, file) == NULL || strncmp(found, "railcosim tape 1", 16) != 0) {
@@ -254,11 +254,11 @@ static fmi2Status tape_load(Instance *s, const char *path)
                     path);
     }
     memcpy(s->tape.recording, s->tape.committed, (size_t)s->tape.rows * N_TAPE * sizeof(double));
-    return fmi2OK;
+    return STATUS_OK;
 }
 
 /* Write the file, whole or not at all. */
-static fmi2Status tape_save(Instance *s, const char *path)
+static Status tape_save(Instance *s, const char *path)
 {
     char part[MAX_TEXT + 8], text[MAX_MESSAGE / 2];
     snprintf(part, sizeof part, "%s.part", path);
@@ -284,7 +284,7 @@ static fmi2Status tape_save(Instance *s, const char *path)
         remove(part);
         return fail(s, "tape_file: %.300s cannot be written", path);
     }
-    return fmi2OK;
+    return STATUS_OK;
 }
 
 #endif
@@ -299,7 +299,7 @@ static void tape_free(Tape *tape)
 }
 
 /* Room for `rows` samples, and for the filter that the parameters ask for; the same memory again if it fits. */
-static fmi2Status tape_allocate(Instance *s, int rows)
+static Status tape_allocate(Instance *s, int rows)
 {
     Tape *tape = &s->tape;
     double sample_time = s->values[SAMPLE_TIME], cutoff = s->values[TAPE_CUTOFF];
@@ -332,11 +332,11 @@ static fmi2Status tape_allocate(Instance *s, int rows)
     }
     tape->sample_time = sample_time;
     tape->gain = gain;
-    return fmi2OK;
+    return STATUS_OK;
 }
 
 /* A tape as it is before the first sample: the start row everywhere, or what the tape file holds. */
-static fmi2Status tape_prepare(Instance *s)
+static Status tape_prepare(Instance *s)
 {
     Tape *tape = &s->tape;
     if (!(s->values[SAMPLE_TIME] > 0.0)) {
@@ -346,8 +346,8 @@ static fmi2Status tape_prepare(Instance *s)
     if (!(rows >= 1.0 && rows * N_TAPE < 1e9)) {
         return fail(s, "a tape of %g samples cannot be; check tape_duration and sample_time", rows);
     }
-    if (tape_allocate(s, (int)rows) != fmi2OK) {
-        return fmi2Error;
+    if (tape_allocate(s, (int)rows) != STATUS_OK) {
+        return STATUS_ERROR;
     }
     tape->has_trip = false;
     tape->first = tape->last = -1;
@@ -356,9 +356,9 @@ static fmi2Status tape_prepare(Instance *s)
     }
     const char *path = s->texts[model_variables[TAPE_FILE].text];
 #if REAL_TIME
-    return path[0] == '\0' ? fmi2OK : fail(s, "tape_file: a real-time FMU reads and writes no files; leave it empty");
+    return path[0] == '\0' ? STATUS_OK : fail(s, "tape_file: a real-time FMU reads and writes no files; leave it empty");
 #else
-    return path[0] == '\0' ? fmi2OK : tape_load(s, path);
+    return path[0] == '\0' ? STATUS_OK : tape_load(s, path);
 #endif
 }
 

@@ -1,9 +1,17 @@
-/* The FMI 2.0 functions that get and set: the way between value references and values. */
+/* Getting and setting, whatever the version of FMI: the way between value references and values. A value reference means a
+   variable, or with FMI 3.0 all elements of an array, which stand side by side among the values. Each function is called as
+   `call` by the importer. */
+
+/* How many values a value reference means, 0 within an array. Of FMI 2.0 it is known to the compiler. */
+static inline size_t elements(Reference reference)
+{
+    return HAS_ARRAYS ? (size_t)model_variables[reference].size : 1;
+}
 
 /* The variable behind a value reference, or NULL with a message. A rate der(x) has no entry of its own. */
-static const Variable *find(Instance *s, fmi2ValueReference reference, Type type, const char *call)
+static const Variable *find(Instance *s, Reference reference, Type type, const char *call)
 {
-    if (reference >= N_VARIABLES) {
+    if (reference >= N_VARIABLES || elements(reference) == 0) {
         fail(s, "%s: there is no variable with value reference %u", call, reference);
         return NULL;
     }
@@ -14,13 +22,14 @@ static const Variable *find(Instance *s, fmi2ValueReference reference, Type type
     return &model_variables[reference];
 }
 
-static bool is_rate(fmi2ValueReference reference, Type type)
+static bool is_rate(Reference reference, Type type)
 {
-    return type == TYPE_REAL && reference >= N_VARIABLES && reference < N_VARIABLES + N_STATES;
+    return type == TYPE_REAL && reference >= N_VARIABLES && reference < N_VARIABLES + N_STATES &&
+           elements(FIRST_STATE + (reference - N_VARIABLES)) > 0;
 }
 
 /* The rates of the states into the scratch space, from which rates are read. */
-static fmi2Status rates(Instance *s)
+static Status rates(Instance *s)
 {
 #if N_STATES > 0
     call_equations(s, MODEL_DERIVATIVES, s->slopes[0]);
@@ -31,91 +40,117 @@ static fmi2Status rates(Instance *s)
                         s->slopes[0][n], s->time);
         }
     }
-    return fmi2OK;
+    return STATUS_OK;
 }
 
-static fmi2Status begin_get(Instance *s, const fmi2ValueReference vr[], size_t nvr, const void *value, const char *call)
+static Status begin_get(Instance *s, const Reference vr[], size_t nvr, const void *value, const char *call)
 {
     if (s == NULL) {
-        return fmi2Error;
+        return STATUS_ERROR;
     }
     if (nvr > 0 && (vr == NULL || value == NULL)) {
         return fail(s, "%s: NULL for an array of %lu", call, (unsigned long)nvr);
     }
-    return nvr > 0 ? refresh(s) : fmi2OK;
+    return nvr > 0 ? refresh(s) : STATUS_OK;
 }
 
-fmi2Status fmi2GetReal(fmi2Component c, const fmi2ValueReference vr[], size_t nvr, fmi2Real value[])
+/* Too few values, or too many, for the value references. */
+NEVER_INLINE Status miscounted(Instance *s, size_t given, const char *call)
 {
-    Instance *s = enter(c, READABLE, "fmi2GetReal");
+    return fail(s, "%s: %lu values are not those of the variables", call, (unsigned long)given);
+}
+
+/* Importers keep numbers in the types of their version of FMI. */
+ALWAYS_INLINE void write_number(void *numbers, size_t place, Type type, double value)
+{
+    switch (type) {
+    case TYPE_REAL: ((double *)numbers)[place] = value; break;
+    case TYPE_INTEGER: ((int32_t *)numbers)[place] = (int32_t)value; break;
+    default: ((Truth *)numbers)[place] = value != 0.0;
+    }
+}
+
+ALWAYS_INLINE double read_number(const void *numbers, size_t place, Type type)
+{
+    switch (type) {
+    case TYPE_REAL: return ((const double *)numbers)[place];
+    case TYPE_INTEGER: return (double)((const int32_t *)numbers)[place];
+    default: return ((const Truth *)numbers)[place] ? 1.0 : 0.0;
+    }
+}
+
+/* The numbers behind a value reference, or NULL with a message; rates are found once in a call. */
+ALWAYS_INLINE const double *numbers_of(Instance *s, Reference reference, Type type, bool *rated, size_t *count,
+                                       const char *call)
+{
+    if (HAS_TIME && type == TYPE_REAL && reference == N_VARIABLES + N_STATES) {
+        *count = 1;
+        return &s->last_successful_time;
+    }
+    if (is_rate(reference, type)) {
+        if (!*rated && rates(s) != STATUS_OK) {
+            return NULL;
+        }
+        *rated = true;
+        *count = elements(FIRST_STATE + (reference - N_VARIABLES));
+        return s->slopes[0] + (reference - N_VARIABLES);
+    }
+    if (find(s, reference, type, call) == NULL) {
+        return NULL;
+    }
+    *count = elements(reference);
+    return s->values + reference;
+}
+
+/* Reals, integers or booleans into `values`, of which there are `room`. */
+ALWAYS_INLINE Status get_numbers(void *c, Type type, const Reference vr[], size_t nvr, void *values, size_t room,
+                                 const char *call)
+{
+    Instance *s = enter(c, READABLE, call);
+    size_t used = 0, count = 1;
     bool rated = false;
-    if (begin_get(s, vr, nvr, value, "fmi2GetReal") != fmi2OK) {
-        return fmi2Error;
+    if (begin_get(s, vr, nvr, values, call) != STATUS_OK) {
+        return STATUS_ERROR;
     }
     for (size_t k = 0; k < nvr; k++) {
-        if (is_rate(vr[k], TYPE_REAL)) {
-            if (!rated && rates(s) != fmi2OK) {
-                return fmi2Error;
-            }
-            rated = true;
-            value[k] = s->slopes[0][vr[k] - N_VARIABLES];
-        } else if (find(s, vr[k], TYPE_REAL, "fmi2GetReal") == NULL) {
-            return fmi2Error;
-        } else {
-            value[k] = s->values[vr[k]];
+        const double *numbers = numbers_of(s, vr[k], type, &rated, &count, call);
+        if (numbers == NULL) {
+            return STATUS_ERROR;
+        }
+        if (HAS_ARRAYS && count > room - used) {
+            return miscounted(s, room, call);
+        }
+        for (size_t n = 0; n < count; n++) {
+            write_number(values, used++, type, numbers[n]);
         }
     }
-    return fmi2OK;
+    return HAS_ARRAYS && used != room ? miscounted(s, room, call) : STATUS_OK;
 }
 
-fmi2Status fmi2GetInteger(fmi2Component c, const fmi2ValueReference vr[], size_t nvr, fmi2Integer value[])
+static Status get_texts(void *c, const Reference vr[], size_t nvr, const char *values[], size_t room, const char *call)
 {
-    Instance *s = enter(c, READABLE, "fmi2GetInteger");
-    if (begin_get(s, vr, nvr, value, "fmi2GetInteger") != fmi2OK) {
-        return fmi2Error;
+    Instance *s = enter(c, READABLE, call);
+    size_t used = 0;
+    if (begin_get(s, vr, nvr, values, call) != STATUS_OK) {
+        return STATUS_ERROR;
     }
     for (size_t k = 0; k < nvr; k++) {
-        if (find(s, vr[k], TYPE_INTEGER, "fmi2GetInteger") == NULL) {
-            return fmi2Error;
-        }
-        value[k] = (fmi2Integer)s->values[vr[k]];
-    }
-    return fmi2OK;
-}
-
-fmi2Status fmi2GetBoolean(fmi2Component c, const fmi2ValueReference vr[], size_t nvr, fmi2Boolean value[])
-{
-    Instance *s = enter(c, READABLE, "fmi2GetBoolean");
-    if (begin_get(s, vr, nvr, value, "fmi2GetBoolean") != fmi2OK) {
-        return fmi2Error;
-    }
-    for (size_t k = 0; k < nvr; k++) {
-        if (find(s, vr[k], TYPE_BOOLEAN, "fmi2GetBoolean") == NULL) {
-            return fmi2Error;
-        }
-        value[k] = s->values[vr[k]] != 0.0 ? fmi2True : fmi2False;
-    }
-    return fmi2OK;
-}
-
-fmi2Status fmi2GetString(fmi2Component c, const fmi2ValueReference vr[], size_t nvr, fmi2String value[])
-{
-    Instance *s = enter(c, READABLE, "fmi2GetString");
-    if (begin_get(s, vr, nvr, value, "fmi2GetString") != fmi2OK) {
-        return fmi2Error;
-    }
-    for (size_t k = 0; k < nvr; k++) {
-        const Variable *variable = find(s, vr[k], TYPE_STRING, "fmi2GetString");
+        const Variable *variable = find(s, vr[k], TYPE_STRING, call);
         if (variable == NULL) {
-            return fmi2Error;
+            return STATUS_ERROR;
         }
-        value[k] = s->texts[variable->text];
+        if (HAS_ARRAYS && elements(vr[k]) > room - used) {
+            return miscounted(s, room, call);
+        }
+        for (size_t n = 0; n < elements(vr[k]); n++) {
+            values[used++] = s->texts[variable[n].text];
+        }
     }
-    return fmi2OK;
+    return HAS_ARRAYS && used != room ? miscounted(s, room, call) : STATUS_OK;
 }
 
 /* The variable behind a value reference if it may be set now, or NULL with a message. */
-static const Variable *settable(Instance *s, fmi2ValueReference reference, Type type, const char *call)
+static const Variable *settable(Instance *s, Reference reference, Type type, const char *call)
 {
     if (is_rate(reference, type)) {
         fail(s, "%s: a rate is computed and cannot be set", call);
@@ -136,129 +171,94 @@ static const Variable *settable(Instance *s, fmi2ValueReference reference, Type 
     return variable;
 }
 
-/* Whether a variable may be set now, to this number; a tunable parameter is held to its bounds at once. */
-static fmi2Status check_value(Instance *s, fmi2ValueReference reference, Type type, double value, const char *call)
+/* Whether a variable takes this number; a tunable parameter is held to its bounds at once. */
+static Status check_value(Instance *s, const Variable *variable, double value, const char *call)
 {
-    const Variable *variable = settable(s, reference, type, call);
-    if (variable == NULL) {
-        return fmi2Error;
-    }
     if (!isfinite(value)) {
         return fail(s, "%s: %s takes a finite number, not %g", call, variable->name, value);
     }
-    return s->phase == PHASE_RUNNING && variable->role == ROLE_TUNABLE ? check_bounds(s, variable, value) : fmi2OK;
+    return s->phase == PHASE_RUNNING && variable->role == ROLE_TUNABLE ? check_bounds(s, variable, value) : STATUS_OK;
 }
 
-static fmi2Status begin_set(Instance *s, const fmi2ValueReference vr[], size_t nvr, const void *value, const char *call)
+static Status begin_set(Instance *s, const Reference vr[], size_t nvr, const void *value, const char *call)
 {
     if (s == NULL) {
-        return fmi2Error;
+        return STATUS_ERROR;
     }
     return nvr > 0 && (vr == NULL || value == NULL)
                ? fail(s, "%s: NULL for an array of %lu", call, (unsigned long)nvr)
-               : fmi2OK;
-}
-
-static void assign(Instance *s, fmi2ValueReference reference, double value)
-{
-    s->values[reference] = value;
-    s->fresh = s->prepared = false;
+               : STATUS_OK;
 }
 
 /* All values are looked at before the first is taken: a refused call changes nothing. */
-fmi2Status fmi2SetReal(fmi2Component c, const fmi2ValueReference vr[], size_t nvr, const fmi2Real value[])
+ALWAYS_INLINE Status set_numbers(void *c, Type type, const Reference vr[], size_t nvr, const void *values, size_t given,
+                                 const char *call)
 {
-    Instance *s = enter(c, SETTABLE, "fmi2SetReal");
-    fmi2Status status = begin_set(s, vr, nvr, value, "fmi2SetReal");
-    for (size_t k = 0; k < nvr && status == fmi2OK; k++) {
-        status = check_value(s, vr[k], TYPE_REAL, value[k], "fmi2SetReal");
-    }
-    for (size_t k = 0; k < nvr && status == fmi2OK; k++) {
-        assign(s, vr[k], value[k]);
-    }
-    return status;
-}
-
-/* Whether a derivative of this order may be given for a variable. */
-static fmi2Status check_derivative(Instance *s, fmi2ValueReference reference, fmi2Integer order, double value)
-{
-    static const char call[] = "fmi2SetRealInputDerivatives";
-    if (is_rate(reference, TYPE_REAL)) {
-        return fail(s, "%s: a rate is no input", call);
-    }
-    const Variable *variable = find(s, reference, TYPE_REAL, call);
-    if (variable == NULL) {
-        return fmi2Error;
-    }
-    if (variable->role != ROLE_INPUT) {
-        return fail(s, "%s: %s is no input", call, variable->name);
-    }
-    if (order < 1 || order > MAX_ORDER) {
-        return fail(s, "%s: %s takes derivatives of the orders 1 to %d, not %d", call, variable->name, MAX_ORDER, order);
-    }
-    return isfinite(value) ? fmi2OK : fail(s, "%s: %s takes a finite derivative, not %g", call, variable->name, value);
-}
-
-/* For the coming step; in which order values and derivatives are set does not matter. */
-fmi2Status fmi2SetRealInputDerivatives(fmi2Component c, const fmi2ValueReference vr[], size_t nvr,
-                                       const fmi2Integer order[], const fmi2Real value[])
-{
-    Instance *s = enter(c, SETTABLE, "fmi2SetRealInputDerivatives");
-    fmi2Status status = begin_set(s, vr, nvr, order == NULL ? NULL : value, "fmi2SetRealInputDerivatives");
-    for (size_t k = 0; k < nvr && status == fmi2OK; k++) {
-        status = check_derivative(s, vr[k], order[k], value[k]);
-    }
-    for (size_t k = 0; k < nvr && status == fmi2OK; k++) {
-        s->input_derivatives[model_variables[vr[k]].input][order[k] - 1] = value[k];
-        s->moving = s->moving || value[k] != 0.0;
-    }
-    return status;
-}
-
-fmi2Status fmi2SetInteger(fmi2Component c, const fmi2ValueReference vr[], size_t nvr, const fmi2Integer value[])
-{
-    Instance *s = enter(c, SETTABLE, "fmi2SetInteger");
-    fmi2Status status = begin_set(s, vr, nvr, value, "fmi2SetInteger");
-    for (size_t k = 0; k < nvr && status == fmi2OK; k++) {
-        status = check_value(s, vr[k], TYPE_INTEGER, (double)value[k], "fmi2SetInteger");
-    }
-    for (size_t k = 0; k < nvr && status == fmi2OK; k++) {
-        assign(s, vr[k], (double)value[k]);
-    }
-    return status;
-}
-
-fmi2Status fmi2SetBoolean(fmi2Component c, const fmi2ValueReference vr[], size_t nvr, const fmi2Boolean value[])
-{
-    Instance *s = enter(c, SETTABLE, "fmi2SetBoolean");
-    fmi2Status status = begin_set(s, vr, nvr, value, "fmi2SetBoolean");
-    for (size_t k = 0; k < nvr && status == fmi2OK; k++) {
-        status = check_value(s, vr[k], TYPE_BOOLEAN, 0.0, "fmi2SetBoolean");
-    }
-    for (size_t k = 0; k < nvr && status == fmi2OK; k++) {
-        assign(s, vr[k], value[k] != fmi2False ? 1.0 : 0.0);
-    }
-    return status;
-}
-
-fmi2Status fmi2SetString(fmi2Component c, const fmi2ValueReference vr[], size_t nvr, const fmi2String value[])
-{
-    Instance *s = enter(c, SETTABLE, "fmi2SetString");
-    fmi2Status status = begin_set(s, vr, nvr, value, "fmi2SetString");
-    for (size_t k = 0; k < nvr && status == fmi2OK; k++) {
-        const Variable *variable = settable(s, vr[k], TYPE_STRING, "fmi2SetString");
+    Instance *s = enter(c, SETTABLE, call);
+    Status status = begin_set(s, vr, nvr, values, call);
+    size_t used = 0;
+    for (size_t k = 0; k < nvr && status == STATUS_OK; k++) {
+        const Variable *variable = settable(s, vr[k], type, call);
         if (variable == NULL) {
-            return fmi2Error;
+            return STATUS_ERROR;
         }
-        if (value[k] == NULL || strlen(value[k]) >= MAX_TEXT) {
-            return fail(s, "fmi2SetString: %s takes a text of at most %d bytes", variable->name, MAX_TEXT - 1);
+        if (HAS_ARRAYS && elements(vr[k]) > given - used) {
+            return miscounted(s, given, call);
+        }
+        for (size_t n = 0; n < elements(vr[k]) && status == STATUS_OK; n++) {
+            status = check_value(s, variable + n, read_number(values, used++, type), call);
         }
     }
-    for (size_t k = 0; k < nvr && status == fmi2OK; k++) {
-        char *text = s->texts[model_variables[vr[k]].text];
-        memset(text, 0, MAX_TEXT); /* equal states are equal bytes */
-        memcpy(text, value[k], strlen(value[k]));
+    if (status != STATUS_OK) {
+        return status;
+    }
+    if (HAS_ARRAYS && used != given) {
+        return miscounted(s, given, call);
+    }
+    used = 0;
+    for (size_t k = 0; k < nvr; k++) {
+        for (size_t n = 0; n < elements(vr[k]); n++) {
+            s->values[vr[k] + n] = read_number(values, used++, type);
+        }
         s->fresh = s->prepared = false;
     }
-    return status;
+    return STATUS_OK;
+}
+
+static Status set_texts(void *c, const Reference vr[], size_t nvr, const char *const values[], size_t given,
+                        const char *call)
+{
+    Instance *s = enter(c, SETTABLE, call);
+    Status status = begin_set(s, vr, nvr, values, call);
+    size_t used = 0;
+    for (size_t k = 0; k < nvr && status == STATUS_OK; k++) {
+        const Variable *variable = settable(s, vr[k], TYPE_STRING, call);
+        if (variable == NULL) {
+            return STATUS_ERROR;
+        }
+        if (HAS_ARRAYS && elements(vr[k]) > given - used) {
+            return miscounted(s, given, call);
+        }
+        for (size_t n = 0; n < elements(vr[k]); n++, used++) {
+            if (values[used] == NULL || strlen(values[used]) >= MAX_TEXT) {
+                return fail(s, "%s: %s takes a text of at most %d bytes", call, variable[n].name, MAX_TEXT - 1);
+            }
+        }
+    }
+    if (status != STATUS_OK) {
+        return status;
+    }
+    if (HAS_ARRAYS && used != given) {
+        return miscounted(s, given, call);
+    }
+    used = 0;
+    for (size_t k = 0; k < nvr; k++) {
+        for (size_t n = 0; n < elements(vr[k]); n++, used++) {
+            char *text = s->texts[model_variables[vr[k] + n].text];
+            memset(text, 0, MAX_TEXT); /* equal states are equal bytes */
+            memcpy(text, values[used], strlen(values[used]));
+        }
+        s->fresh = s->prepared = false;
+    }
+    return STATUS_OK;
 }

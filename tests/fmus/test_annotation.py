@@ -19,15 +19,16 @@ WHOLE = Annotation(
 )
 
 
-def through_xml(annotation):
+def through_xml(annotation, fmi="2"):
     root = etree.Element("fmiModelDescription")
-    write(annotation, root)
+    write(annotation, root, fmi)
     return root, read(etree.fromstring(etree.tostring(root)))
 
 
 @pytest.mark.parametrize("annotation", [WHOLE, Annotation("Mine"), Annotation()])
-def test_what_is_written_is_read_back(annotation):
-    assert through_xml(annotation)[1] == annotation
+@pytest.mark.parametrize("fmi", ["2", "3"])
+def test_what_is_written_is_read_back(annotation, fmi):
+    assert through_xml(annotation, fmi)[1] == annotation
 
 
 def test_what_an_fmu_has_not_is_not_written():

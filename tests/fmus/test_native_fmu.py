@@ -63,9 +63,12 @@ def test_the_archive_is_whole(tmp_path):
         "modelDescription.xml",
         "documentation/index.html",
         f"binaries/{toolchain.PLATFORMS[toolchain.here()].folder}/PointMassTrain{toolchain.PLATFORMS[toolchain.here()].suffix}",
-        *(f"sources/{name}" for name in ("all.c", "model.h", "equations.c", "instance.h", "fmi2.c", "simulation.c")),
+        *(
+            f"sources/{name}"
+            for name in ("all.c", "model.h", "equations.c", "instance.h", "fmi2.h", "fmi2.c", "life.c")
+        ),
         *(f"sources/{name}" for name in ("values.c", "inputs.c", "derivatives.c", "state.c")),
-        *(f"sources/{name}" for name in ("tape.c", "noise.c", "log.c")),
+        *(f"sources/{name}" for name in ("tape.c", "noise.c", "log.c", "simulation.c")),
     } <= files
     assert not any("fmi2Functions" in name for name in files)
 
@@ -246,6 +249,22 @@ def test_the_optimizer_of_either_compiler_finds_nothing_to_warn_of(tmp_path, com
     strictly_compiled(MIXED, tmp_path, compiler, "-O2")
 
 
+def test_fmi_3_has_folders_of_its_own():
+    found = toolchain.folders(toolchain.PLATFORMS, "3")
+    assert found["darwin64"] == ("x86_64-darwin", "aarch64-darwin")
+    others = {"x86_64-linux", "x86_64-windows", "aarch64-linux", "wasm32-wasi"}
+    assert {folder for name in found for folder in found[name]} == {*found["darwin64"], *others}
+
+
+@pytest.mark.parametrize("compiler", COMPILERS)
+def test_so_it_is_in_fmi_3(tmp_path, compiler):
+    if shutil.which(COMPILERS[compiler][0]) is None:
+        pytest.skip(f"{compiler} is not installed")
+    folder = unzip(build(MIXED, kind="native", fmi="3"), tmp_path)
+    flags = (*STRICT, "-O2", "-c", "-isystem", HEADERS)
+    compile_program([folder / "sources" / "all.c"], tmp_path / "o", *flags, compiler=COMPILERS[compiler])
+
+
 @pytest.mark.long
 @pytest.mark.parametrize("compiler", COMPILERS)
 def test_every_component_compiles_without_a_warning_when_optimized(tmp_path, reference, compiler):
@@ -291,10 +310,12 @@ def _prefixing(folder):
 
 
 @pytest.mark.skipif(shutil.which("g++") is None, reason="needs g++")
-@pytest.mark.parametrize("name", [MIXED, "PidAto", "Gust"], ids=["Mixed", "PidAto", "Gust"])
-def test_the_sources_compile_as_c_plus_plus_with_the_functions_of_c(tmp_path, name):
+@pytest.mark.parametrize(
+    ("name", "fmi"), [(MIXED, "2"), (MIXED, "3"), ("PidAto", "2"), ("Gust", "2")], ids=["Mixed", "3", "PidAto", "Gust"]
+)
+def test_the_sources_compile_as_c_plus_plus_with_the_functions_of_c(tmp_path, name, fmi):
     (tmp_path / "sources").mkdir()
-    for file, text in native_fmu.sources(resolve(name)(), "{x}").items():
+    for file, text in native_fmu.sources(resolve(name)(), "{x}", fmi=fmi).items():
         (tmp_path / "sources" / file).write_text(text, encoding="utf-8")
     flags = (
         "-x",
@@ -306,13 +327,13 @@ def test_the_sources_compile_as_c_plus_plus_with_the_functions_of_c(tmp_path, na
         "-c",
         "-I",
         HEADERS,
-        "-DFMI2_FUNCTION_PREFIX=own_",
+        f"-DFMI{fmi}_FUNCTION_PREFIX=own_",
     )
     command = ["g++", *flags, tmp_path / "sources" / "all.c", "-o", tmp_path / "it.o"]
     done = subprocess.run(command, capture_output=True, text=True, check=False)
     assert done.returncode == 0, done.stderr
     listed = subprocess.run(["nm", "-g", tmp_path / "it.o"], capture_output=True, text=True, check=True).stdout
-    assert len(re.findall(r" T \w+_fmi2\w+$", listed, re.MULTILINE)) > 30
+    assert len(re.findall(rf" T own_fmi{fmi}\w+$", listed, re.MULTILINE)) > 30
 
 
 @pytest.mark.skipif(shutil.which("objdump") is None or not sys.platform.startswith("linux"), reason="needs objdump")

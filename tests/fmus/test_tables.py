@@ -37,13 +37,13 @@ def test_the_numbers_of_things():
 
 def test_variables_say_type_role_start_and_bounds():
     rows = {re.search(r'"(.*?)"', row)[1]: row.strip() for row in table(header(resolve(MIXED)()), "model_variables")}
-    assert rows["gain"] == '{"gain", TYPE_REAL, ROLE_TUNABLE, 0.5, 0.0, 2.0, -1, -1},'
-    assert rows["teeth"] == '{"teeth", TYPE_INTEGER, ROLE_FIXED, 3.0, 1.0, 9.0, -1, -1},'
-    assert rows["door"] == '{"door", TYPE_BOOLEAN, ROLE_INPUT, 0.0, -INFINITY, INFINITY, -1, -1},'
-    assert rows["remark"] == '{"remark", TYPE_STRING, ROLE_INPUT, 0.0, -INFINITY, INFINITY, 2, -1},'
-    assert rows["y[2]"] == '{"y[2]", TYPE_REAL, ROLE_OUTPUT, 0.0, -INFINITY, INFINITY, -1, -1},'
+    assert rows["gain"] == '{"gain", TYPE_REAL, ROLE_TUNABLE, 0.5, 0.0, 2.0, -1, -1, 1},'
+    assert rows["teeth"] == '{"teeth", TYPE_INTEGER, ROLE_FIXED, 3.0, 1.0, 9.0, -1, -1, 1},'
+    assert rows["door"] == '{"door", TYPE_BOOLEAN, ROLE_INPUT, 0.0, -INFINITY, INFINITY, -1, -1, 1},'
+    assert rows["remark"] == '{"remark", TYPE_STRING, ROLE_INPUT, 0.0, -INFINITY, INFINITY, 2, -1, 1},'
+    assert rows["y[2]"] == '{"y[2]", TYPE_REAL, ROLE_OUTPUT, 0.0, -INFINITY, INFINITY, -1, -1, 1},'
     assert all("ROLE_KEPT" in rows[name] for name in ("x[1]", "v", "m[2]", "n"))
-    assert rows["x_start[2]"] == '{"x_start[2]", TYPE_REAL, ROLE_FIXED, 1.0, -INFINITY, INFINITY, -1, -1},'
+    assert rows["x_start[2]"] == '{"x_start[2]", TYPE_REAL, ROLE_FIXED, 1.0, -INFINITY, INFINITY, -1, -1, 1},'
 
 
 def test_what_starts_from_a_parameter_is_told_with_it():
@@ -58,7 +58,7 @@ def test_what_starts_from_a_parameter_is_told_with_it():
 def test_real_inputs_are_numbered():
     text = header(resolve(MIXED)())
     rows = [row.strip(" {},").split(", ") for row in table(text, "model_variables")]
-    numbers = {row[0].strip('"'): int(row[-1]) for row in rows if row[-1] != "-1"}
+    numbers = {row[0].strip('"'): int(row[-2]) for row in rows if row[-2] != "-1"}
     assert numbers == {"u[1]": 0, "u[2]": 1, "trip_time": 2}
     references = [int(row.strip(" ,")) for row in table(text, "model_real_inputs")]
     assert [rows[reference][0].strip('"') for reference in references] == list(numbers)

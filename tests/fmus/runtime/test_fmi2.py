@@ -165,6 +165,7 @@ def test_instantiate_refuses_what_it_cannot_be(load):
         ({"name": ""}, "name"),
         ({"name": NULL}, "name"),
         ({"kind": 0}, "co-simulation"),
+        ({"kind": 0, "name": NULL}, "co-simulation"),
         ({"guid": "{00000000}"}, "GUID"),
     ):
         assert fmu.instantiate(**arguments) is None
