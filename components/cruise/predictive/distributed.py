@@ -32,8 +32,9 @@ class DistributedMpc(GuardedCruise):
     cannot all be kept the plan violates them, all by some, and ``infeasible`` is raised; the demand keeps its own.
 
     What the train ahead will do is its own ``plan``, as it comes by radio, where ``has_plan`` says so; else the
-    acceleration that its speeds show is taken to go on. The problem is convex. It is solved by ``iterations`` Newton
-    steps of a primal-dual interior point method, always the same work, begun from the last plan.
+    acceleration that its speeds show is taken to go on. For where it can stop neither counts as long as it was not
+    heard: since its last message it may have braked with ``ahead_braking``. The problem is convex. It is solved by
+    ``iterations`` Newton steps of a primal-dual interior point method, always the same work, begun from the last plan.
 
     The safe bound of `GuardedCruise` acts at all times by default, behind a train that does not keep its plan; it knows
     no limit of the jerk.
@@ -46,7 +47,7 @@ class DistributedMpc(GuardedCruise):
         r" without a train ahead $w_\mathrm{v} (v_\mathrm{r} - v_k)^2$ in place of the first two",
         r"$\dot x = v, \; \dot v = a, \; \dot a = j$ over intervals $\Delta$ with constant $j$, from the own position,"
         r" speed and demand",
-        r"$x_k + T v_k + v_k^2 / (2 b) \leq x_{\mathrm{a},k} + v_{\mathrm{a},k}^2 / (2 b_\mathrm{a}) - s, \quad"
+        r"$x_k + T v_k + v_k^2 / (2 b) \leq x_{\mathrm{a},k} + v_{\mathrm{a},k}^2 / (2 b_\mathrm{a}) - s - e, \quad"
         r" 0 \leq v_k \leq v_\mathrm{max}, \quad -b \leq a_k \leq a_\mathrm{max}, \quad |j_k| \leq j_\mathrm{max}$",
         r"$a_k + R(v_k) + r \leq \min(F_\mathrm{max}, P_\mathrm{max} / v_k) / m$, linear about the present speed",
         r"$u^+ = u + j_0\, \mathrm{d}t, \qquad F = m\,(u + R(v) + r)$",
@@ -54,7 +55,8 @@ class DistributedMpc(GuardedCruise):
         r" reaction_time + reserve, braking $b$, ahead_braking $b_\mathrm{a}$, acceleration_limit $a_\mathrm{max}$,"
         r" jerk_limit $j_\mathrm{max}$, speed_limit $v_\mathrm{max}$, traction_limit $F_\mathrm{max}$, power_limit"
         r" $P_\mathrm{max}$, demand $u$, force $F$, mass $m$, resistance $R$, line_resistance $r$, and the predicted"
-        r" position and speed of the train ahead $x_\mathrm{a}$, $v_\mathrm{a}$.",
+        r" position and speed of the train ahead $x_\mathrm{a}$, $v_\mathrm{a}$; $e$ is what $x_\mathrm{a} +"
+        r" v_\mathrm{a}^2 / (2 b_\mathrm{a})$ is predicted to have gained since the last message.",
     )
     recommended_step = 0.1
 
@@ -163,10 +165,13 @@ class DistributedMpc(GuardedCruise):
         base = self.standstill_gap + self.gap_margin
         error = ahead.position[0] - self.position - base - self.time_headway * speed
         counted = error - clip(error, -_LARGEST_ERROR, _LARGEST_ERROR)
-        safe = [
-            position + maximum(speed, 0.0) ** 2 / (2.0 * self.ahead_braking) - self.standstill_gap
+        stops = [
+            position + maximum(speed, 0.0) ** 2 / (2.0 * self.ahead_braking)
             for position, speed in zip(ahead.position, ahead.speed, strict=True)
         ]
+        heard = self.ahead_position + maximum(self.ahead_speed, 0.0) ** 2 / (2.0 * self.ahead_braking)
+        # No plan is a promise: since its message the train ahead may have braked as hard as it can.
+        unheard = where(has_ahead, maximum(stops[0] - heard, 0.0), 0.0)
         knee = maximum(speed, self.power_limit / self.traction_limit)
         traction = self.power_limit / (knee * self.mass)
         slope = where(speed < knee, 0.0, traction / knee) + self.c1 + 2.0 * self.c2 * maximum(speed, 0.0)
@@ -191,5 +196,5 @@ class DistributedMpc(GuardedCruise):
             jerk_weight=self.jerk_weight,
             wanted=[position - base - counted for position in ahead.position[1:]],
             ahead_speed=ahead.speed[1:],
-            stop=safe[1:],
+            stop=[stop - unheard - self.standstill_gap for stop in stops[1:]],
         )

@@ -69,6 +69,15 @@ def test_without_a_plan_the_acceleration_that_speeds_show_goes_on():
     assert ahead.speed[1] == pytest.approx(40.0 - 0.5 * 2.5)
 
 
+@pytest.mark.parametrize("has_plan", [True, False])
+def test_the_time_in_which_the_train_ahead_was_not_heard_counts_as_braked(has_plan):
+    """It ran at 40 m/s when last heard: by what it may have braked since it stops 800 m on, however old that is."""
+    values = FOLLOWS | {"ahead_position": 1000.0, "ahead_age": 0.8, "has_plan": has_plan}
+    follower = DistributedMpc(**values)
+    stop = follower._problem(follower._ahead()).stop
+    assert stop == pytest.approx([1000.0 + 80.0 * k + 800.0 - 250.0 for k in range(1, 11)])
+
+
 def test_it_stops_behind_a_train_that_breaks_down():
     """It brakes by 1 m/s2, which no plan told, to a stand: the guard and the plan keep the gap at rest."""
 
