@@ -8,6 +8,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from railcosim.components import (
     ComfortCruise,
+    DistributedMpc,
     FixedDistanceCruise,
     GuardedCruise,
     RangePotentialCruise,
@@ -16,7 +17,14 @@ from railcosim.components import (
     TunablePotentialCruise,
 )
 
-LAWS = (ComfortCruise, FixedDistanceCruise, RangePotentialCruise, TimeHeadwayCruise, TunablePotentialCruise)
+LAWS = (
+    ComfortCruise,
+    DistributedMpc,
+    FixedDistanceCruise,
+    RangePotentialCruise,
+    TimeHeadwayCruise,
+    TunablePotentialCruise,
+)
 SCENE = {
     "position": 0.0,
     "speed": 70.0,
@@ -27,11 +35,14 @@ SCENE = {
     "has_behind": True,
     "behind_position": -7300.0,
     "behind_speed": 71.0,
+    "braking": 0.6,
+    "guard": False,
 }
+"""Where a law has other defaults, these are meant."""
 
 
 def safe_bound(gap, speed, ahead_speed):
-    """By hand, defaults: the speed from which the train stops 250 m short of where the train ahead does."""
+    """By hand: the speed from which the train stops 250 m short of where the train ahead does."""
     b, ahead, reaction, rest = 0.6, 1.0, 1.0, 250.0
     stop = gap + ahead_speed**2 / (2 * ahead) - rest
     safe = -b * reaction + math.sqrt((b * reaction) ** 2 + 2 * b * max(stop, 0.0))
@@ -79,7 +90,7 @@ def test_with_fresh_data_the_fallback_never_wakes(law):
 @given(st.floats(0.0, 1e6))
 def test_switched_off_no_age_matters(law, age):
     ages = {"ahead_age": age, "behind_age": age, "leader_age": age, "has_leader": True, "leader_speed": 69.0}
-    off = law(**SCENE, **ages, fallback=False, guard=True).outputs()
+    off = law(**(SCENE | ages | {"fallback": False, "guard": True})).outputs()
     assert off == law(**SCENE, has_leader=True, leader_speed=69.0, fallback=False).outputs()
     assert off["degraded"] is False
 
@@ -189,7 +200,7 @@ def test_a_train_behind_that_is_silent_fades_out_and_in():
 @given(st.floats(100.0, 5e3), st.floats(0.0, 100.0), st.floats(0.0, 100.0))
 def test_the_guard_bounds_the_demand_at_all_times(gap, speed, ahead_speed):
     scene = SCENE | {"ahead_position": gap, "speed": speed, "ahead_speed": ahead_speed}
-    free, guarded = (TunablePotentialCruise(**scene, guard=guard).outputs() for guard in (False, True))
+    free, guarded = (TunablePotentialCruise(**(scene | {"guard": guard})).outputs() for guard in (False, True))
     expected = min(free["demand"], safe_bound(gap, speed, ahead_speed))
     assert guarded["demand"] == pytest.approx(expected, rel=1e-9, abs=1e-9)
     assert guarded["degraded"] is False
@@ -198,7 +209,7 @@ def test_the_guard_bounds_the_demand_at_all_times(gap, speed, ahead_speed):
 
 def test_a_train_without_one_ahead_needs_no_guard():
     scene = SCENE | {"has_ahead": False, "ahead_position": -1e300, "ahead_speed": 1e300}
-    assert TunablePotentialCruise(**scene, guard=True).outputs() == TunablePotentialCruise(**scene).outputs()
+    assert TunablePotentialCruise(**(scene | {"guard": True})).outputs() == TunablePotentialCruise(**scene).outputs()
 
 
 def test_every_shipped_cruise_law_has_the_fallback():
