@@ -61,8 +61,11 @@ def test_a_radio_in_between_is_looked_through():
 
 def test_several_platoons_are_told_apart():
     graphs, lines = found("cruise_comparison")
-    assert [graph.vehicles[0] for graph in graphs] == ["train[1]", "train[6]", "train[11]"]
-    assert lines[0].endswith("(3 platoons alike)")
+    assert [graph.vehicles[0] for graph in graphs] == [f"train[{i}]" for i in (1, 6, 11, 16, 21)]
+    assert [line.partition(", train")[0] + line[line.rindex(" (") :] for line in lines if "alike" in line] == [
+        "information: neighbours on both sides (3 platoons alike)",
+        "information: predecessor only (2 platoons alike)",
+    ]
 
 
 def test_a_train_that_hears_nobody_breaks_the_chain():
