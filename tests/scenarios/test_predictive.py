@@ -1,5 +1,7 @@
 """Predictive and constant time headway control in closed loop: string stability, and the shipped scenario."""
 
+import itertools
+
 import numpy as np
 import pytest
 from railcosim.components import CATALOGUE
@@ -54,6 +56,20 @@ def test_the_constant_time_headway_law_is_a_lag_of_its_headway():
 def test_the_predictive_controller_is_string_stable(plans):
     """Away from its limits, where its matrices are those of the FMU's own steps, twenty Newton steps included."""
     assert gains("DistributedMpc", 1270.0, plans).max() < 1.0
+
+
+@pytest.mark.parametrize(
+    ("law", "settings"),
+    [
+        ("TimeHeadwayCruise", ["cruise.standstill_gap=400"]),
+        ("DistributedMpc", ["cruise.gap_margin=150", "cruise.sample_time=0.5"]),
+    ],
+)
+def test_a_braking_wave_dies_out(law, settings):
+    """Each of ten trains deviates less from its speed than the one ahead of it, of which the first is braked."""
+    system = load("braking_wave", swaps=[f"cruise={law}"], settings=["cruise.time_headway=100", *settings])
+    (deviations,) = (metric.values for metric in run(system).metrics if metric.name == "speed_deviation")
+    assert all(after < before for before, after in itertools.pairwise(deviations.values()))
 
 
 @pytest.mark.parametrize("preset", [None, "no-plans"])
