@@ -15,6 +15,12 @@ from .events import EVENT_KEYS
 from .groups import OPTION_KEYS
 from .simulation import SIMULATION_KEYS
 
+STANDARD, TIMES = ("instances", "connections"), ("start_time", "stop_time", "step")
+"""What other formats have words for: sections, and keys of the simulation."""
+_USUAL = Stepping()
+_ALWAYS = ("simulation", "instances")
+"""Sections that a scenario has even where they hold nothing."""
+
 
 def dump(system: System) -> str:
     """A scenario that loads to an equal system: counts, patterns and the preset in force are written out.
@@ -25,48 +31,88 @@ def dump(system: System) -> str:
     Raises:
         TypeError: a value that TOML cannot hold.
     """
-    return "\n".join(_lines(system)).lstrip("\n") + "\n"
+    return text_of(tables_of(system))
 
 
-def _lines(system: System) -> Iterator[str]:
+def dump_beside(system: System) -> str:
+    """What a scenario says of a system beside instances, connections and times: these have words elsewhere, too.
+
+    Raises:
+        TypeError: a value that TOML cannot hold.
+    """
+    tables = tables_of(system)
+    for section in STANDARD:
+        del tables[section]
+    for key in TIMES:
+        del tables["simulation"][key]
+    return text_of(tables)
+
+
+def tables_of(system: System) -> dict[str, Any]:
+    """What a scenario says of a system, by section, without what goes without saying."""
     came, stepping = system.provenance, system.stepping
-    yield from _assignments({key: getattr(came, key) or None for key in ("title", "source", "description")})
-    yield from _assignments({"default_preset": system.provenance.preset})
-    yield from ("", "[simulation]")
     keys = ("start_time", "stop_time", "step", "algorithm", "record")
-    yield from _assignments({key: getattr(stepping, key) for key in keys} | {"seed": system.seed})
-    yield from _assignments({key: getattr(stepping, key) or None for key in ("order", "record_only")})
-    others = [key for key in SIMULATION_KEYS if key not in (*keys, "seed", "order", "record_only", "tolerances")]
-    yield from _assignments(
-        {key: value for key in others if (value := getattr(stepping, key)) != getattr(Stepping, key)}
-    )
-    if system.stepping.tolerances:
-        yield from ("", "[simulation.tolerances]", *_assignments(system.stepping.tolerances))
-    yield from () if system.instances else ("", "[instances]")
-    for instance in system.instances.values():
-        yield from _instance(instance)
-    connections = {connection.target: _options(connection) for connection in system.connections}
-    for section, table in (
-        ("connections", connections),
-        ("require", system.judged.requirements),
-        ("metrics", system.judged.metrics),
-    ):
-        if table:
-            yield from ("", f"[{section}]", *_assignments(table))
-    study = {**system.study}
-    varied = study.pop("vary", {})
-    for section, table in (("study", study), ("study.vary", varied)):
-        if table:
-            yield from ("", f"[{section}]", *_assignments(table))
-    for event in system.events:
-        yield from ("", "[[events]]", *_assignments({key: getattr(event, key) for key in EVENT_KEYS}))
+    simulation = {key: getattr(stepping, key) for key in keys} | {"seed": system.seed}
+    simulation |= {key: getattr(stepping, key) or None for key in ("order", "record_only")}
+    for key in SIMULATION_KEYS:
+        if key not in simulation and (value := getattr(stepping, key)) != getattr(_USUAL, key):
+            simulation[key] = value
     owed, own = (
         [entry for entry in entries if _applies(entry, system)]
         for entries in (system.judged.published, system.judged.references)
     )
-    for section, tables in (("published", owed), ("references", own), ("figures", system.judged.figures)):
-        for entry in tables:
+    return {
+        **{key: getattr(came, key) or None for key in ("title", "source", "description")},
+        "default_preset": came.preset,
+        "simulation": simulation,
+        "instances": {one.name: _instance(one) for one in system.instances.values()},
+        "connections": {one.target: _options(one) for one in system.connections},
+        "require": system.judged.requirements,
+        "metrics": system.judged.metrics,
+        "study": system.study,
+        "events": [{key: getattr(event, key) for key in EVENT_KEYS} for event in system.events],
+        "published": owed,
+        "references": own,
+        "figures": system.judged.figures,
+    }
+
+
+def text_of(tables: Mapping[str, Any]) -> str:
+    """The text of a scenario.
+
+    Args:
+        tables: by section, what they hold by key; None stands for nothing.
+
+    Raises:
+        TypeError: a value that TOML cannot hold.
+    """
+    return "\n".join(_lines(tables)).lstrip("\n") + "\n"
+
+
+def _lines(tables: Mapping[str, Any]) -> Iterator[str]:
+    sections = {key: value for key, value in tables.items() if isinstance(value, dict) or _is_repeated(value)}
+    yield from _assignments({key: value for key, value in tables.items() if key not in sections})
+    for section, content in sections.items():
+        if isinstance(content, dict):
+            yield from _section(section, content)
+            continue
+        for entry in content:
             yield from ("", f"[[{section}]]", *_assignments(entry))
+
+
+def _is_repeated(value: Any) -> bool:
+    return isinstance(value, list) and all(isinstance(entry, dict) for entry in value)
+
+
+def _section(section: str, content: Mapping[str, Any]) -> Iterator[str]:
+    """A section, the tables in it as sections of their own; those of connections stand in a line."""
+    inner = {} if section == "connections" else {key: one for key, one in content.items() if isinstance(one, dict)}
+    if len(inner) < len(content) or (section in _ALWAYS and not content):
+        yield from ("", f"[{section}]", *_assignments({key: content[key] for key in content if key not in inner}))
+    for key, table in inner.items():
+        yield from ("", f"[{section}.{_key(key)}]")
+        yield from _assignments({name: value for name, value in table.items() if name != "start"})
+        yield from (f"start.{line}" for line in _assignments(table.get("start", {})))
 
 
 def _assignments(table: Mapping[str, Any]) -> Iterator[str]:
@@ -78,13 +124,14 @@ def _applies(entry: Mapping[str, Any], system: System) -> bool:
     return not came.modified and bool(entry.get("preset", came.default_preset) == came.preset)
 
 
-def _instance(instance: Instance) -> Iterator[str]:
-    yield from ("", f"[instances.{_key(instance.name)}]")
-    yield f"{'fmu' if is_fmu_name(instance.model) else 'component'} = {toml_value(instance.model)}"
+def _instance(instance: Instance) -> dict[str, Any]:
     keys = (*OPTION_KEYS, "swapped")
-    yield from _assignments({key: value for key in keys if (value := getattr(instance, key)) != getattr(Instance, key)})
-    yield from _assignments({"build": instance.build or None})
-    yield from (f"start.{line}" for line in _assignments(instance.start))
+    return {
+        "fmu" if is_fmu_name(instance.model) else "component": instance.model,
+        **{key: value for key in keys if (value := getattr(instance, key)) != getattr(Instance, key)},
+        "build": instance.build or None,
+        "start": instance.start,
+    }
 
 
 def _options(connection: Connection) -> str | dict[str, Any]:
