@@ -5,6 +5,7 @@ from .shipped import MODELS, Listed, listed, presets_of, raw, shipped
 from .toml_source import Source, parse_value
 from .trust import import_notes, untrusted_code
 from .values import SEED, assignment, changed, is_structural
+from .writer import dump_beside
 
 __all__ = [
     "MODELS",
@@ -15,6 +16,7 @@ __all__ = [
     "assignment",
     "changed",
     "dump",
+    "dump_beside",
     "import_notes",
     "import_ssp",
     "is_structural",

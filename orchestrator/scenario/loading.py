@@ -31,7 +31,7 @@ from .shipped import is_shipped, shipped, shipped_file
 from .simulation import TOLERANCES, read_simulation, spread_tolerances
 from .toml_source import Source, parse_value
 from .varied import read_study
-from .writer import dump
+from .writer import STANDARD, TIMES, dump, tables_of, text_of
 
 __all__ = ["dump", "find", "load", "loads", "preset_names"]
 
@@ -118,12 +118,37 @@ def _system_of_ssp(name: str, changes: _Changes) -> System:
     for instance in read.instances.values():
         places["instances", instance.name] = instance.origin
         for variable in instance.start:
-            origin = read.provenance.origins[f"{instance.name}.{variable}"]
+            origin = read.provenance.origins.get(f"{instance.name}.{variable}", instance.origin)
             places["instances", instance.name, "start", variable] = origin
     places |= {("connections", connection.target): connection.origin for connection in read.connections}
-    system = _system(Source(dump(read), read.provenance.path, places), Path(read.provenance.path), changes)
+    tables = _tables_of_ssp(read)
+    annotation = read.provenance.origins["scenario"]
+    places |= {(key,): annotation for key in tables if key not in STANDARD}
+    system = _system(Source(text_of(tables), read.provenance.path, places), Path(read.provenance.path), changes)
     system.provenance.notes = read.provenance.notes
     return system
+
+
+def _tables_of_ssp(read: System) -> dict[str, Any]:
+    """A scenario's tables: instances, connections and times as the standard has them, the rest by our annotation.
+
+    Raises:
+        ScenarioError: the annotation is no TOML, or holds what a scenario cannot.
+    """
+    tables = tables_of(read)
+    if not read.provenance.text:
+        return tables
+    place = read.provenance.origins["scenario"]
+    own = Source(read.provenance.text, place, {}).data
+    times = {key: tables["simulation"][key] for key in TIMES}
+    if isinstance(own.get("simulation", {}), dict):
+        own["simulation"] = tables["simulation"] | own.get("simulation", {}) | times
+    merged = own | {key: tables[key] for key in STANDARD}
+    try:
+        text_of(merged)
+    except TypeError as error:
+        raise ScenarioError(Problem(place, str(error))) from None
+    return merged
 
 
 def import_ssp(name: str, fmus: Path, folder: Path) -> str:
@@ -142,7 +167,7 @@ def import_ssp(name: str, fmus: Path, folder: Path) -> str:
         instance.model = Path(os.path.relpath(instance.model, folder)).as_posix()
     lines = [f"imported from {name}", *system.provenance.notes]
     comments = "".join(f"# {part}\n" for line in lines for part in line.splitlines())
-    return f"{comments}\n{dump(system)}"
+    return f"{comments}\n{text_of(_tables_of_ssp(system))}"
 
 
 def loads(text: str, path: str | os.PathLike[str] = "scenario.toml", **changes: Any) -> System:

@@ -1,16 +1,19 @@
-"""How a system is stepped: what the standard says of it, and what OMSimulator and OSP write beside it."""
+"""What stands beside the standard: how a system is stepped, by OMSimulator and OSP; names and the rest, by us."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+import re
+from collections import defaultdict
+from collections.abc import Mapping
 from typing import Any
 
 from ..errors import ScenarioError
 from ..fmi import Interface
+from ..names import SignalName
 from ..problems import Problem
-from ..system import Stepping
+from ..system import Instance, Stepping
 from ..times import digits
-from .documents import Document, children, first, local
+from .documents import OWN, Document, annotated, first, local
 from .network import Path
 from .structure import Element
 
@@ -54,11 +57,11 @@ def _annotated(
     document: Document, root: Element, experiment: Any, interfaces: Mapping[Path, Interface], stepping: Stepping
 ) -> float | None:
     """The step that annotations give, and the algorithm they ask for."""
-    for master in _annotation(root.node, _OMS, "SimulationInformation"):
+    for master in annotated(root.node, _OMS, "SimulationInformation"):
         if (found := _oms(document, master, interfaces, stepping)) is not None:
             return found
     nodes = [] if experiment is None else [experiment]
-    for algorithm in (one for node in nodes for one in _annotation(node, _OSP, "Algorithm")):
+    for algorithm in (one for node in nodes for one in annotated(node, _OSP, "Algorithm")):
         fixed = first(algorithm, "FixedStepAlgorithm")
         if fixed is not None:
             stepping.algorithm = "jacobi"  # all instances step at once, libcosim has no other
@@ -95,19 +98,57 @@ def _positive(document: Document, element: Any, attribute: str) -> float:
     return value
 
 
-def _annotation(node: Any, kind: str, name: str) -> Iterator[Any]:
-    """The elements of a name in the annotations of a kind, however deep."""
-    for annotation in children(node, "Annotations", "Annotation"):
-        if annotation.get("type") == kind:
-            yield from annotation.iter(f"{{*}}{name}")
-
-
 def step_of(element: Element) -> float | None:
     """The step that OSP's annotation hints at for a component.
 
     Raises:
         ScenarioError: it is no number.
     """
-    for hint in _annotation(element.node, _OSP, "StepSizeHint"):
+    for hint in annotated(element.node, _OSP, "StepSizeHint"):
         return _positive(element.document, hint, "value")
     return None
+
+
+def scenario_of(document: Document) -> tuple[str, str]:
+    """What we have written of a system that the standard has no words for, as a scenario has it, and where it stands.
+
+    Empty where there is no such annotation.
+    """
+    for found in annotated(document.root, OWN, "Scenario"):
+        return found.text or "", document.place(found)
+    return "", ""
+
+
+def own_names(elements: Mapping[Path, Element]) -> dict[Path, str]:
+    """The names of instances as we have written them; of a family of which some are missing, none."""
+    found: dict[Path, SignalName] = {}
+    families: dict[str, list[int | None]] = defaultdict(list)
+    for path, element in elements.items():
+        for own in annotated(element.node, OWN, "Instance"):
+            name = SignalName(own.get("name", ""))
+            if re.fullmatch(r"[A-Za-z_]\w*(\[[1-9]\d{0,8}\])?", name.instance, re.ASCII):
+                found[path] = name
+                families[name.group].append(name.number)
+    whole = {
+        group
+        for group, numbers in families.items()
+        if numbers == [None] or (None not in numbers and set(numbers) == set(range(1, len(numbers) + 1)))
+    }
+    return {path: name.instance for path, name in found.items() if name.group in whole}
+
+
+def set_options(instance: Instance, element: Element) -> None:
+    """Give an instance what we have written of how it runs.
+
+    Raises:
+        ScenarioError: a number is none.
+    """
+    for own in annotated(element.node, OWN, "Instance"):
+        instance.isolate, instance.swapped = own.get("isolate") == "true", own.get("swapped") == "true"
+        for key in ("step_timeout", "memory_limit"):
+            if own.get(key) is not None:
+                setattr(instance, key, element.document.number(own, key))
+        for left in own.iterfind("{*}Left"):
+            text = left.get("value")
+            number = text == "true" if text in ("true", "false") else element.document.number(left, "value")
+            instance.start[left.get("name", "")] = number

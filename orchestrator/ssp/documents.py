@@ -23,6 +23,8 @@ _SCHEMAS = {
 }
 _BASE = ("kg", "m", "s", "A", "K", "mol", "cd", "rad")
 _MOST_TOLD = 3
+OWN = "railcosim"
+"""The type of our annotations."""
 
 
 @final
@@ -117,6 +119,19 @@ class Document:
             what = f"{attribute} of {local(element)} is {text!r}, not a number"
             raise ScenarioError(Problem(self.place(element), what)) from None
 
+    def whole(self, element: Any, attribute: str) -> int:
+        """A whole number in an attribute; 0 where it is not given.
+
+        Raises:
+            ScenarioError: it is none.
+        """
+        text = element.get(attribute, "0")
+        try:
+            return int(text)
+        except ValueError:
+            what = f"{attribute} of {local(element)} is {text!r}, not a whole number"
+            raise ScenarioError(Problem(self.place(element), what)) from None
+
     def unit(self, element: Any) -> Unit | None:
         """The unit that an element names; one that is not defined has no exponents."""
         name = element.get("unit")
@@ -136,6 +151,13 @@ def children(element: Any, *path: str) -> Iterator[Any]:
 def first(element: Any, *path: str) -> Any | None:
     """The first of those."""
     return next(children(element, *path), None)
+
+
+def annotated(element: Any, kind: str, name: str) -> Iterator[Any]:
+    """The elements of a name in the annotations of a kind that an element has, however deep."""
+    for annotation in children(element, "Annotations", "Annotation"):
+        if annotation.get("type") == kind:
+            yield from annotation.iter(f"{{*}}{name}")
 
 
 def only_child(element: Any) -> Any | None:

@@ -36,6 +36,8 @@ class Hop(NamedTuple):
     suppressed: bool
     transformation: Transformation | None
     place: str
+    delay: int = 0
+    threshold: float | None = None
 
 
 @dataclass(frozen=True)
@@ -131,7 +133,8 @@ class Network:
         if target in self.incoming:
             what = f"{target} takes a value already, by the connection at {self.incoming[target].place}"
             raise ScenarioError(Problem(connection.place, what, "remove one of the two"))
-        self.incoming[target] = Hop(source, target, connection.suppressed, connection.transformation, connection.place)
+        how = (connection.suppressed, connection.transformation, connection.place, connection.delay)
+        self.incoming[target] = Hop(source, target, *how, connection.threshold)
 
     def _settle(self) -> None:
         """Directions where both ends may give and take, as in signal dictionaries: away from where a value comes."""

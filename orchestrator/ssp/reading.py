@@ -12,10 +12,11 @@ from typing import final
 from ...fmus.build import cache_folder
 from ..errors import FmuFileError, ScenarioError
 from ..fmi import Interface, Workspace, load_fmu
+from ..names import SignalName
 from ..problems import Problem, suggestion
 from ..system import Connection, Instance, System
 from ..wiring import convert
-from .annotations import read_stepping, step_of
+from .annotations import own_names, read_stepping, scenario_of, set_options, step_of
 from .network import Hop, Network, Node, Path, own_unit
 from .package import DEFAULT, Package, digest_of
 from .settings import Settings
@@ -64,6 +65,7 @@ def read_system(name: str, folder: FilePath | None = None) -> System:
         raise ScenarioError(list(dict.fromkeys(problems)))
     came = system.provenance
     came.name, came.path = path.stem.encode(errors="replace").decode(), file
+    came.text, came.origins["scenario"] = scenario_of(document)
     came.notes = tuple(dict.fromkeys([*reader.notes, *network.notes, *settings.notes, *flat.notes]))
     return system
 
@@ -112,6 +114,12 @@ def _interfaces(
         yield from _interfaces(inner, (*path, name), workspace, problems, read)
 
 
+def _elements(element: Element, path: Path) -> Iterator[tuple[Path, Element]]:
+    yield path, element
+    for name, inner in element.inner.items():
+        yield from _elements(inner, (*path, name))
+
+
 @final
 class _Flat:
     """Instances, start values and connections of a system without nesting, put into a `System`."""
@@ -127,8 +135,11 @@ class _Flat:
         self.problems: list[Problem] = []
         self.notes: list[str] = []
         self._interfaces, self._network, self._settings, self._system = interfaces, network, settings, system
-        self._names = _instance_names(interfaces)
-        changed = [f"{'.'.join(path)} is {name}" for path, name in self._names.items() if path != (name,)]
+        own = own_names({path: one for path, one in _elements(root, ()) if path in interfaces})
+        self._names = _instance_names(interfaces, own)
+        changed = [
+            f"{'.'.join(path)} is {name}" for path, name in self._names.items() if path != (name,) and path not in own
+        ]
         if changed:
             more = f", and {len(changed) - 8} more" if len(changed) > 8 else ""
             self.notes.append(f"names of instances: {', '.join(changed[:8])}{more}")
@@ -154,6 +165,7 @@ class _Flat:
             instance = Instance(name, os.fspath(element.fmu or ""), origin=element.place)
             self._system.instances[name] = instance
             self._try(self._rate, instance, element)
+            self._try(set_options, instance, element)
         for name, inner in element.inner.items():
             self._add(inner, (*path, name))
 
@@ -208,7 +220,8 @@ class _Flat:
             way = way.to(self._network.unit(hop.target), hop.suppressed, hop.transformation, hop.place)
             plain = plain.to(None, False, hop.transformation, hop.place)
         ends = [f"{self._names[node.path]}.{node.name}" for node in (source, target)]
-        made = Connection(ends[0], ends[1], origin=place)
+        made = Connection(ends[0], ends[1], sum(hop.delay for hop in hops), origin=place)
+        made.threshold = next((hop.threshold for hop in hops if hop.threshold is not None), None)
         if way.entries is not None:
             made.map = dict(way.entries)
         elif self._is_own(source, target, way, plain):
@@ -233,13 +246,16 @@ class _Flat:
         return all(close)
 
 
-def _instance_names(paths: Mapping[Path, object]) -> dict[Path, str]:
-    """A name for each component that a scenario can write, the same for the same archive."""
-    names: dict[Path, str] = {}
+def _instance_names(paths: Mapping[Path, object], own: Mapping[Path, str]) -> dict[Path, str]:
+    """A name for each component that a scenario can write, the same for the same archive; those of ours stay."""
+    names = dict(own)
+    groups = {SignalName(name).group for name in own.values()}
     for path in paths:
+        if path in own:
+            continue
         text = re.sub(r"\W", "_", "_".join(path), flags=re.ASCII)
         text = text if re.match(r"[A-Za-z_]", text) and not keyword.iskeyword(text) else f"_{text}"
-        taken, number = set(names.values()), 2
+        taken, number = groups.union(names.values()), 2
         name = text
         while name in taken:
             name, number = f"{text}_{number}", number + 1

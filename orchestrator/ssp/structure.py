@@ -9,7 +9,7 @@ from typing import Any, final
 from ..errors import ScenarioError
 from ..fmi import Unit
 from ..problems import Problem
-from .documents import Document, children, first, local
+from .documents import OWN, Document, annotated, children, first, local
 from .package import DEFAULT, Package
 from .values import Setting, Transformation, is_suppressed, read_bindings, read_transformation
 
@@ -30,13 +30,20 @@ class Connector:
 
 @dataclass(frozen=True)
 class Connection:
-    """Two connectors, each as element (None: the system itself) and name; which is the source follows from kinds."""
+    """Two connectors, each as element (None: the system itself) and name; which is the source follows from kinds.
+
+    Attributes:
+        suppressed: whether units are not converted. transformation: of the value.
+        delay, threshold: as `system.Connection` has them, by our own annotation.
+    """
 
     start: tuple[str | None, str]
     end: tuple[str | None, str]
     suppressed: bool
     transformation: Transformation | None
     place: str
+    delay: int = 0
+    threshold: float | None = None
 
 
 @dataclass
@@ -205,4 +212,9 @@ class StructureReader:
         start = node.get("startElement") or None, node.get("startConnector", "")
         end = node.get("endElement") or None, node.get("endConnector", "")
         transformation = read_transformation(document, node)
-        return Connection(start, end, is_suppressed(node), transformation, document.place(node))
+        delay, threshold = 0, None
+        for own in annotated(node, OWN, "Connection"):
+            delay = document.whole(own, "delay")
+            threshold = None if own.get("threshold") is None else document.number(own, "threshold")
+        suppressed, place = is_suppressed(node), document.place(node)
+        return Connection(start, end, suppressed, transformation, place, delay, threshold)

@@ -1,10 +1,10 @@
 """From archive to `System`: variants, bare structures, versions, times, steps and algorithms."""
 
 import pytest
-from railcosim.orchestrator import ScenarioError
+from railcosim.orchestrator import ScenarioError, load
 from railcosim.orchestrator.ssp import is_ssp_name, read_system
 
-from .conftest import DESCRIPTION, GADGET, UNITS, component, connection, packed, structure, system
+from .conftest import DESCRIPTION, GADGET, UNITS, component, connection, connectors, packed, structure, system
 
 
 def test_names_of_files():
@@ -177,3 +177,98 @@ def test_two_connectors_of_one_name(read):
     found = read(system(component("a", shown=twice) + component("b"), connection("a.y", "b.u")))
     assert told(found, "a has two connectors 'y'; the last counts") == [True]
     assert found.connections[0].source == "a.y"
+
+
+def own(inside):
+    """An annotation of ours, which an export writes."""
+    return annotated("railcosim", inside)
+
+
+def named(*names):
+    """Components a, b, ... of the gadget with our names for them."""
+    return "".join(
+        component(letter, own(f'<r:Instance xmlns:r="r" {name}/>')) for letter, name in zip("abcd", names, strict=False)
+    )
+
+
+def test_names_of_ours_come_back(read):
+    found = read(system(named('name="cart[2]"', 'name="cart[1]"', 'name="b_"', "")))
+    assert list(found.instances) == ["cart[2]", "cart[1]", "b_", "d"]
+    assert told(found, "names of instances") == [False]
+
+
+@pytest.mark.parametrize(
+    ("names", "expected"),
+    [
+        (('name="cart[1]"', 'name="cart[3]"'), ["a", "b"]),  # one of the family is gone
+        (('name="cart[1]"', 'name="cart"'), ["a", "b"]),
+        (('name="cart"', 'name="cart"'), ["a", "b"]),
+        (('name="../x"', 'name="cart[0]"'), ["a", "b"]),
+        (("", 'name="a"'), ["a_2", "a"]),  # what is ours comes first
+    ],
+)
+def test_names_that_do_not_go_together_are_left(read, names, expected):
+    found = read(system(named(*names)))
+    assert list(found.instances) == expected
+
+
+def test_how_an_instance_runs_by_our_annotation(read):
+    options = 'name="a" isolate="true" step_timeout="2.5" memory_limit="64" swapped="true"'
+    left = '<r:Left name="fast" value="true"/><r:Left name="limit" value="0.5"/>'
+    inside = f'<r:Instance xmlns:r="r" {options}>{left}</r:Instance>'
+    one = read(system(component("a", own(inside)))).instances["a"]
+    assert (one.isolate, one.step_timeout, one.memory_limit, one.swapped) == (True, 2.5, 64.0, True)
+    assert one.start == {"fast": True, "limit": 0.5}
+    with pytest.raises(ScenarioError, match=r"ssd:4: step_timeout of Instance is 'soon', not a number"):
+        read(system(component("a", own(inside.replace("2.5", "soon")))))
+
+
+def test_delays_by_our_annotation_add_up(read):
+    def late(start, end, facts):
+        return connection(start, end, own(f'<r:Connection xmlns:r="r" {facts}/>'))
+
+    inner = system(component("b"), late("i", "b.u", 'delay="2" threshold="0.25"'), connectors(i="input"), name="inner")
+    wires = late("a.y", "inner.i", 'delay="1"')
+    (found,) = read(system(component("a") + inner, wires)).connections
+    assert (found.delay, found.threshold) == (3, 0.25)
+    with pytest.raises(ScenarioError, match=r"delay of Connection is '1\.5', not a whole number"):
+        read(system(component("a") + inner, wires.replace('"1"', '"1.5"')))
+
+
+def scenario_of(text):
+    return UNITS + EXPERIMENT.format("") + own(f'<r:Scenario xmlns:r="r">{text}</r:Scenario>')
+
+
+def test_what_only_a_scenario_says_comes_from_our_annotation(archive):
+    """Times are those of the standard, whatever the annotation says of them."""
+    text = """
+title = "Gadgets"
+[simulation]
+stop_time = 99.0
+record = 0.5
+seed = 3
+[instances.b]
+fmu = "other.fmu"
+[metrics]
+last = "final(a.y)"
+"""
+    found = load(archive(structure(system(component("a")), scenario_of(text))))
+    assert (found.provenance.title, found.judged.metrics) == ("Gadgets", {"last": "final(a.y)"})
+    assert times(found) == (1.0, 5.0, 0.05, "gauss-seidel")
+    assert (found.stepping.record, found.seed, list(found.instances)) == (0.5, 3, ["a"])
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        ("a = ", r"SystemStructure\.ssd:\d+:\d+: .*Invalid value"),
+        ("[metrics]\nx = 2020-01-01", r"SystemStructure\.ssd:\d+: a scenario cannot hold datetime\.date"),
+        ("simulation = 3", r"SystemStructure\.ssd:\d+: simulation"),
+        ("events = [1, 2]", r"SystemStructure\.ssd:\d+: events: is a list of tables"),
+        ("[require]\nx = { y = { z = 1 } }", r"SystemStructure\.ssd:\d+: require"),
+        ("[colour]\nx = 1", r"SystemStructure\.ssd:\d+: colour: unknown key 'colour'"),
+    ],
+)
+def test_what_is_wrong_with_our_annotation_is_told(archive, text, message):
+    with pytest.raises(ScenarioError, match=message):
+        load(archive(structure(system(component("a")), scenario_of(text))))
