@@ -89,6 +89,7 @@ app.command()(answering(runs.run))
 app.command("list")(answering(scenarios.list_all, "list"))
 app.command("import")(answering(scenarios.import_ssp, "import"))
 for command in (
+    scenarios.export,
     scenarios.check,
     runs.plot,
     runs.convert,

@@ -1,4 +1,4 @@
-"""The commands of ``orchestrate`` that are about scenarios and do not run them: list, check, import."""
+"""The commands of ``orchestrate`` that are about scenarios and do not run them: list, check, import, export."""
 
 from __future__ import annotations
 
@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from .. import world
+from . import completing
 from .documents import Answer
 from .options import Algorithm, Preset, Quiet, Scenario, Set, Step, Stop, Swap, Trust, With, load_system
 
@@ -88,6 +89,53 @@ def import_ssp(
     text = make(f"{archive}#{variant}" if variant else archive, folder, output.parent)
     world.write_text(output, text, encoding="utf-8")
     return written([output], quiet)
+
+
+def export(
+    scenario: Scenario,
+    output: Annotated[
+        Path,
+        typer.Option("--output", "-o", help="The file to write: platoon.ssp, or OspSystemStructure.xml for libcosim."),
+    ],
+    *,
+    preset: Preset = None,
+    settings: Set = None,
+    builds: With = None,
+    swaps: Swap = None,
+    stop: Stop = None,
+    step: Step = None,
+    algorithm: Algorithm = None,
+    platforms: Annotated[
+        str | None,
+        typer.Option(
+            help="Of native FMUs: some of linux64,win64,darwin64,aarch64-linux, all of these; this machine's by "
+            "default.",
+            autocompletion=completing.platforms,
+        ),
+    ] = None,
+    trust: Trust = False,
+    quiet: Quiet = False,
+) -> Answer:
+    """Write a scenario for other tools: an SSP archive, which 'run' reads too, or libcosim's OspSystemStructure.xml.
+
+    What other tools do otherwise with it, or not at all, is told.
+    """
+    from ..packing import export as write
+    from .documents import export_document
+    from .lines import printable
+    from .printing import open_console, show_compilations, show_notes
+
+    system = load_system(scenario, preset, settings, builds, swaps, stop=stop, step=step, algorithm=algorithm)
+    wanted = [name.strip() for name in (platforms or "").split(",") if name.strip()]
+    with show_compilations(quiet):
+        exported = write(system, output, platforms=wanted, trusted=trust)
+
+    def show() -> None:
+        show_notes(open_console(), exported.notes)
+        for path in () if quiet else exported.files:
+            print(printable(str(path)))
+
+    return Answer(lambda: export_document(exported), show)
 
 
 def _delays(system: System) -> list[str]:

@@ -1,4 +1,4 @@
-"""A whole scenario as one FMU."""
+"""A whole scenario for other tools: as one FMU, or as FMUs and their structure."""
 
 from ...components.doors import hang_door
 

@@ -4,7 +4,7 @@ from .catalogue import DOCUMENTS
 from .driving import drive_document
 from .envelope import Document, Failure, Mistake
 from .listing import list_document
-from .models import describe_document, new_document, pack_document, validate_document
+from .models import describe_document, export_document, new_document, pack_document, validate_document
 from .plain import plain, text_of
 from .runs import CaseDocument, reproduce_document, run_document
 from .scenarios import check_document, scenario_document
@@ -25,6 +25,7 @@ __all__ = [
     "compare_document",
     "describe_document",
     "drive_document",
+    "export_document",
     "fail",
     "failed",
     "falsify_document",

@@ -7,7 +7,7 @@ from typing import Any
 from .analysis import CompareDocument, LinearizeDocument, RecordedDocument
 from .driving import DriveDocument
 from .listing import ListDocument
-from .models import ModelDocument, NewDocument, PackDocument, ValidateDocument
+from .models import ExportDocument, ModelDocument, NewDocument, PackDocument, ValidateDocument
 from .runs import ReproduceDocument, RunDocument
 from .scenarios import CheckDocument, ScenarioDocument
 from .searches import FalsifyDocument, OptimizeDocument
@@ -18,6 +18,7 @@ DOCUMENTS: dict[str, Any] = {
     "run": RunDocument,
     "list": ListDocument,
     "import": FilesDocument,
+    "export": ExportDocument,
     "check": CheckDocument,
     "plot": FilesDocument,
     "convert": FilesDocument,

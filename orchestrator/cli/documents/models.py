@@ -1,4 +1,4 @@
-"""The documents of commands that are about models: describe of a model, pack, validate, new."""
+"""The documents of commands that are about models: describe of a model, pack, export, validate, new."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from ...fmi import Interface
-    from ...packing import Packed
+    from ...packing import Exported, Packed
     from ...validation import Report
 
 
@@ -109,6 +109,20 @@ def pack_document(packed: Packed, instances: int) -> PackDocument:
     """The document of an FMU that was packed."""
     names = [each.name for each in packed.exposed]
     return PackDocument(str(packed.path), instances, names, list(packed.platforms), list(packed.notes))
+
+
+@dataclass(frozen=True)
+class ExportDocument:
+    """A scenario written for other tools: the files, how many instances are in it, and what a user should know."""
+
+    files: list[str]
+    instances: int
+    notes: list[str]
+
+
+def export_document(exported: Exported) -> ExportDocument:
+    """The document of a scenario that was written for other tools."""
+    return ExportDocument(list(map(str, exported.files)), exported.parts, list(exported.notes))
 
 
 @dataclass(frozen=True)
