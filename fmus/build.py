@@ -184,11 +184,13 @@ def package(
     arguments: Mapping[str, Any],
     kind: PackagingKind = "auto",
     platforms: Sequence[str] = (),
+    *,
     profile: Profile = "standard",
+    fmi: FmiVersion = "2",
 ) -> tuple[Path, FmuKind, str]:
     """The FMU of a component in the cache, its kind, and why it is not native if that was left open."""
     if kind != "auto":
-        return build(reference, arguments, kind=kind, platforms=platforms, profile=profile), kind, ""
+        return build(reference, arguments, kind=kind, platforms=platforms, profile=profile, fmi=fmi), kind, ""
     component = resolve(reference)
     problem = native_problem(component)
     if platforms and not component.requires:

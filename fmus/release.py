@@ -12,7 +12,7 @@ from ..components import ComponentError
 from . import toolchain
 from .build import package, write_whole
 from .host import has_counter, step_cost
-from .kinds import PackagingKind, Profile
+from .kinds import FmiVersion, PackagingKind, Profile
 from .references import resolve
 
 CHECKSUMS = "SHA256SUMS"
@@ -26,6 +26,7 @@ def release(
     kind: PackagingKind = "auto",
     platforms: Sequence[str] = (),
     profile: Profile = "standard",
+    fmi: FmiVersion = "2",
     checksums: bool = False,
     tell: Callable[[str], None] = lambda line: None,
 ) -> list[Path]:
@@ -38,6 +39,7 @@ def release(
         kind: ``"auto"`` is native where that is possible, and tells why where it is not.
         platforms: of native FMUs, keys of `toolchain.PLATFORMS` or ``all``; this machine's by default.
         profile: ``"real-time"`` makes native FMUs, and counts the instructions of a step where valgrind is there.
+        fmi: the version of FMI; those in 3.0 are native.
         checksums: whether to write `CHECKSUMS`, which ``sha256sum -c`` checks.
         tell: takes a line on each FMU's progress.
 
@@ -45,12 +47,12 @@ def release(
         What was written.
 
     Raises:
-        ComponentError: two components of one name, or platforms asked of a Python FMU.
+        ComponentError: two components of one name, or platforms asked of a Python FMU, or what FMI 3.0 has not.
         ComponentError: a component cannot be built; what was built before it stays.
     """
-    if profile == "real-time":
+    if profile == "real-time" or fmi == "3":
         kind = "native" if kind == "auto" else kind  # what cannot be compiled is an error, no reason for another kind
-    _check(references, kind, platforms, profile)
+    _check(references, kind, platforms, profile, fmi)
     chosen = toolchain.chosen(platforms)
     directory.mkdir(parents=True, exist_ok=True)
     listing = directory / CHECKSUMS
@@ -59,12 +61,13 @@ def release(
     written: list[Path] = []
     for count, reference in enumerate(references, start=1):
         begin = time.perf_counter()
-        source, made, problem = package(reference, arguments, kind, platforms, profile)
+        source, made, problem = package(reference, arguments, kind, platforms, profile=profile, fmi=fmi)
         target = directory / source.name
         write_whole(source.read_bytes(), target)
         written.append(target)
         note = f", not a native one: {problem}" if problem else ""
-        what = f"native, {' '.join(chosen)}" if made == "native" else f"a Python FMU{note}"
+        version = ", FMI 3.0" if fmi == "3" else ""
+        what = f"native{version}, {' '.join(chosen)}" if made == "native" else f"a Python FMU{note}"
         cost = f"{time.perf_counter() - begin:.1f} s, {target.stat().st_size / 1000:.0f} kB"
         tell(f"[{count}/{len(references)}] {target.stem}: {what} ({cost})")
         if profile == "real-time":
@@ -92,7 +95,13 @@ def _step_cost(fmu: Path) -> str:
     return f"instructions of a step: at most {found.most} in {found.steps} steps over its reference signals (callgrind)"
 
 
-def _check(references: Sequence[str], kind: PackagingKind, platforms: Sequence[str], profile: Profile) -> None:
+def _check(
+    references: Sequence[str], kind: PackagingKind, platforms: Sequence[str], profile: Profile, fmi: FmiVersion
+) -> None:
+    if fmi == "3" and profile == "real-time":
+        raise ComponentError("--profile real-time is FMI 2.0, whose functions its host in C calls; leave out --fmi 3")
+    if fmi == "3" and kind == "python":
+        raise ComponentError("--fmi 3 is for native FMUs; Python FMUs, by pythonfmu's wrapper, are FMI 2.0")
     if kind == "python" and profile == "real-time":
         raise ComponentError("--profile real-time is for native FMUs; a Python FMU has no bounds on time or memory")
     if kind == "python" and platforms:

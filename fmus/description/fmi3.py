@@ -38,8 +38,16 @@ class Fmi3(Dialect):
         for rate in model.rates:
             if not rate.state.element:
                 _write_rate(block, rate)
-        time = {"name": "time", "valueReference": str(len(model.variables) + len(model.rates)), "unit": "s"}
-        etree.SubElement(block, "Float64", **time, causality="independent", variability="continuous")
+        etree.SubElement(
+            block,
+            "Float64",
+            name="time",
+            valueReference=str(len(model.variables) + len(model.rates)),
+            description="time of the last communication point",
+            causality="independent",
+            variability="continuous",
+            unit="s",
+        )
         _write_structure(root, model.variables, model.rates, model.unknowns)
         write_annotation(model.annotation, root, "3")
 

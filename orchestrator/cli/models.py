@@ -16,6 +16,7 @@ from .options import (
     OK,
     PROBE_SECONDS,
     Algorithm,
+    FmiName,
     PackagingName,
     Preset,
     ProfileName,
@@ -117,6 +118,7 @@ def build(
         ProfileName,
         typer.Option(help="real-time: native FMUs without files, and without memory taken after instantiation."),
     ] = ProfileName.standard,
+    fmi: Annotated[FmiName, typer.Option(help="Version of FMI: 2 (2.0), or 3 (3.0, native FMUs).")] = FmiName.two,
     output: Annotated[Path | None, typer.Option("--output", "-o", help="Directory for the FMUs.")] = None,
     quiet: Quiet = False,
 ) -> Answer:
@@ -137,6 +139,7 @@ def build(
             kind=kind.value,
             platforms=[name.strip() for name in (platforms or "").split(",") if name.strip()],
             profile=profile.value,
+            fmi=fmi.value,
             checksums=every,
             tell=(lambda line: None) if quiet else tell,
         )

@@ -46,6 +46,13 @@ class ProfileName(StrEnum):
     real_time = "real-time"
 
 
+class FmiName(StrEnum):
+    """The version of FMI that FMUs are written in, as the command line needs it."""
+
+    two = "2"
+    three = "3"
+
+
 Scenario = Annotated[
     str,
     typer.Argument(

@@ -84,6 +84,15 @@ def test_native_is_what_is_built(tmp_path, told):
 
 
 @native
+def test_fmi_3_is_native_or_an_error(components, tmp_path, told):
+    (path,) = release(["Gust"], {}, tmp_path, fmi="3", tell=told.append)
+    assert folders_of(path) == {place for places in toolchain.folders([HERE], "3").values() for place in places}
+    assert told[0].startswith(f"[1/1] Gust: native, FMI 3.0, {HERE} (")
+    with pytest.raises(ComponentError, match="only a Python FMU can be made of it"):
+        release([components(UNTRACEABLE)("Needy")], {}, tmp_path, fmi="3")
+
+
+@native
 @pytest.mark.parametrize(
     ("name", "reason"),
     [("Texted", "Texted.outputs cannot be traced"), ("Needy", "Needy imports scipy")],
@@ -229,6 +238,8 @@ def test_the_command_prints_files_and_tells_progress_apart(tmp_path):
         (["--kind", "python", "--platforms", "all"], "error: --platforms is for native FMUs"),
         (["--platforms", "linux64,beos"], "error: there is no platform 'beos'; it has "),
         (["--kind", "plain"], "Invalid value for '--kind'"),
+        (["--fmi", "3", "--kind", "python"], "error: --fmi 3 is for native FMUs"),
+        (["--fmi", "3", "--profile", "real-time"], "error: --profile real-time is FMI 2.0"),
     ],
 )
 def test_the_command_refuses_wrong_input_in_words(tmp_path, arguments, message):

@@ -69,10 +69,10 @@ def starts(variable):
     return inside or variable.get("start", "").split()
 
 
-LONG = [pytest.param(name, marks=pytest.mark.long) for name in CATALOGUE if name not in FEW]
+REST = [pytest.param(name, marks=pytest.mark.campaign) for name in CATALOGUE if name not in FEW]
 
 
-@pytest.mark.parametrize("name", [*FEW, *LONG], ids=lambda name: name.rpartition(":")[2])
+@pytest.mark.parametrize("name", [*FEW, *REST], ids=lambda name: name.rpartition(":")[2])
 def test_it_says_in_arrays_what_fmi_2_says_in_scalars(name, tmp_path):
     component = resolve(name)()
     two, three = described(component, "2"), described(component, "3")
