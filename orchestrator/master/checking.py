@@ -46,10 +46,8 @@ def _against_threads(system: System, models: Mapping[str, Model], wiring: Wiring
         yield "the kernel has no threads on this platform"
     if len(models) == 1:
         yield "there is one instance"
-    if system.stepping.extrapolation:
-        yield "inputs are extrapolated in Python"
     if system.stepping.refresh:
-        yield "feed-through is refreshed in Python"
+        yield "feed-through is refreshed in one thread"
     interfaces = {name: model.interface for name, model in models.items()}
     if system.stepping.algebraic_loops == "solve" and find_loops(interfaces, wiring.links, doubtful=True):
         yield "algebraic loops are solved in Python"

@@ -1,4 +1,4 @@
-"""The bridge to the compiled step loop: an explicit algorithm's operations as flat arrays, and blocks of steps with it.
+"""The bridge to the compiled step loop: blocks of steps by an algorithm's plan, and what happens when an FMU fails.
 
 The kernel is an optional extension: without it, or for what it does not do (components as Python objects, text
 signals), steps are taken in Python with identical results.
@@ -13,13 +13,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .. import world
+from ..errors import FmuError, RunError
 from ..fmi.binding import FmuSlave
 from ..fmi.guard import GUARD, NOTE_SIZE, NOTES, own_note, said
 from ..isolation import Ride
-from .algorithms import Explicit
+from .algorithms import Programmed
 from .coupling import Coupling
 from .observer import Observer, Table
-from .plans import CHANGES, PLACE, SIZES, SWING, Plan
+from .plans import CHANGES, PLACE, SIZES, SWING, Kind, Plan
 
 try:
     from . import kernel
@@ -54,20 +55,20 @@ if HAS_KERNEL:
 
 
 class CompiledLoop:
-    """An explicit algorithm's plan for the kernel."""
+    """An algorithm's plan for the kernel."""
 
     @classmethod
-    def of(cls, coupling: Coupling, algorithm: Explicit) -> CompiledLoop | None:
+    def of(cls, coupling: Coupling, algorithm: Programmed) -> CompiledLoop | None:
         """One that takes these steps, where the kernel is there and can do all that is asked for."""
-        return cls(coupling, algorithm) if kernel is not None and Plan.is_able(coupling) else None
+        able = kernel is not None and Plan.is_able(coupling, algorithm)
+        return cls(coupling, algorithm) if able else None
 
-    def __init__(self, coupling: Coupling, algorithm: Explicit) -> None:
-        self._coupling = coupling
+    def __init__(self, coupling: Coupling, algorithm: Programmed) -> None:
+        self._coupling, self._algorithm = coupling, algorithm
         self._exchange = coupling.exchange
         self.plan = Plan(coupling, algorithm, can_share=bool(kernel.HAS_THREADS))
         self._under_way: tuple[Table, Observer, float, float] | None = None
         self._note = 0
-        self._whole = [place for place, kind in enumerate(self._exchange.kinds) if kind != "Real"]
 
     def run(
         self,
@@ -107,6 +108,7 @@ class CompiledLoop:
             ],
             dtype=CHANGES,
         )
+        self.plan.courses.load()
         goes_on, block = True, 1
         most = max(1, _MOST_VALUES // (len(values if table is None else table.kept) + 1)) * every
         while done < stop and goes_on:
@@ -127,17 +129,17 @@ class CompiledLoop:
             done += taken
             self._tell_disturbers(disturbed, done, places)
             coupling.steps, coupling.time = done, start_time + done * step
+            for slave in coupling.slaves.values():  # at events they are called in Python
+                slave.time = coupling.time
             exchange.values[:] = self.plan.wide.unpacked(values)
-            for place in self._whole:  # the kernel's values are all doubles
-                exchange.values[place] = int(exchange.values[place])
+            self.plan.courses.store()
+            self._algorithm.note_steps(taken)
             if taken:
                 self._roll(history, newest)
                 goes_on = observe(done, into.filled(written))
             if goes_on:
                 self._go_on(places, start_time + done * step, step)
             block = max(1, int(taken * min(_BLOCK_SECONDS / max(seconds, 1e-9), _GROWTH)))
-        for slave in coupling.slaves.values():
-            slave.time = start_time + done * step
         for array in self.plan.channels:
             array.forget()
         return goes_on
@@ -184,8 +186,24 @@ class CompiledLoop:
         if max(failed) >= 0:
             waiting = (n for n, operation in enumerate(failed) if operation >= 0)
             part = min(waiting, key=lambda n: self.plan.rank(failed[n]))
-            again = self._recover(failed[part], int(places[part]["status"]), time, step)
+            again = self._see_to(failed[part], int(places[part]["status"]), time, step)
             places[part] = failed[part] + (not again), -1, 0
+
+    def _see_to(self, failed: int, status: int, time: float, step: float) -> bool:
+        """See to an operation that failed, as `_recover` says; states that were saved are given back."""
+        try:
+            if failed in self.plan.iterations:
+                self.plan.iterations[failed].give_up(time, step)
+                return False
+            return self._recover(failed, status, time, step)
+        except RunError as failure:
+            told = failure
+            if failed in self.plan.rounds and isinstance(failure, FmuError):
+                told = self.plan.rounds[failed].explain(failure, time, step)
+            self.plan.forget(time)
+            if told is failure:
+                raise
+            raise told from failure
 
     def _recover(self, failed: int, status: int, time: float, step: float) -> bool:
         """Go on where an FMU discarded a step that it takes in parts; raise what happens in Python otherwise.
@@ -194,21 +212,31 @@ class CompiledLoop:
         """
         slave, call = self.plan.culprits[failed]
         assert slave is not None
-        period, phase = self.plan.operations[failed][2:]
-        when = time + (period - phase) * step if "Get" in call else time
+        kind, _, period, phase = self.plan.operations[failed]
+        is_late = self.plan.late[failed]
+        is_of_end = "Get" in call if kind < Kind.SAVE else kind != Kind.SAVE
+        when = time + (period - phase) * step if is_of_end or (kind == Kind.SET and is_late) else time
         if isinstance(slave, Ride):
             if not 0 <= status <= 1:
                 return slave.recover(call, status, when)
-        elif call == slave.DO_STEP and 0 <= status <= _DISCARD:  # it was discarded, or ended early
-            slave.resume(time, period * step, status, final=True)
+        elif kind == Kind.STEP and 0 <= status <= _DISCARD:  # it was discarded, or ended early
+            slave.resume(time, period * step, status, final=not is_late)
             return False
         owner = self._coupling.slaves[slave.name]
         owner.time = when
-        if "Set" in call and 0 <= status <= 1:  # a number that its type does not hold
-            self._exchange.write(slave.name, time)
+        if kind == Kind.SET and 0 <= status <= 1:  # a number that its type does not hold
+            self._exchange.is_at_point = is_late
+            self._exchange.write(slave.name, when)
         if status >> 32 > 0 and not isinstance(slave, Ride):  # a call that was left, how, and with which exit code
             raise slave.lose(said(call, status >> 32, (status & 0x7FFFFFFF) - (status & 0x80000000)))
-        slave.check(call, status)
+        try:
+            slave.check(call, status)
+        except FmuError as error:
+            if kind != Kind.SLOPES or error.status == "fatal" or self._coupling.extrapolator is None:
+                raise
+            self._coupling.extrapolator.refuse(slave.name, error, time)
+            self.plan.courses.load()
+            return False
         self._exchange.check_finite(owner)
         return False
 

@@ -23,7 +23,7 @@ Points = Sequence[tuple[float, float]]
 
 
 @dataclass(frozen=True)
-class _Course:
+class Course:
     """The inputs of one instance that are continued, all of one feed: their places in it, and their names."""
 
     instance: str
@@ -44,17 +44,17 @@ class Extrapolator:
     """
 
     def __init__(self, exchange: Exchange, links: Sequence[Link], order: int, *, ended: bool = False) -> None:
-        self._order = order
+        self.order = order
         self._exchange = exchange
-        self._ended = ended
+        self.is_of_end = ended
         exchange.stamps = [0.0] * len(exchange.values)
         smooth = {link.target for link in links if _is_smooth(exchange, link)}
-        self._courses: dict[str, _Course] = {}
+        self.courses: dict[str, Course] = {}
         for name, feeds in exchange.feeds.items():
             for feed in feeds:
                 members = tuple(k for k, target in enumerate(feed.targets) if (name, target) in smooth)
                 if members:
-                    self._courses[name] = _Course(name, feed, members, tuple(feed.targets[k] for k in members))
+                    self.courses[name] = Course(name, feed, members, tuple(feed.targets[k] for k in members))
         self.orders: dict[str, int] = {}
         """Of instances that refused derivatives of the order wanted: the order they take."""
         self.said: dict[str, str] = {}
@@ -64,7 +64,7 @@ class Extrapolator:
 
     def begin(self, time: float) -> None:
         """Note the values at the start, in s."""
-        for name, course in self._courses.items():
+        for name, course in self.courses.items():
             values = self._exchange.inputs(course.feed, time)
             self.past[name] = [[(time, values[k])] for k in course.members]
 
@@ -73,7 +73,7 @@ class Extrapolator:
 
         ``ended``: the values are those of the end of the step.
         """
-        course = self._courses.get(name)
+        course = self.courses.get(name)
         if course is None:
             self._exchange.write(name, time)
             return
@@ -83,15 +83,15 @@ class Extrapolator:
                 feed.channel.set(values)
                 continue
             for past, k in zip(self.past[name], course.members, strict=True):
-                is_end = ended or self._ended
+                is_end = ended or self.is_of_end
                 at = time + length if is_end else self._exchange.stamps[feed.sources[k]]
-                former = [point for point in past if point[0] < at - _ROUNDING * length][-self._order :]
+                former = [point for point in past if point[0] < at - _ROUNDING * length][-self.order :]
                 past[:] = [*former, (at, values[k])]
             self._give(course, values, self.past[name], time)
 
-    def _give(self, course: _Course, values: list[float], past: Sequence[Points], time: float) -> None:
+    def _give(self, course: Course, values: list[float], past: Sequence[Points], time: float) -> None:
         """Set the inputs of a continued feed from a time in s on, by the polynomials through the past."""
-        order, given, derivatives = self.orders.get(course.instance, self._order), list(values), list[float]()
+        order, given, derivatives = self.orders.get(course.instance, self.order), list(values), list[float]()
         if order:
             for points, k in zip(past, course.members, strict=True):
                 given[k], *slopes = polynomial(points[-order - 1 :], time, order)
@@ -108,9 +108,18 @@ class Extrapolator:
         except FmuError as error:
             if error.status == "fatal":
                 raise
-            self.orders[course.instance] = order - 1
-            self.said.setdefault(course.instance, str(error).partition("\n")[0])
-            self._give(course, values, past, time)
+            self._lower(course, error, values, past, time)
+
+    def _lower(self, course: Course, error: FmuError, values: list[float], past: Sequence[Points], time: float) -> None:
+        """An instance has refused derivatives of its order: give it those of the next lower one from now on."""
+        self.orders[course.instance] = self.orders.get(course.instance, self.order) - 1
+        self.said.setdefault(course.instance, str(error).partition("\n")[0])
+        self._give(course, values, past, time)
+
+    def refuse(self, name: str, error: FmuError, time: float) -> None:
+        """An instance has refused in the compiled loop what its inputs' past gives for a step from a time in s."""
+        course = self.courses[name]
+        self._lower(course, error, self._exchange.inputs(course.feed, time), self.past[name], time)
 
     def report(self) -> dict[str, Any]:
         """Whose inputs are continued by less than was wanted, for the record of the run; empty where there are none."""
@@ -122,12 +131,12 @@ class Extrapolator:
 
     def continued(self, name: str, feed: Feed) -> list[list[tuple[float, float]]] | None:
         """What inputs of a feed are continued by now: the points of each; None where all of them are held."""
-        course = self._courses.get(name)
+        course = self.courses.get(name)
         return None if course is None or feed is not course.feed else [list(points) for points in self.past[name]]
 
     def give_again(self, name: str, values: Sequence[float], past: Sequence[Points], time: float) -> None:
         """Set the inputs of an instance's continued feed from another time in s on, as `continued` had them."""
-        self._give(self._courses[name], list(values), past, time)
+        self._give(self.courses[name], list(values), past, time)
 
     def restart(self) -> None:
         """Forget the past, after something has jumped: a polynomial through a jump would overshoot."""

@@ -17,7 +17,7 @@ from ..fmi.binding import Watch
 from ..times import slack
 from ..wiring import Link
 from .algebraic_loops import LoopSolver, find_feeders, find_loops
-from .algorithms import ALGORITHMS, Explicit, FixedStep, VariableStep
+from .algorithms import ALGORITHMS, Explicit, FixedStep, Programmed, VariableStep
 from .compiled import CompiledLoop
 from .coupling import Coupling
 from .events import Schedule
@@ -82,7 +82,9 @@ class Master:
             starts: start values.
             settings: how the run couples.
         """
-        is_plain = not settings.events and settings.stepping.algebraic_loops != "solve"
+        stepping = settings.stepping
+        is_plain = isinstance(self.algorithm, Explicit) and not (settings.events or stepping.extrapolation)
+        is_plain = is_plain and not stepping.refresh and stepping.algebraic_loops != "solve"
         if self._compiled is None or not is_plain or slaves != self.slaves or settings != self.coupling.settings:
             return False
         self._starts, self.coupling.steps = starts, 0
@@ -146,8 +148,7 @@ class Master:
         if coupling.extrapolator is not None:
             coupling.extrapolator.begin(start_time)
         self.exchange.remember()
-        if isinstance(self.algorithm, Explicit) and self._compiled is None:
-            self._compiled = CompiledLoop.of(coupling, self.algorithm)
+        self._compile()
 
     def _set_starts(self, slave: Slave) -> None:
         given = self._starts.get(slave.name, {})
@@ -215,12 +216,22 @@ class Master:
             stop = end
             if self._schedule is not None:
                 stop = int(min(end, self._schedule.next_point(start_time, step, self.steps)))
+            refresher, into = self.coupling.refresher, None if self._compiled is None else table
+            if refresher is not None and not refresher.is_decided:  # who refuses shows in the first step
+                stop, into = self.steps + 1, None if "String" in self.kinds else table
             take = self._run_in_python if self._compiled is None else partial(self._compiled.run, table=table)
-            kept = None if self._compiled is None or table is None else table.kept.tolist()
-            observed = self._eventful(step, stop, observe, kept)
+            observed = self._eventful(step, stop, observe, None if into is None else into.kept.tolist())
+            if into is not None and self._compiled is None:
+                observed = into.keeping(observed)
             if not take(start_time, step, (self.steps, stop, count), int(every), observed):
                 return False
+            self._compile()
         return True
+
+    def _compile(self) -> None:
+        """Let the compiled kernel take the steps from here on, if it can."""
+        if isinstance(self.algorithm, Programmed) and self._compiled is None:
+            self._compiled = CompiledLoop.of(self.coupling, self.algorithm)
 
     def _watching(self, observe: Observer) -> Observer:
         """An observer before whom what the instances share is looked at."""

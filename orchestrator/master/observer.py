@@ -60,6 +60,16 @@ class Table:
         cells[:, self.count : self.count + len(rows)] = rows.T
         self.count += len(rows)
 
+    def keeping(self, observe: Observer) -> Observer:
+        """An observer who keeps rows of all values here, and shows to another what is kept."""
+
+        def see(steps: int, rows: Rows) -> bool:
+            if len(rows):
+                self.append(np.array(rows, dtype=np.float64)[:, [0, *(self.kept + 1)]])
+            return observe(steps, self._cells[:, self.count - len(rows) : self.count].T)
+
+        return see
+
     def columns(self) -> NDArray[np.float64]:
         """A view of what there is, shape (columns, count)."""
         return self._cells[:, : self.count]

@@ -34,12 +34,13 @@ class Refresher:
         links: scalar connections.
 
     Attributes:
+        stages: instances in the order to visit them, and whether a stage's go round in a circle.
         refused: what instances said that refused, by name.
     """
 
     def __init__(self, exchange: Exchange, interfaces: Mapping[str, Interface], links: Sequence[Link]) -> None:
         self._exchange = exchange
-        self._stages = _stages(interfaces, links)
+        self.stages = _stages(interfaces, links)
         self.refused: dict[str, str] = {}
         self._willing = {name for name, interface in interfaces.items() if interface.annotation}
         """Those that have been read so, or are ours: what they fail of is no refusal."""
@@ -47,7 +48,12 @@ class Refresher:
     @property
     def instances(self) -> set[str]:
         """Those that are refreshed."""
-        return {name for stage, _ in self._stages for name in stage}
+        return {name for stage, _ in self.stages for name in stage}
+
+    @property
+    def is_decided(self) -> bool:
+        """Whether of each it is known whether it refuses."""
+        return self.instances <= self._willing | self.refused.keys()
 
     def refresh(self, time: float) -> None:
         """Set inputs and read outputs in dependency order, at a time in s.
@@ -59,7 +65,7 @@ class Refresher:
             FmuError: a value is not finite, or an FMU died.
         """
         values = self._exchange.values
-        for stage, is_circle in self._stages:
+        for stage, is_circle in self.stages:
             before = list(values)
             for _ in range(len(stage) + 1 if is_circle else 1):
                 last = list(values)

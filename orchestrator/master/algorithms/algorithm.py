@@ -14,6 +14,7 @@ from ...problems import Problem
 from ...system import System
 from ...wiring import Wiring
 from ..coupling import Coupling
+from .iteration import Iteration
 
 ALGORITHMS: dict[str, type[Algorithm]] = {}
 """All of them, by name."""
@@ -163,11 +164,13 @@ class VariableStep(Algorithm):
 
 
 class Operation(IntEnum):
-    """What is done to an instance; the kernel knows the numbers."""
+    """What is done to an instance; of outputs all are read, or those that depend directly on inputs, or the rest."""
 
     SET = 0
     STEP = 1
     GET = 2
+    GET_DIRECT = 3
+    GET_REST = 4
 
 
 @dataclass(frozen=True)
@@ -181,8 +184,28 @@ class Batch:
     names: tuple[str, ...]
 
 
-class Explicit(FixedStep):
-    """A fixed sequence of operations, the same in each step: the compiled loop can take it over, and so can others."""
+@dataclass(frozen=True)
+class Repeated:
+    """A batch that is repeated, instance by instance, from the states before it until what is passed on agrees."""
+
+    batch: Batch
+    iteration: Iteration
+
+
+class Programmed(FixedStep):
+    """A program of operations, the same in each step: the compiled loop can take it over."""
+
+    @abstractmethod
+    def program(self) -> Sequence[Batch | Repeated]:
+        """What is done in a step, in this order."""
+
+    @abstractmethod
+    def note_steps(self, count: int) -> None:
+        """So many steps have been taken by the compiled loop."""
+
+
+class Explicit(Programmed):
+    """A program in which nothing is repeated: others than the compiled loop can take it over, too."""
 
     takes_own_steps = True
 
@@ -200,6 +223,15 @@ class Explicit(FixedStep):
     def report(self) -> dict[str, Any]:
         """There is nothing to tell."""
         return {}
+
+    @final
+    def program(self) -> Sequence[Batch]:
+        """The batches."""
+        return self.batches()
+
+    @final
+    def note_steps(self, count: int) -> None:
+        """Nobody asks."""
 
     @abstractmethod
     def batches(self) -> Sequence[Batch]:

@@ -11,25 +11,24 @@ the run.
 
 from __future__ import annotations
 
-import math
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from typing import Any
 
-import numpy as np
-
-from ...errors import CouplingError, FmuError, StoppedError
+from ...errors import FmuError
 from ...fmi import Interface
 from ...system import System
 from ...times import digits
 from ...wiring import Link, Wiring, condensed, derive_order, graph_of, in_sequence
 from ..coupling import Coupling
-from .acceleration import ACCELERATIONS, Vector
-from .algorithm import Fit, FixedStep
+from .algorithm import Batch, Fit, Operation, Programmed, Repeated
+from .iteration import Iteration
 from .refusals import cannot, listed
 
 _TOLERANCE = 1e-8
 """Relative tolerance of what is exchanged, where the system gives none."""
+_TOLD = 100
+"""How many steps that went on unsettled are told one by one."""
 
 
 @dataclass(frozen=True)
@@ -57,22 +56,7 @@ def find_blocks(interfaces: Mapping[str, Interface], links: Iterable[Link]) -> B
     return Blocks(sweep, groups, cyclic)
 
 
-@dataclass
-class Tally:
-    """How the iterations went.
-
-    Communication ``steps``, ``iterations`` in all and at ``most``, the worst ``residual`` in units of the tolerance,
-    and the begins in s of steps that were taken ``unsettled``.
-    """
-
-    steps: int = 0
-    iterations: int = 0
-    most: int = 0
-    residual: float = 0.0
-    unsettled: list[float] = field(default_factory=list)
-
-
-class Iterative(FixedStep):
+class Iterative(Programmed):
     """Steps of coupled instances are repeated from saved states until what is exchanged agrees at their end."""
 
     name = "iterative"
@@ -82,17 +66,16 @@ class Iterative(FixedStep):
     def __init__(self, coupling: Coupling) -> None:
         super().__init__(coupling)
         settings, exchange = coupling.settings, coupling.exchange
-        self.exchange, self.tally = exchange, Tally()
+        self.exchange = exchange
         self.blocks = find_blocks(coupling.interfaces, exchange.links)
         self.tolerances = coupling.tolerances(_TOLERANCE, own_tolerances(self.blocks, coupling.interfaces))
-        self.unsettled = settings.stepping.unsettled
-        self.max_iterations = settings.stepping.max_iterations
-        self.relaxation, self.acceleration = settings.stepping.relaxation, settings.stepping.acceleration
-        self._exchanged = {
-            group: self._find_exchanged(group)
+        self._iterations = {
+            group: Iteration(exchange, *self._find_exchanged(group), self.tolerances, settings.stepping)
             for group in self.blocks.continuous
             if not self.blocks.cyclic.isdisjoint(group)
         }
+        self._program = self.program()
+        self._steps = 0
 
     @classmethod
     def fit(cls, system: System, interfaces: Mapping[str, Interface], wiring: Wiring) -> Fit:
@@ -121,10 +104,10 @@ class Iterative(FixedStep):
 
     # ---------------------------------------------------------------- on the way
 
-    def _find_exchanged(self, group: Sequence[str]) -> tuple[list[int], list[int]]:
-        """Places of the values that one of the group gives to another or itself.
+    def _find_exchanged(self, group: Sequence[str]) -> tuple[list[int], int]:
+        """Places of the values that one of the group gives to another or itself, and how many have to be guessed.
 
-        First those that are needed before their source has stepped, and have to be guessed; then the others.
+        These come first: they are needed before their source has stepped.
         """
         owners, at = self.exchange.owners, {name: k for k, name in enumerate(group)}
         passed = {
@@ -135,152 +118,93 @@ class Iterative(FixedStep):
             if age is None and owners[k] in at
         }
         guessed = {k for k, early in passed if early}
-        return sorted(guessed), sorted({k for k, _ in passed} - guessed)
+        return [*sorted(guessed), *sorted({k for k, _ in passed} - guessed)], len(guessed)
+
+    def program(self) -> Sequence[Batch | Repeated]:
+        """Sampled components; groups, repeated or not; and what the sampled ones show of the step's end."""
+        whole = (Operation.SET, Operation.STEP, Operation.GET)
+        early = (Operation.SET, Operation.STEP, Operation.GET_DIRECT)
+        found: list[Batch | Repeated] = [Batch(early, (name,)) for name in self.blocks.sampled]
+        for group in self.blocks.continuous:
+            iteration = self._iterations.get(group)
+            found += (
+                [Batch(whole, (name,)) for name in group]
+                if iteration is None
+                else [Repeated(Batch(whole, group), iteration)]
+            )
+        return [*found, Batch((Operation.GET_REST,), self.blocks.sampled)]
 
     def take(self, number: int, time: float, length: float) -> None:
         """Take a step, as `FixedStep.take` says."""
-        exchange, end = self.exchange, time + length
-        for name in self.blocks.sampled:
-            self.coupling.write(name, time, length)
-            exchange.slaves[name].step(time, length)
-            exchange.read_finite(exchange.slaves[name], end, direct=True)
-        for group in self.blocks.continuous:
-            if group in self._exchanged:
-                self._iterate(group, time, length)
-            else:
-                self._sweep(group, time, length, final=True)
-        for name in self.blocks.sampled:
-            exchange.read_finite(exchange.slaves[name], end, direct=False)
-        self.tally.steps += 1
+        for part in self._program:
+            if isinstance(part, Repeated):
+                self._repeat(part, time, length)
+                continue
+            for operation in part.operations:
+                for name in part.names:
+                    self._do(operation, name, time, length, final=True)
+        self._steps += 1
 
-    def _sweep(self, group: Sequence[str], time: float, length: float, *, final: bool) -> None:
-        for name in group:
-            self.coupling.write(name, time, length)
-            self.exchange.slaves[name].step(time, length, final=final)
-            self.exchange.read_finite(self.exchange.slaves[name], time + length)
+    def note_steps(self, count: int) -> None:
+        """So many steps have been taken by the compiled loop."""
+        self._steps += count
 
-    def _iterate(self, group: tuple[str, ...], time: float, length: float) -> None:
-        exchange, (guessed, passed) = self.exchange, self._exchanged[group]
-        slaves = [exchange.slaves[name] for name in group]
-        reals = [k for k in (*guessed, *passed) if exchange.kinds[k] == "Real"]
-        others = [k for k in (*guessed, *passed) if exchange.kinds[k] != "Real"]
-        unknowns = slice(sum(exchange.kinds[k] == "Real" for k in guessed))
+    def _do(self, operation: Operation, name: str, time: float, length: float, *, final: bool) -> None:
+        slave = self.exchange.slaves[name]
+        if operation == Operation.SET:
+            self.coupling.write(name, time, length)
+        elif operation == Operation.STEP:
+            slave.step(time, length, final=final)
+        else:
+            direct = {Operation.GET_DIRECT: True, Operation.GET_REST: False}.get(operation)
+            self.exchange.read_finite(slave, time + length, direct=direct)
+
+    def _repeat(self, part: Repeated, time: float, length: float) -> None:
+        names, iteration = part.batch.names, part.iteration
+        slaves = [self.exchange.slaves[name] for name in names]
         states = [slave.save() for slave in slaves]
         try:
-            next_guess = ACCELERATIONS[self.acceleration](self.relaxation)
-            wrong: list[int] = []
-            sizes: list[float] = []
-            error = scale = np.zeros(0)
-            for count in range(1, self.max_iterations + 1):
-                if count > 1:
+            iteration.begin()
+            agrees: bool | None = False
+            while agrees is False:
+                if iteration.round:
                     for slave, state in zip(slaves, states, strict=True):
                         slave.restore(state)
-                guess = np.array([exchange.values[k] for k in reals], dtype=np.float64)
-                flags = [exchange.values[k] for k in others]
+                iteration.begin_round()
                 try:
-                    self._sweep(group, time, length, final=False)
+                    for name in names:
+                        for operation in part.batch.operations:
+                            self._do(operation, name, time, length, final=False)
                 except FmuError as failure:
-                    if count == 1 or isinstance(failure, StoppedError):
+                    told = iteration.explain(failure, time, length)
+                    if told is failure:
                         raise
-                    said = str(failure).partition("\n")[0]
-                    raise self._failure((time, length), wrong, error, sizes, said) from failure
-                reached = np.array([exchange.values[k] for k in reals], dtype=np.float64)
-                distance = np.abs(reached - guess)
-                error = distance / self._scale(reals, guess, reached)
-                if count == 1:  # the size of each value, for the method that combines them
-                    scale = self._scale(reals, guess, reached)
-                sizes.append(_largest(distance / scale))
-                wrong = [reals[k] for k in np.argsort(error)[::-1] if error[k] > 1.0]
-                wrong += [k for k, flag in zip(others, flags, strict=True) if flag != exchange.values[k]]
-                if not wrong:
-                    self._count(count, _largest(error))
-                    return
-                u = unknowns
-                following = next_guess(guess[u] / scale[u], reached[u] / scale[u]) * scale[u]
-                if not np.isfinite(following).all() or sizes[-1] > _HOPELESS * max(sizes[0], 1.0):
-                    break
-                for k, value in zip(reals[u], following, strict=True):
-                    exchange.values[k] = float(value)
-            if not self._goes_on_with(reals, reached, sizes, time):
-                raise self._failure((time, length), wrong, error, sizes)
+                    raise told from failure
+                agrees = iteration.end_round()
+            if agrees is None:
+                iteration.give_up(time, length)
         finally:
             for slave, state in zip(slaves, states, strict=True):
                 slave.forget(state)
 
-    def _goes_on_with(self, places: Sequence[int], reached: Vector, sizes: Sequence[float], time: float) -> bool:
-        """Whether the last iterate, of which the FMUs' states are, may stand though nothing settled; note it if so."""
-        if self.unsettled == "stop" or not np.isfinite(reached).all() or sizes[-1] > _GROWN * sizes[0]:
-            return False
-        for k, value in zip(places, reached, strict=True):
-            self.exchange.values[k] = float(value)
-        self._count(len(sizes), 0.0)
-        self.tally.unsettled.append(time)
-        return True
-
-    def _scale(self, places: Sequence[int], a: Vector, b: Vector) -> Vector:
-        bounds = np.array([self.tolerances[k] for k in places]).reshape(-1, 2)
-        return np.asarray(bounds[:, 1] + bounds[:, 0] * np.maximum(np.abs(a), np.abs(b)) + 1e-300)
-
-    def _count(self, iterations: int, worst: float) -> None:
-        self.tally.iterations += iterations
-        self.tally.most = max(self.tally.most, iterations)
-        self.tally.residual = max(self.tally.residual, worst)
-
-    def _failure(
-        self, step: tuple[float, float], wrong: Sequence[int], error: Vector, sizes: Sequence[float], failure: str = ""
-    ) -> CouplingError:
-        """What to say of iterations that led nowhere.
-
-        Args:
-            step: its begin and its length in s.
-            wrong: places of the values that disagree.
-            error: by how much those do that are real, in units of the tolerance.
-            sizes: how far apart values were at most, for each iteration.
-            failure: what an FMU failed of in the one after them, if it did.
-        """
-        names = ", ".join(self.exchange.signals[k] for k in wrong[:_SHOWN])
-        grows = bool(failure) or sizes[-1] > _GROWN * sizes[0]
-        worst = _largest(error)
-        what = f"still disagree by {worst:.3g} times the tolerance" if worst > 1.0 else "still change"
-        if failure:
-            what += f", and with the next guess an FMU fails ({failure})"
-        enough = 0.0
-        if worst > 1.0 and not grows:
-            enough = _rounded_up(max(sizes[-_LAST:]) * max(self.tolerances[k][0] for k in wrong))
-        ways = ["a smaller step"]
-        ways += [f"simulation.tolerance = {enough:g}"] if 0.0 < enough < _LOOSE else []
-        ways += [] if grows else ["more simulation.max_iterations"]
-        ways += [] if self.acceleration == "anderson" else ['simulation.acceleration = "anderson"']
-        return CouplingError(
-            f"t = {digits(step[0])} s: the coupling through {names} "
-            f"{'diverges' if grows else 'does not converge'}: after "
-            f"{len(sizes)} iterations of the step of {digits(step[1])} s they {what}; take "
-            f"{', '.join(ways)} or a smaller "
-            "simulation.relaxation"
-        )
-
     def report(self) -> dict[str, Any]:
         """Iterations and the worst residual."""
-        tally = self.tally
-        mean = tally.iterations / tally.steps if tally.steps else 0.0
+        counted = [iteration.counted() for iteration in self._iterations.values()]
+        mean = sum(each[0] for each in counted) / self._steps if self._steps else 0.0
+        most, worst = max((each[1] for each in counted), default=0), max((each[2] for each in counted), default=0.0)
+        begins = sorted(time for iteration in self._iterations.values() for time in iteration.unsettled)
+        told = ""
+        if begins:
+            told = f"; {len(begins)} of {self._steps} steps went on unsettled, the first from t = {digits(begins[0])} s"
         return {
             "iterations_per_step": mean,
-            "most_iterations": tally.most,
-            "worst_residual_per_tolerance": tally.residual,
-            "unsettled": len(tally.unsettled),
-            "first_unsettled": tally.unsettled[:_TOLD],
-            "summary": f"{mean:.3g} iterations per step, at most {tally.most}; worst residual {tally.residual:.2g} of "
-            f"the tolerance{self._unsettled()}",
+            "most_iterations": most,
+            "worst_residual_per_tolerance": worst,
+            "unsettled": len(begins),
+            "first_unsettled": begins[:_TOLD],
+            "summary": f"{mean:.3g} iterations per step, at most {most}; worst residual {worst:.2g} of "
+            f"the tolerance{told}",
         }
-
-    def _unsettled(self) -> str:
-        """What to say of steps that were taken though nothing agreed."""
-        begins = self.tally.unsettled
-        if not begins:
-            return ""
-        return (
-            f"; {len(begins)} of {self.tally.steps} steps went on unsettled, the first from t = {digits(begins[0])} s"
-        )
 
 
 def own_tolerances(blocks: Blocks, interfaces: Mapping[str, Interface]) -> dict[str, float]:
@@ -291,22 +215,3 @@ def own_tolerances(blocks: Blocks, interfaces: Mapping[str, Interface]) -> dict[
         if _TOLERANCE < coarsest < 1.0 and not blocks.cyclic.isdisjoint(group):
             found.update(dict.fromkeys(group, coarsest))
     return found
-
-
-def _rounded_up(value: float) -> float:
-    """The next number with one digit that is not less."""
-    if not 0.0 < value < math.inf:
-        return 0.0
-    unit = 10.0 ** math.floor(math.log10(value))
-    return math.ceil(value / unit) * unit
-
-
-def _largest(errors: Vector) -> float:
-    return float(errors.max(initial=0.0))
-
-
-_HOPELESS, _GROWN = 1e12, 10.0
-"""How many times farther apart than at first values are that nothing will bring together, or that are getting away."""
-_LAST, _LOOSE = 5, 0.01
-"""Iterations whose distances tell how near they get, and the tolerance from which on none is advised."""
-_SHOWN, _TOLD = 3, 100

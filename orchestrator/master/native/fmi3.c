@@ -83,7 +83,7 @@ const Call *take_steps_3(const Hand *hand, const Group *group, double time, doub
         told->ends = told->early = false;
         told->reached = NAN;
         note_call(hand, call);
-        int found = do_step(call->component, time, step, true, (bool *)&told->waits, (bool *)&told->ends,
+        int found = do_step(call->component, time, step, !group->is_late, (bool *)&told->waits, (bool *)&told->ends,
                             (bool *)&told->early, &told->reached);
         if (is_failure(found) || told->ends || told->early) {
             *status = found;
@@ -126,7 +126,7 @@ const Call *get_3(const Hand *hand, const Group *group, int *status)
         for (size_t k = 0; k < group->count; k++) {
             double value = taken(group->type, hand->reals, k);
             hand->plan->values[call->entries[k].place] = value;
-            finite &= !is_real || isfinite(value);
+            finite &= group->is_unseen || !is_real || isfinite(value);
         }
         if (!finite) {
             return call;

@@ -6,7 +6,8 @@
    and takes over between blocks for progress, flushing and interruption.
 
    This file is what Python sees of it; plan.c makes a plan of Python's arrays, stepping.c takes the steps, team.c with
-   several threads. growth.c looks at what came of them. */
+   several threads; loops.c repeats them, with acceleration.c, and courses.c continues inputs. growth.c looks at what came of
+   them. */
 
 #include "growth.h"
 #include "plan.h"
@@ -69,8 +70,9 @@ static int take(Plan *plan, const Block *block, Outcome *outcome)
 }
 
 PyDoc_STRVAR(run_doc,
-    "run(operations, parts, channels, instances, entries, references, changes, kept, values, history, newest, table, row,\n"
-    "    places, disturbed, every, start, step, first, count, last) -> (done, written, newest)\n\n"
+    "run(operations, parts, channels, instances, entries, references, forms, courses, loops, passed, points, states, work,\n"
+    "    stamps, changes, kept, values, history, newest, table, row, places, disturbed, every, start, step, first, count,\n"
+    "    last) -> (done, written, newest)\n\n"
     "Take up to `count` communication steps from number `first`. Of every `every`-th step and of step number `last` the\n"
     "time and the values that are `kept`, by place, become the next elements of the columns of `table`, one after the\n"
     "other, from element `row` on; the block ends before one for which there is no room, and where an operation\n"
@@ -85,8 +87,9 @@ static PyObject *run(PyObject *module, PyObject *arguments)
     Py_ssize_t newest, row;
     PyObject *result = NULL;
     (void)module;
-    if (!PyArg_ParseTuple(arguments, "y*y*y*y*y*y*y*y*y*w*w*nw*nw*w*LddLLL:run", &b[OPERATIONS], &b[PARTS], &b[CHANNELS],
-                          &b[INSTANCES], &b[ENTRIES], &b[REFERENCES], &b[FORMS], &b[CHANGES], &b[KEPT], &b[VALUES], &b[HISTORY],
+    if (!PyArg_ParseTuple(arguments, "y*y*y*y*y*y*y*y*y*y*w*w*w*w*y*y*w*w*nw*nw*w*LddLLL:run", &b[OPERATIONS], &b[PARTS], &b[CHANNELS],
+                          &b[INSTANCES], &b[ENTRIES], &b[REFERENCES], &b[FORMS], &b[COURSES], &b[LOOPS], &b[PASSED], &b[POINTS], &b[STATES],
+                          &b[WORK], &b[STAMPS], &b[CHANGES], &b[KEPT], &b[VALUES], &b[HISTORY],
                           &newest, &b[TABLE], &row, &b[PLACES], &b[DISTURBED], &block.every, &block.start, &block.step,
                           &block.first, &block.count, &block.last)) {
         return NULL;

@@ -15,7 +15,16 @@
 #include <stddef.h>
 #include <stdint.h>
 
-enum { OPERATION_SET = 0, OPERATION_STEP = 1, OPERATION_GET = 2, OPERATION_CHANGE = 3 };
+enum {
+    OPERATION_SET = 0, OPERATION_STEP = 1, OPERATION_GET = 2, OPERATION_CHANGE = 3,
+    OPERATION_READ = 4,   /* get what need not be finite, */
+    OPERATION_LOOK = 5,   /* and look whether it is */
+    OPERATION_STAMP = 6,  /* note what time values that were read belong to */
+    OPERATION_EXTEND = 7, /* set inputs that go on during a step, */
+    OPERATION_SLOPES = 8, /* and their derivatives */
+    OPERATION_BEGIN = 9, OPERATION_MARK = 10, OPERATION_END = 11, /* what is repeated: see `Loop` */
+    OPERATION_SAVE = 12, OPERATION_RESTORE = 13, OPERATION_FORGET = 14, /* states */
+};
 
 enum { AS_IT_IS = 0, TRUE_ABOVE = 1, ROUNDED_UP = 2 };
 
@@ -82,11 +91,66 @@ typedef struct {
 
 typedef struct {
     int32_t kind;
-    int32_t index;  /* of the channel, instance or change */
+    int32_t index;  /* of the channel, instance, change, course, loop or state */
     int32_t period; /* it is due in every so manyth step, */
     int32_t phase;  /* in those with this rest */
     int32_t is_watched; /* whether it may change how numbers are rounded */
+    int32_t is_late;    /* what is set is of the step's end; a step is not the last word: a state may be restored */
 } Operation;
+
+/* The last values of an input, and the times that they belong to, newest last. */
+typedef struct {
+    double times[3];
+    double values[3];
+    double slopes[2]; /* its derivatives over the coming step */
+    int64_t count;
+    int64_t place;     /* in its channel */
+    int64_t reference; /* value reference */
+} Points;
+
+/* Inputs of a channel that go on during a step: polynomials through their last values. */
+typedef struct {
+    uint64_t function; /* address of fmi2SetRealInputDerivatives */
+    int64_t channel;
+    int64_t begin; /* first of its points */
+    int64_t count; /* number of its inputs that go on */
+    int64_t depth; /* former values that are kept */
+    int64_t order; /* of the polynomials, at most `depth`; 0: the FMU takes no derivatives */
+    int64_t is_of_end; /* whether values are those of the step's end, and not of the time that is noted of them */
+} Course;
+
+/* The saved state of an instance. */
+typedef struct {
+    uint64_t save, restore, forget; /* addresses of fmi2GetFMUstate, fmi2SetFMUstate, fmi2FreeFMUstate */
+    uint64_t component;
+    uint64_t handle; /* that the FMU gave; 0 */
+} State;
+
+/* What is repeated: BEGIN; what comes before each but the first round; MARK; a round; END.
+
+   A circle goes round until no value changes; after so many rounds all are again as they were. An iteration goes round
+   until what is passed on agrees with what was guessed; after so many rounds it is lost.
+
+   Its numbers stand in the work space: a head, and of a circle all values as they were before it and before this round;
+   of an iteration what iteration.py lays out there. */
+typedef struct {
+    int64_t kind;
+    int64_t limit; /* rounds */
+    int64_t work;  /* where its numbers begin */
+    int64_t begin; /* first of the places of the values that are compared: so many real numbers, */
+    int64_t real_count;
+    int64_t guess_count; /* of which the first are guessed, */
+    int64_t other_count; /* and others */
+    int64_t method; /* by which the next guess is made */
+    double relaxation;
+} Loop;
+
+enum { CIRCLE = 0, ITERATION = 1 };
+
+enum { RELAXED = 0, AITKEN = 1, ANDERSON = 2 };
+
+/* The head of a loop's numbers. */
+enum { ROUND, COMPARED, ROUNDS, MOST_ROUNDS, RESIDUAL, HEAD = 8 };
 
 /* How far a part of a step that was left has got; each thread has one. The others go on with a part that has failed only
    when it is said to have not: by who knows what comes first, and whether it can be helped. */
@@ -98,7 +162,10 @@ typedef struct {
 
 /* ------------------------------------------------------------------------------------------------ the plan, as it runs */
 
-typedef enum { STEP, SET_REALS_IN_PLACE, SET_REALS, SET_INTEGERS, GET_REALS, GET_INTEGERS, CHANGE, STEP_3, SET_3, GET_3 } Kind;
+typedef enum {
+    STEP, SET_REALS_IN_PLACE, SET_REALS, SET_INTEGERS, GET_REALS, GET_INTEGERS, CHANGE, STEP_3, SET_3, GET_3, LOOK, STAMP, EXTEND,
+    SLOPES, SAVE, RESTORE, FORGET, BEGIN, MARK, END,
+} Kind;
 
 /* One operation. */
 typedef struct {
@@ -108,6 +175,9 @@ typedef struct {
     union {
         const Change *change;
         Told *told;
+        const Course *course;
+        State *state;
+        Loop *loop;
     };
 } Call;
 
@@ -122,6 +192,8 @@ typedef struct {
     int32_t period;
     int32_t phase;
     int32_t is_watched;
+    int32_t is_late;
+    int32_t is_unseen; /* what is read need not be finite */
     Call *begin;
     Call *end;
 } Group;
@@ -140,6 +212,12 @@ typedef struct {
     size_t depth;
     size_t newest; /* the ring's newest row */
     const Change *changes;
+    Points *points;
+    double *stamps; /* what time each of the values belongs to; NULL where nobody asks */
+    Loop *loops;
+    size_t *loop_groups; /* of each loop those of BEGIN and MARK, from 1 */
+    const int64_t *passed; /* places of the values that loops compare */
+    double *work;
     const int64_t *forms; /* of the values; NULL where all of them are numbers */
     int64_t *disturbed; /* by operation, after which of its steps numbers were first rounded in another way, from 1 */
     unsigned control; /* how numbers are rounded when the block begins, as `float_control` has it, */
@@ -159,7 +237,8 @@ typedef struct {
 /* When a communication step is. */
 typedef struct {
     long long number;
-    double time;
+    double start; /* of the run, */
+    double time;  /* and of the step */
     double step;
     int is_due; /* whether its row is to be written */
 } Advance;
@@ -238,6 +317,30 @@ double number_of(double value, int64_t form);
 const Call *take_steps_3(const Hand *hand, const Group *group, double time, double step, int *status);
 const Call *set_3(const Hand *hand, const Group *group, double time, int *status);
 const Call *get_3(const Hand *hand, const Group *group, int *status);
+
+/* The same for what else there is to do (courses.c, states.c); values that are looked at, stamped or extended. */
+const Call *look_at(const Plan *plan, const Group *group, int *status);
+void stamp(const Plan *plan, const Group *group, const Advance *it);
+const Call *extend(const Hand *hand, const Group *group, const Advance *it, int *status);
+const Call *set_slopes(const Hand *hand, const Group *group, int *status);
+const Call *treat_states(const Hand *hand, const Group *group, int *status);
+
+typedef enum { ON, AGAIN, LOST } Way_on;
+
+/* Loops (loops.c): a loop begins, a round of it begins, and whether there is another one. */
+void begin_loop(const Plan *plan, const Loop *loop);
+void begin_round(const Plan *plan, const Loop *loop);
+Way_on end_round(const Plan *plan, const Loop *loop);
+
+/* How many numbers a loop needs in the work space. */
+size_t work_of(const Plan *plan, const Loop *loop);
+
+/* The next guess in the place of the last one, from what it led to; 0 if it is not finite (acceleration.c). */
+int accelerate(int64_t method, double relaxation, size_t count, int is_first, double *guess, double *reached,
+               double *work);
+
+/* How many numbers that needs in the work space. */
+size_t work_of_acceleration(int64_t method, size_t count);
 
 /* That of a block of which nothing is done. */
 Outcome outcome_of(const Block *block);

@@ -11,13 +11,15 @@
 #include <string.h>
 
 static const char *const buffer_names[N_BUFFERS] = {
-    "operations", "parts", "channels", "instances", "entries", "references", "forms", "changes", "kept", "values",
-    "history", "table", "places", "disturbed",
+    "operations", "parts", "channels", "instances", "entries", "references", "forms", "courses", "loops", "passed",
+    "points", "states", "work", "stamps", "changes", "kept", "values", "history", "table", "places", "disturbed",
 };
 static const size_t buffer_sizes[N_BUFFERS] = {
     sizeof(Operation), sizeof(int64_t), sizeof(Channel), sizeof(Instance), sizeof(Entry),
-    sizeof(unsigned),  sizeof(int64_t), sizeof(Change),  sizeof(int64_t),  sizeof(double),
-    sizeof(double),    sizeof(double),  sizeof(Place),   sizeof(int64_t),
+    sizeof(unsigned),  sizeof(int64_t), sizeof(Course),  sizeof(Loop),     sizeof(int64_t),
+    sizeof(Points),    sizeof(State),   sizeof(double),  sizeof(double),   sizeof(Change),
+    sizeof(int64_t),   sizeof(double),  sizeof(double),  sizeof(double),   sizeof(Place),
+    sizeof(int64_t),
 };
 
 size_t length(const Py_buffer *buffers, int which)
@@ -50,6 +52,10 @@ static int check_buffers(const Py_buffer *buffers)
         PyErr_SetString(PyExc_ValueError, "kernel: there must be a form for each of the values, or none at all");
         return 0;
     }
+    if (length(buffers, STAMPS) != 0 && length(buffers, STAMPS) != value_count) {
+        PyErr_SetString(PyExc_ValueError, "kernel: there must be a stamp for each of the values, or none at all");
+        return 0;
+    }
     if (value_count > 0 && length(buffers, HISTORY) % value_count != 0) {
         PyErr_SetString(PyExc_ValueError, "kernel: the history must be whole rows of values");
         return 0;
@@ -57,46 +63,14 @@ static int check_buffers(const Py_buffer *buffers)
     return 1;
 }
 
-/* Whether so many elements, which are not less than none, stand from one on. */
-static int is_within(int64_t begin, int64_t count, size_t length)
-{
-    return begin >= 0 && (uint64_t)begin <= length && (uint64_t)count <= length - (uint64_t)begin;
-}
-
-/* Whether a channel's entries can be read (or stand side by side among the values, where they must). */
-static int entries_fit(const Plan *plan, const Entry *entries, int64_t count, size_t change_count, int is_row)
-{
-    for (int64_t k = 0; k < count; k++) {
-        const Entry *entry = &entries[k];
-        if (!is_within(entry->place, 1, plan->value_count) || entry->age < -1 || entry->change < -1 ||
-            (entry->change >= 0 && (uint64_t)entry->change >= change_count) ||
-            (entry->age >= 0 && (uint64_t)entry->age >= plan->depth) ||
-            (is_row && entry->place != entries[0].place + k)) {
-            return 0;
-        }
-    }
-    return 1;
-}
-
-/* Whether the values stand among the live ones as they are to be set. */
-static int are_in_place(const Entry *entries, int64_t count)
-{
-    for (int64_t k = 0; k < count; k++) {
-        if (entries[k].form != NUMBER || entries[k].age >= 0 || entries[k].change >= 0 || entries[k].scale != 1.0 || entries[k].offset != 0.0 ||
-            entries[k].place != entries[0].place + k) {
-            return 0;
-        }
-    }
-    return 1;
-}
-
 /* One operation as a group of a single call; 0 if it points outside the plan. */
-static int resolve(const Plan *plan, const Py_buffer *buffers, const Operation *operation, Group *group, Call *call)
+static int resolve(Plan *plan, const Py_buffer *buffers, const Operation *operation, Group *group, Call *call)
 {
     *group = (Group){.begin = call, .end = call + 1};
     group->period = operation->period;
     group->phase = operation->phase;
     group->is_watched = operation->is_watched;
+    group->is_late = operation->is_late;
     *call = (Call){0};
     if (operation->period < 1 || operation->phase < 0 || operation->phase >= operation->period) {
         return 0;
@@ -124,41 +98,24 @@ static int resolve(const Plan *plan, const Py_buffer *buffers, const Operation *
         call->component = (void *)(uintptr_t)instance->component;
         return group->function != 0;
     }
-    int is_get = operation->kind == OPERATION_GET;
-    if ((!is_get && operation->kind != OPERATION_SET) ||
-        !is_within(operation->index, 1, length(buffers, CHANNELS))) {
-        return 0;
+    switch (operation->kind) {
+    case OPERATION_SET: case OPERATION_GET: case OPERATION_READ: case OPERATION_LOOK: case OPERATION_STAMP:
+        return resolve_channel(plan, buffers, operation, operation->index, group, call);
+    case OPERATION_EXTEND: case OPERATION_SLOPES:
+        return resolve_course(plan, buffers, operation, group, call);
+    case OPERATION_BEGIN: case OPERATION_MARK: case OPERATION_END:
+        return resolve_loop(plan, buffers, operation, group, call);
+    default:
+        return resolve_state(buffers, operation, group, call);
     }
-    const Channel *channel = (const Channel *)buffers[CHANNELS].buf + operation->index;
-    if (channel->count < 1 || !is_within(channel->begin, channel->count, length(buffers, ENTRIES)) ||
-        channel->type < 0 || channel->type > TYPE_BOOLEAN || channel->reference_count < 1 ||
-        channel->reference_count > channel->count) {
-        return 0;
-    }
-    const Entry *entries = (const Entry *)buffers[ENTRIES].buf + channel->begin;
-    if (!entries_fit(plan, entries, channel->count, length(buffers, CHANGES), is_get && channel->type == 0)) {
-        return 0;
-    }
-    int in_place = channel->type == 0 && channel->is_real && (is_get || are_in_place(entries, channel->count));
-    group->kind = channel->type ? (is_get ? GET_3 : SET_3)
-                  : in_place ? (is_get ? GET_REALS : SET_REALS_IN_PLACE)
-                           : (is_get ? GET_INTEGERS : channel->is_real ? SET_REALS : SET_INTEGERS);
-    group->function = (uintptr_t)channel->function;
-    group->references = (const unsigned int *)buffers[REFERENCES].buf + channel->begin;
-    group->count = (size_t)channel->count;
-    group->reference_count = (size_t)channel->reference_count;
-    group->type = (int)channel->type;
-    call->component = (void *)(uintptr_t)channel->component;
-    call->values = plan->values + (in_place || is_get ? entries[0].place : 0);
-    call->entries = entries;
-    return group->function != 0;
 }
 
 /* Whether calls are alike; one after which to look at how numbers are rounded stands alone. */
 static int are_alike(const Group *a, const Group *b)
 {
     return !b->is_watched && a->kind == b->kind && a->function == b->function && a->count == b->count &&
-           a->period == b->period && a->phase == b->phase &&
+           a->period == b->period && a->phase == b->phase && a->is_late == b->is_late &&
+           a->is_unseen == b->is_unseen && b->kind < BEGIN &&
            (a->count == 0 || memcmp(a->references, b->references, a->count * sizeof *a->references) == 0);
 }
 
@@ -167,6 +124,7 @@ void free_plan(Plan *plan)
     free(plan->calls);
     free(plan->groups);
     free(plan->bounds);
+    free(plan->loop_groups);
 }
 
 /* Where the operations of each part end: one part, or for each of n threads one that sets and steps, and then for each
@@ -221,6 +179,11 @@ int make_plan(Plan *plan, const Py_buffer *buffers, Py_ssize_t newest)
     plan->newest = (size_t)newest;
     plan->changes = buffers[CHANGES].buf;
     plan->forms = length(buffers, FORMS) == 0 ? NULL : buffers[FORMS].buf;
+    plan->points = buffers[POINTS].buf;
+    plan->stamps = length(buffers, STAMPS) == 0 ? NULL : buffers[STAMPS].buf;
+    plan->loops = buffers[LOOPS].buf;
+    plan->passed = buffers[PASSED].buf;
+    plan->work = buffers[WORK].buf;
     plan->disturbed = buffers[DISTURBED].buf;
     plan->largest = 1;
     if (!check_parts(plan, buffers, count) || !check_places(plan, buffers, count)) {
@@ -228,7 +191,8 @@ int make_plan(Plan *plan, const Py_buffer *buffers, Py_ssize_t newest)
     }
     plan->calls = calloc(count + 1, sizeof *plan->calls);
     plan->groups = calloc(count + 1, sizeof *plan->groups);
-    if (plan->calls == NULL || plan->groups == NULL) {
+    plan->loop_groups = calloc(2 * length(buffers, LOOPS) + 1, sizeof *plan->loop_groups);
+    if (plan->calls == NULL || plan->groups == NULL || plan->loop_groups == NULL) {
         PyErr_NoMemory();
         return 0;
     }
@@ -252,6 +216,10 @@ int make_plan(Plan *plan, const Py_buffer *buffers, Py_ssize_t newest)
     }
     for (size_t n = part + 1; n <= length(buffers, PARTS); n++) {
         plan->bounds[n] = plan->group_count;
+    }
+    if (!are_loops_closed(plan, buffers)) {
+        PyErr_SetString(PyExc_ValueError, "kernel: each loop must begin, mark its rounds and end");
+        return 0;
     }
     return 1;
 }

@@ -9,10 +9,10 @@
 
 #include "kernel.h"
 
-/* Buffers in the sequence of the arguments; `values` and what follows is written. */
+/* Buffers in the sequence of the arguments; `points` and what follows is written. */
 enum {
-    OPERATIONS, PARTS, CHANNELS, INSTANCES, ENTRIES, REFERENCES, FORMS, CHANGES, KEPT, VALUES, HISTORY, TABLE, PLACES,
-    DISTURBED,
+    OPERATIONS, PARTS, CHANNELS, INSTANCES, ENTRIES, REFERENCES, FORMS, COURSES, LOOPS, PASSED, POINTS, STATES, WORK, STAMPS,
+    CHANGES, KEPT, VALUES, HISTORY, TABLE, PLACES, DISTURBED,
     N_BUFFERS
 };
 
@@ -30,6 +30,22 @@ int make_plan(Plan *plan, const Py_buffer *buffers, Py_ssize_t newest);
 int make_room(Block *block, const Plan *plan, const Py_buffer *buffers, Py_ssize_t row);
 
 void free_plan(Plan *plan);
+
+/* Whether so many elements, which are not less than none, stand from one on. */
+static inline int is_within(int64_t begin, int64_t count, size_t length)
+{
+    return begin >= 0 && (uint64_t)begin <= length && (uint64_t)count <= length - (uint64_t)begin;
+}
+
+/* What an operation on a channel, a course, a state or a loop is (resolving.c); 0 if it points outside the plan. */
+int resolve_channel(const Plan *plan, const Py_buffer *buffers, const Operation *operation, int64_t index, Group *group,
+                    Call *call);
+int resolve_course(Plan *plan, const Py_buffer *buffers, const Operation *operation, Group *group, Call *call);
+int resolve_state(const Py_buffer *buffers, const Operation *operation, Group *group, Call *call);
+int resolve_loop(Plan *plan, const Py_buffer *buffers, const Operation *operation, Group *group, Call *call);
+
+/* Whether each loop's operations come one after the other. */
+int are_loops_closed(const Plan *plan, const Py_buffer *buffers);
 
 /* The sizes of what the buffers hold in one number, by which Python knows a kernel that other sources were compiled to. */
 uint32_t layout(void);

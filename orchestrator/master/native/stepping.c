@@ -64,7 +64,7 @@ static const Call *take_steps(const Hand *hand, const Group *group, double time,
     const Call *end = group->end;
     for (const Call *call = group->begin; call < end; call++) {
         note_call(hand, call);
-        int found = do_step(call->component, time, step, 1);
+        int found = do_step(call->component, time, step, !group->is_late);
         if (is_failure(found)) {
             *status = found;
             return call;
@@ -140,6 +140,7 @@ static const Call *get_reals(const Hand *hand, const Group *group, int *status)
         for (size_t k = 0; k < count; k++) {
             finite &= isfinite(call->values[k]) != 0;
         }
+        finite |= group->is_unseen;
         if (is_failure(found) || !finite) {
             *status = found;
             return call;
@@ -173,20 +174,43 @@ static const Call *change_values(const Group *group, double time)
     return group->end;
 }
 
-static const Call *take_group(const Hand *hand, const Group *group, double time, double step, int *status)
+static const Call *take_group(const Hand *hand, const Group *group, const Advance *it, int *status)
 {
+    double time = it->time, step = it->step, when = group->is_late ? time + step : time;
     switch (group->kind) {
     case STEP: return take_steps(hand, group, time, (double)group->period * step, status);
     case SET_REALS_IN_PLACE: return set_reals_in_place(hand, group, status);
-    case SET_REALS: return set_reals(hand, group, time, status);
-    case SET_INTEGERS: return set_integers(hand, group, time, status);
+    case SET_REALS: return set_reals(hand, group, when, status);
+    case SET_INTEGERS: return set_integers(hand, group, when, status);
     case GET_REALS: return get_reals(hand, group, status);
     case GET_INTEGERS: return get_integers(hand, group, status);
     case STEP_3: return take_steps_3(hand, group, time, (double)group->period * step, status);
-    case SET_3: return set_3(hand, group, time, status);
+    case SET_3: return set_3(hand, group, when, status);
     case GET_3: return get_3(hand, group, status);
+    case LOOK: return look_at(hand->plan, group, status);
+    case STAMP: stamp(hand->plan, group, it); return group->end;
+    case EXTEND: return extend(hand, group, it, status);
+    case SLOPES: return set_slopes(hand, group, status);
+    case SAVE: case RESTORE: case FORGET: return treat_states(hand, group, status);
     default: return change_values(group, time + step);
     }
+}
+
+/* Where a loop leads from here: a group to go on before, or NULL where it was lost. */
+static const Group *lead(const Plan *plan, const Group *group)
+{
+    const Loop *loop = group->begin->loop;
+    const size_t *groups = &plan->loop_groups[2 * (loop - plan->loops)];
+    if (group->kind == BEGIN) {
+        begin_loop(plan, loop);
+        return plan->groups + groups[1] - 2; /* they are counted from 1; the one before MARK */
+    }
+    if (group->kind == MARK) {
+        begin_round(plan, loop);
+        return group;
+    }
+    Way_on way = end_round(plan, loop);
+    return way == AGAIN ? plan->groups + groups[0] - 1 : way == ON ? group : NULL;
 }
 
 void take_part(Hand *hand, int part, const Advance *it, Place *place)
@@ -199,6 +223,17 @@ void take_part(Hand *hand, int part, const Advance *it, Place *place)
         if (group->end <= from || (group->period > 1 && it->number % group->period != group->phase)) {
             continue;
         }
+        if (group->kind >= BEGIN) {
+            const Group *next = lead(plan, group);
+            if (next == NULL) {
+                place->failed = group->begin - plan->calls;
+                place->status = 0;
+                break;
+            }
+            from = next < group ? plan->calls : from; /* what was done before is to be done again */
+            group = next;
+            continue;
+        }
         Group rest;
         const Group *taken = group;
         if (group->begin < from) { /* taken up again in the middle */
@@ -209,7 +244,7 @@ void take_part(Hand *hand, int part, const Advance *it, Place *place)
         hand->group = group;
         hand->note->function = group->function;
         int status = 0;
-        const Call *call = take_group(hand, taken, it->time, it->step, &status);
+        const Call *call = take_group(hand, taken, it, &status);
         if (group->is_watched && float_control() != plan->control) { /* an FMU must not change the numbers of others */
             fesetenv(&plan->floats);
             int64_t *mark = &plan->disturbed[group->begin - plan->calls]; /* a group of its own */
@@ -249,6 +284,7 @@ int has_next(const Block *block, const Outcome *outcome, Advance *it)
         return 0;
     }
     it->number = k;
+    it->start = block->start;
     it->time = block->start + (double)k * block->step;
     it->step = block->step;
     it->is_due = is_due;

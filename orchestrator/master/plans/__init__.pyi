@@ -1,3 +1,4 @@
-from .plan import CHANGES, PLACE, SIZES, SWING, Plan
+from .layout import CHANGES, PLACE, SIZES, SWING, Kind
+from .plan import Plan
 
-__all__ = ["CHANGES", "PLACE", "SIZES", "SWING", "Plan"]
+__all__ = ["CHANGES", "PLACE", "SIZES", "SWING", "Kind", "Plan"]

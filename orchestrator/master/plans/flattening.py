@@ -43,6 +43,7 @@ class Wide:
         )
         forms = [_FORMS.get(v.fmi_type, NUMBER) for v in variables]
         self.forms = np.array(forms if any(forms) else [], dtype=np.int64)
+        self._whole = [place for place, kind in enumerate(exchange.kinds) if kind != "Real"]
         self._wide = [(place, _BITS[form]) for place, form in enumerate(forms) if form]
 
     def form(self, place: int) -> int:
@@ -59,6 +60,8 @@ class Wide:
     def unpacked(self, cells: NDArray[np.float64]) -> list[Any]:
         """Values that the kernel has left."""
         values: list[Any] = cells.tolist()
+        for place in self._whole:  # the kernel's values are all doubles
+            values[place] = 0 if values[place] != values[place] else int(values[place])
         for place, bits in self._wide:
             values[place] = int(cells.view(bits)[place])
         return values

@@ -3,60 +3,41 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from ctypes import addressof
+from ctypes import addressof, c_void_p
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ...fmi import Channel, Slave
-from ...fmi.binding import ElementsChannel, Fmi3Slave, FmuSlave, is_watched
+from ...fmi.binding import ElementsChannel, Fmi3Slave, FmuSlave, LoadedSlave, is_watched
 from ...isolation import IsolatedChannel, IsolatedSlave, Ride, may_ride
-from ..algorithms import Explicit, Operation
+from ..algorithms import HEAD, Iteration, Operation, Programmed, Repeated
 from ..coupling import Coupling
-from ..exchange import Change, Exchange
+from ..exchange import Change, Exchange, Yield
+from ..refresh import Refresher
+from .courses import Courses
 from .flattening import TYPES, Wide, can_exchange, parts_of
-
-_CHANGE = 3
-"""The kernel's number for what an event does to values that have been read; the others are `Operation`."""
-_AS_IT_IS, _TRUE_ABOVE, _ROUNDED_UP = 0, 1, 2
-"""The kernel's numbers for what a threshold does."""
-_NONE = 2**32 - 1
-"""What stands where there is no value reference, so that lists of other lengths are others."""
-
-CHANNEL = np.dtype(
-    [(name, "u8") for name in ("function", "component")]
-    + [(name, "i8") for name in ("begin", "count", "is_real", "type", "reference_count")]
+from .layout import (
+    AS_IT_IS,
+    CHANNEL,
+    CIRCLE,
+    ENTRY,
+    INSTANCE,
+    ITERATION,
+    LOOP,
+    METHODS,
+    NONE,
+    OPERATION,
+    ROUNDED_UP,
+    STATE,
+    TRUE_ABOVE,
+    Kind,
 )
-INSTANCE = np.dtype([("function", "u8"), ("component", "u8"), ("told", "u8")])
-ENTRY = np.dtype(
-    [
-        ("place", "i8"),
-        ("age", "i8"),
-        ("change", "i8"),
-        ("scale", "f8"),
-        ("offset", "f8"),
-        ("whole", "i8"),
-        ("threshold", "f8"),
-        ("form", "i8"),
-    ]
-)
-CHANGES = np.dtype(
-    [("active", "i8"), ("place", "i8"), ("is_real", "i8"), *((n, "f8") for n in ("scale", "offset", "slope", "since"))]
-)
-OPERATION = np.dtype([(name, "i4") for name in ("kind", "index", "period", "phase", "is_watched")])
-PLACE = np.dtype([(name, "i8") for name in ("begin", "failed", "status")])
-
-SWING = np.dtype(
-    [(name, "f8") for name in ("peak", "last", "from", "size")] + [(x, "i8") for x in ("way", "rises", "is_begun")]
-)
-"""What the kernel notes of how a signal grows, as growth.h has it."""
-
-_OWN = [each.itemsize for each in (OPERATION, CHANNEL, INSTANCE, ENTRY, CHANGES, PLACE)]
-SIZES = (_OWN[0], 8, *_OWN[1:4], 4, 8, _OWN[4], 8, 8, 8, 8, _OWN[5], 8)
-"""Of what the kernel's buffers hold, in bytes, in the order in which it takes them."""
 
 _Entry = tuple[int, int, int, float, float, int, float, int]
 Called = FmuSlave | Fmi3Slave | Ride
 """What the kernel calls."""
+_NOBODY = None, ""
 
 
 class Plan:
@@ -71,39 +52,57 @@ class Plan:
         wide: what each of the values is.
         arrays: the plan, in the sequence in which the kernel takes it.
         operations: kind, index, period and phase of each.
+        late: of each, whether what it sets is of the step's end, or its step is not the last word.
         culprits: whom each of them calls, and by which function.
         changes: what events do, with the place among the values and whether it is a real number.
         channels: arrays that are set as a whole.
+        courses: the inputs that go on during a step.
+        rounds: by operation, what it is repeated for. iterations: by the operation that ends a round.
+        states: by instance, the number of its saved state.
         threads: how many threads there is work for.
     """
 
-    def __init__(self, coupling: Coupling, algorithm: Explicit, *, can_share: bool) -> None:
+    def __init__(self, coupling: Coupling, algorithm: Programmed, *, can_share: bool) -> None:
         self._coupling = coupling
         self._exchange = coupling.exchange
         self.wide = Wide(coupling.exchange)
+        self.courses = Courses(coupling.extrapolator, coupling.exchange)
         self._channels: list[tuple[int, ...]] = []
         self.channels: list[ElementsChannel] = []
         self._entries: list[_Entry] = []
         self._references: list[int] = []
         self.operations: list[tuple[int, int, int, int]] = []
+        self.late: list[bool] = []
         self.culprits: list[tuple[Called | None, str]] = []
         self._instances: list[tuple[int, int, int]] = []
         self.changes: list[tuple[Change, int, bool]] = []
         self._slaves = {name: _called(slave) for name, slave in coupling.slaves.items()}
         self.rides = [slave for slave in self._slaves.values() if isinstance(slave, Ride)]
-        is_shared = can_share and algorithm.takes_threads
+        self.rounds: dict[int, Iteration] = {}
+        self.iterations: dict[int, Iteration] = {}
+        self._loops: list[tuple[float, ...]] = []
+        self._passed: list[int] = []
+        self._work: list[tuple[int, Iteration]] = []
+        self._room = 0
+        self.states: dict[str, int] = {}
+        is_shared = can_share and algorithm.takes_threads and coupling.refresher is None
         self.threads = max(1, min(coupling.settings.threads, len(self._slaves))) if is_shared else 1
         ends: list[int] = []
-        for batch in algorithm.batches():
-            names = list(batch.names)
+        for part in algorithm.program():
+            if isinstance(part, Repeated):
+                self._repeat(part)
+                continue
+            names = list(part.names)
             for share in np.array_split(names, self.threads) if self.threads > 1 else [names]:
-                self._add(list(share), batch.operations)
+                self._add(list(share), part.operations)
                 ends.append(len(self.operations))
+        if coupling.refresher is not None:
+            self._refresh(coupling.refresher)
         self.arrays = (
             np.array(
                 [
-                    (*operation, isinstance(slave, FmuSlave) and is_watched(slave))
-                    for operation, (slave, _) in zip(self.operations, self.culprits, strict=True)
+                    (*operation, isinstance(slave, FmuSlave) and is_watched(slave), late)
+                    for operation, late, (slave, _) in zip(self.operations, self.late, self.culprits, strict=True)
                 ],
                 OPERATION,
             ),
@@ -113,53 +112,172 @@ class Plan:
             np.array(self._entries, dtype=ENTRY),
             np.array(self._references, dtype=np.uint32),
             self.wide.forms,
+            self.courses.courses,
+            np.array(self._loops, dtype=LOOP),
+            np.array(self._passed, dtype=np.int64),
+            self.courses.points,
+            self._made_states(),
+            self._made_work(),
+            self.courses.stamps,
         )
 
     @staticmethod
-    def is_able(coupling: Coupling) -> bool:
+    def is_able(coupling: Coupling, algorithm: Programmed) -> bool:
         """Whether the kernel can do all that is asked for."""
-        able = all(_can_be_called(x, coupling.exchange) for x in coupling.slaves.values())
-        mapped = any(link.mapping is not None for link in coupling.exchange.links)
-        held = not coupling.settings.stepping.extrapolation and coupling.loops is None and coupling.refresher is None
-        return able and held and not mapped and can_exchange(coupling.exchange)
+        exchange, slaves, refresher = coupling.exchange, coupling.slaves, coupling.refresher
+        repeated = [n for part in algorithm.program() if isinstance(part, Repeated) for n in part.batch.names]
+        able = all(_can_be_called(x, exchange) for x in slaves.values())
+        able = able and not any(link.mapping is not None for link in exchange.links)
+        able = able and all(can_be_restored(slaves[name]) for name in repeated)
+        able = able and Courses.are_able(coupling.extrapolator, exchange)
+        here = not any(isinstance(slave, IsolatedSlave) for slave in slaves.values())
+        able = able and (refresher is None or (here and refresher.is_decided))
+        return able and coupling.loops is None and can_exchange(exchange)
+
+    def forget(self, time: float) -> None:
+        """Give back the states that have been saved at a time in s and not been given back."""
+        for name, n in self.states.items():
+            handle, slave = int(self._handles[n]), self._slaves[name]
+            self._handles[n] = 0
+            if handle:
+                assert isinstance(slave, LoadedSlave)
+                slave.forget((time, c_void_p(handle)))
 
     def rank(self, operation: int) -> tuple[bool, int]:
         """Where an operation of several that failed would stand without threads: all are set before any steps."""
-        return self.operations[operation][0] != Operation.SET, operation
+        return self.operations[operation][0] not in (Kind.SET, Kind.EXTEND, Kind.SLOPES), operation
 
-    def _add(self, names: Sequence[str], operations: Sequence[Operation]) -> None:
-        add = {Operation.SET: self._add_sets, Operation.STEP: self._add_step, Operation.GET: self._add_gets}
+    def _add(self, names: Sequence[str], operations: Sequence[Operation], *, final: bool = True) -> None:
         for operation in operations:
             for name in names:
-                add[operation](self._slaves[name], self._coupling.settings.rates.get(name, 1))
+                slave, rate = self._slaves[name], self._coupling.settings.rates.get(name, 1)
+                if operation == Operation.SET:
+                    self._add_sets(slave, rate)
+                elif operation == Operation.STEP:
+                    self._add_step(slave, rate, final=final)
+                else:
+                    self._add_gets(slave, rate, {Operation.GET_DIRECT: True, Operation.GET_REST: False}.get(operation))
 
-    def _add_operation(self, kind: int, index: int, culprit: tuple[Called | None, str], due: tuple[int, int]) -> None:
+    def _repeat(self, part: Repeated) -> None:
+        """Add what is repeated from saved states: see ``native/kernel.h``."""
+        names, iteration = part.batch.names, part.iteration
+        passed, real_count = [*iteration.reals, *iteration.others], len(iteration.reals)
+        method, relaxation = METHODS[iteration.stepping.acceleration], iteration.stepping.relaxation
+        counts = real_count, iteration.guess_count, len(iteration.others)
+        number, begin = len(self._loops), len(self._passed)
+        self._loops.append(
+            (ITERATION, iteration.stepping.max_iterations, self._room, begin, *counts, method, relaxation)
+        )
+        self._passed += passed
+        self._work.append((self._room, iteration))
+        u = iteration.guess_count
+        self._room += len(iteration.numbers) + 2 * u + (0, 1 + u, 1 + 24 * u)[method]
+        self._add_state(names, Kind.SAVE)
+        self._add_operation(Kind.BEGIN, number, _NOBODY, (1, 0))
+        self._add_state(names, Kind.RESTORE)
+        self._add_operation(Kind.MARK, number, _NOBODY, (1, 0))
+        first = len(self.operations)
+        for name in names:
+            self._add([name], part.batch.operations, final=False)
+        self.rounds.update(dict.fromkeys(range(first, len(self.operations)), iteration))
+        self.iterations[len(self.operations)] = iteration
+        self._add_operation(Kind.END, number, _NOBODY, (1, 0))
+        self._add_state(names, Kind.FORGET)
+
+    def _add_state(self, names: Sequence[str], kind: Kind) -> None:
+        for name in names:
+            slave = self._slaves[name]
+            assert isinstance(slave, LoadedSlave)
+            index = self.states.setdefault(name, len(self.states))
+            self._add_operation(kind, index, (slave, slave.STATE[kind - Kind.SAVE]), (1, 0))
+
+    def _made_states(self) -> NDArray[np.void]:
+        made = np.zeros(len(self.states), STATE)
+        for name, n in self.states.items():
+            slave = self._slaves[name]
+            assert isinstance(slave, LoadedSlave)
+            functions = [slave.addresses(call)[0] for call in slave.STATE[:3]]
+            made[n] = (*functions, slave.pointer, 0)
+        self._handles = made["handle"]
+        return made
+
+    def _made_work(self) -> NDArray[np.float64]:
+        """Room for the numbers of what is repeated; those of iterations stand there from now on."""
+        work = np.zeros(self._room)
+        for begin, iteration in self._work:
+            own = work[begin : begin + len(iteration.numbers)]
+            own[:] = iteration.numbers
+            iteration.use(own)
+        return work
+
+    def _refresh(self, refresher: Refresher) -> None:
+        """Add what brings feed-through up to date."""
+        for stage, is_circle in refresher.stages:
+            names = [name for name in stage if name not in refresher.refused]
+            number = len(self._loops)
+            if is_circle:
+                self._loops.append((CIRCLE, len(stage) + 1, self._room, *[0] * 5, 0.0))
+                self._room += HEAD + 2 * len(self._exchange.values)
+                self._add_operation(Kind.BEGIN, number, _NOBODY, (1, 0))
+                self._add_operation(Kind.MARK, number, _NOBODY, (1, 0))
+            for name in names:
+                self._add_sets(self._slaves[name], 1, late=True)
+                self._add_gets(self._slaves[name], 1, None, kind=Kind.READ)
+            if is_circle:
+                self._add_operation(Kind.END, number, _NOBODY, (1, 0))
+            for name in names:
+                for part in self._exchange.yields[name]:
+                    if part.is_real:
+                        self._add_reads(Kind.LOOK, self._slaves[name], part, (1, 0))
+
+    def _add_operation(
+        self, kind: int, index: int, culprit: tuple[Called | None, str], due: tuple[int, int], *, late: bool = False
+    ) -> None:
         self.operations.append((kind, index, *due))
+        self.late.append(late)
         self.culprits.append(culprit)
 
-    def _add_sets(self, slave: Called, rate: int) -> None:
+    def _add_sets(self, slave: Called, rate: int, *, late: bool = False) -> None:
+        """Set inputs: as of a step's begin, continued if they are to be, or ``late``, at a communication point."""
+        extrapolator = self._coupling.extrapolator
+        course = None if extrapolator is None or late else extrapolator.courses.get(slave.name)
         for feed in self._exchange.feeds[slave.name]:
             entries = []
             for k, source in enumerate(feed.sources):
-                age, slot = feed.ages[k], feed.changes[k] if feed.changes else None
+                age, slot = (feed.ages_at_point if late else feed.ages)[k], feed.changes[k] if feed.changes else None
                 threshold = feed.thresholds[k]
-                whole = _AS_IT_IS if threshold is None else _TRUE_ABOVE if feed.kind == "Boolean" else _ROUNDED_UP
+                whole = AS_IT_IS if threshold is None else TRUE_ABOVE if feed.kind == "Boolean" else ROUNDED_UP
                 change = -1 if slot is None else self._add_change(slot, -1, feed.is_real)
                 place = (source, -1 if age is None else age, change)
                 changed = feed.scales[k], feed.offsets[k], whole, threshold or 0.0
                 entries.append((*place, *changed, self.wide.form(source)))
-            self._add_channels(Operation.SET, slave, feed.channel, entries, feed.is_real, due=(rate, 0))
+            if course is None or feed is not course.feed:
+                self._add_channels(Kind.SET, slave, feed.channel, entries, feed.is_real, due=(rate, 0), late=late)
+                continue
+            number = self.courses.number(slave.name)
+            self.courses.courses["channel"][number] = len(self._channels)
+            self._add_channels(Kind.EXTEND, slave, feed.channel, entries, feed.is_real, due=(rate, 0))
+            self._add_operation(Kind.SLOPES, number, (slave, FmuSlave.INTERPOLATE), (rate, 0))
 
-    def _add_gets(self, slave: Called, rate: int) -> None:
+    def _add_gets(self, slave: Called, rate: int, direct: bool | None, kind: Kind = Kind.GET) -> None:
+        """Read outputs, all or those that are ``direct`` or not; with what events make of them."""
         for part in self._exchange.yields[slave.name]:
+            if direct is not None and part.direct != direct:
+                continue
             due = (rate, 0 if part.direct else rate - 1)
-            whole = _TRUE_ABOVE if part.kind == "Boolean" else _AS_IT_IS
-            entries = [(place, -1, -1, 1.0, 0.0, whole, 0.0, 0) for place in range(part.begin, part.end)]
-            self._add_channels(Operation.GET, slave, part.channel, entries, part.is_real, due=due)
+            self._add_reads(kind, slave, part, due)
             for place, change in self._exchange.output_changes.items():
                 if part.begin <= place < part.end:
                     index = self._add_change(change, place, part.is_real)
-                    self._add_operation(_CHANGE, index, (None, "an event"), due)
+                    self._add_operation(Kind.CHANGE, index, (None, "an event"), due)
+
+    def _add_reads(self, kind: Kind, slave: Called, part: Yield, due: tuple[int, int]) -> None:
+        whole = TRUE_ABOVE if part.kind == "Boolean" else AS_IT_IS
+        entries = [(place, -1, -1, 1.0, 0.0, whole, 0.0, 0) for place in range(part.begin, part.end)]
+        first = len(self._channels)
+        self._add_channels(kind, slave, part.channel, entries, part.is_real, due=due)
+        for channel in range(first, len(self._channels)) if self._exchange.stamps and kind != Kind.LOOK else ():
+            self._add_operation(Kind.STAMP, channel, _NOBODY, due)
 
     def _add_change(self, change: Change, place: int, is_real: bool) -> int:
         self.changes.append((change, place, is_real))
@@ -174,25 +292,27 @@ class Plan:
         is_real: bool,
         *,
         due: tuple[int, int],
+        late: bool = False,
     ) -> None:
         if isinstance(channel, ElementsChannel):
             self.channels.append(channel)
         for own, places in parts_of(channel) or ():
-            call = own.calls[kind == Operation.GET]
-            self._add_operation(kind, len(self._channels), (slave, call), due)
+            call = own.calls[kind not in (Kind.SET, Kind.EXTEND)]
+            index = self.courses.number(slave.name) if kind == Kind.EXTEND else len(self._channels)
+            self._add_operation(kind, index, (slave, call), due, late=late)
             if isinstance(slave, Ride):
                 assert isinstance(own, IsolatedChannel)
-                addresses = slave.add(own, is_get=kind == Operation.GET)
+                addresses = slave.add(own, is_get=kind == Kind.GET)
             else:
                 addresses = slave.addresses(call)
             what = len(self._entries), len(places), int(is_real), TYPES.get(own.kind, 0) * isinstance(slave, Fmi3Slave)
             self._channels.append((*addresses, *what, len(own.references)))
             self._entries += [entries[k] for k in places]
-            self._references += [*own.references, *[_NONE] * (len(places) - len(own.references))]
+            self._references += [*own.references, *[NONE] * (len(places) - len(own.references))]
 
-    def _add_step(self, slave: Called, rate: int) -> None:
+    def _add_step(self, slave: Called, rate: int, *, final: bool) -> None:
         call = FmuSlave.DO_STEP if isinstance(slave, Ride) else slave.DO_STEP
-        self._add_operation(Operation.STEP, len(self._instances), (slave, call), (rate, 0))
+        self._add_operation(Kind.STEP, len(self._instances), (slave, call), (rate, 0), late=not final)
         addresses = slave.add_step() if isinstance(slave, Ride) else slave.addresses(call)
         self._instances.append((*addresses, addressof(slave.told) if isinstance(slave, Fmi3Slave) else 0))
 
@@ -211,3 +331,10 @@ def _called(slave: Slave) -> Called:
         return slave.ride()
     assert isinstance(slave, FmuSlave | Fmi3Slave)
     return slave
+
+
+def can_be_restored(slave: Slave) -> bool:
+    """Whether the kernel can save an instance's state and come back to it."""
+    if not isinstance(slave, FmuSlave | Fmi3Slave) or not slave.interface.can_save_state:
+        return False
+    return all(call in slave.functions for call in slave.STATE[:3])

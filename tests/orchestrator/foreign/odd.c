@@ -4,7 +4,8 @@
    Modes 1 to 5: the status of the step; 9: status -1; 10, 11, 12: y is NaN, infinity, minus infinity; 20 + s, 30 + s: the
    status of getting, of setting; 40 to 43 discarded steps: 40 refuses more than 0.1 s, 41 gets 0.15 s of them done, 42
    half of one and asks for the end, 43 is 40 and goes on only when it was restored; 44: rounds upward from then on;
-   60 + s, 70 + s: the status of getting, of setting whole numbers. */
+   60 + s, 70 + s: the status of getting, of setting whole numbers; 80 + s: of setting derivatives of inputs, of which 91
+   refuses the second and 92 all; 100 + s, 110 + s, 120 + s: of saving a state, of coming back to one, of giving it back. */
 
 #include "fmi2.h"
 
@@ -13,6 +14,7 @@
 typedef struct {
     double reals[4];
     int whole[9];
+    double slopes[2][2]; /* of u and v */
     double time, reached;
     int stuck, ends;
     Logger logger;
@@ -54,8 +56,20 @@ int fmi2SetReal(void *c, const unsigned *vr, size_t count, const double *values)
     Odd *s = c;
     for (size_t k = 0; k < count; k++) {
         s->reals[vr[k]] = values[k];
+        memset(s->slopes[vr[k]], 0, sizeof s->slopes[vr[k]]);
     }
     return tell(s, mode(s, 30));
+}
+
+int fmi2SetRealInputDerivatives(void *c, const unsigned *vr, size_t count, const int *orders, const double *values)
+{
+    Odd *s = c;
+    int how = mode(s, 90), is_refused = how == 2;
+    for (size_t k = 0; k < count; k++) {
+        s->slopes[vr[k]][orders[k] - 1] = values[k];
+        is_refused |= how == 1 && orders[k] > 1;
+    }
+    return tell(s, is_refused ? 3 : mode(s, 80));
 }
 
 int fmi2GetReal(void *c, const unsigned *vr, size_t count, double *values)
@@ -105,7 +119,7 @@ int fmi2SetupExperiment(void *c, int has_tolerance, double tolerance, double sta
 
 static void advance(Odd *s, double step)
 {
-    s->reals[2] += step * (s->reals[0] - s->reals[2]);
+    s->reals[2] += step * (s->reals[0] - s->reals[2]) + step * step * (s->slopes[0][0] / 2.0 + step * s->slopes[0][1] / 6.0);
     s->whole[5] = s->whole[4] + 1;
     s->whole[7] = !s->whole[6];
     s->time += step;
@@ -152,24 +166,24 @@ int fmi2GetFMUstate(void *c, void **state)
 {
     *state = *state ? *state : malloc(sizeof(Odd));
     memcpy(*state, c, sizeof(Odd));
-    return 0;
+    return tell(c, mode(c, 100));
 }
 
 int fmi2SetFMUstate(void *c, void *state)
 {
     memcpy(c, state, sizeof(Odd));
-    return 0;
+    return tell(c, mode(c, 110));
 }
 
 int fmi2FreeFMUstate(void *c, void **state)
 {
     free(*state);
     *state = NULL;
-    return 0;
+    return tell(c, mode(c, 120));
 }
 
 FINE(fmi2SetDebugLogging) FINE(fmi2EnterInitializationMode) FINE(fmi2ExitInitializationMode) FINE(fmi2Terminate)
 FINE(fmi2Reset) FINE(fmi2GetString) FINE(fmi2SetString) FINE(fmi2SerializedFMUstateSize) FINE(fmi2SerializeFMUstate)
-FINE(fmi2DeSerializeFMUstate) FINE(fmi2GetDirectionalDerivative) FINE(fmi2SetRealInputDerivatives)
+FINE(fmi2DeSerializeFMUstate) FINE(fmi2GetDirectionalDerivative)
 FINE(fmi2GetRealOutputDerivatives) FINE(fmi2CancelStep) FINE(fmi2GetStatus) FINE(fmi2GetIntegerStatus)
 FINE(fmi2GetStringStatus)

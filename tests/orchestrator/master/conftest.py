@@ -4,7 +4,7 @@ from types import SimpleNamespace
 
 import fmpy
 import pytest
-from railcosim.orchestrator.errors import FmuError
+from railcosim.orchestrator.errors import RunError
 from railcosim.orchestrator.isolation import instantiate
 from railcosim.orchestrator.master import compiled
 from railcosim.orchestrator.master.loop import Master
@@ -47,12 +47,12 @@ def both(monkeypatch, used):
 def _attempt(system, **how):
     try:
         return run(system, **how)
-    except FmuError as error:
+    except RunError as error:
         return error.run
 
 
 def _described(error):
-    return error and (str(error), error.instance, error.time, error.status, error.log)
+    return error and (str(error), *(getattr(error, name, None) for name in ("instance", "time", "status", "log")))
 
 
 @pytest.fixture(scope="session")
@@ -101,6 +101,13 @@ def instantiated(workspace):
     yield make
     for slave in made:
         slave.free()
+
+
+@pytest.fixture
+def able(odd_fmu, tmp_path):
+    """The FMU of odd.c, of which states can be saved, steps vary and inputs go on."""
+    abilities = "canGetAndSetFMUstate", "canHandleVariableCommunicationStepSize", "canInterpolateInputs"
+    return odd_fmu(tmp_path, *abilities)
 
 
 @pytest.fixture

@@ -149,8 +149,7 @@ def test_threads_that_can_act(ring, workspace):
         ({"algorithm": "iterative"}, "native", "the algorithm is iterative, and jacobi takes them"),
         ({"algorithm": "jacobi"}, "plain", "these are Python objects: a, b"),
         ({"algorithm": "jacobi"}, "python", "these run Python, one thread at a time: a, b"),
-        ({"algorithm": "jacobi", "refresh": True}, "native", "feed-through is refreshed in Python"),
-        ({"algorithm": "jacobi", "extrapolation": 1}, "native", "inputs are extrapolated in Python"),
+        ({"algorithm": "jacobi", "refresh": True}, "native", "feed-through is refreshed in one thread"),
     ],
 )
 def test_threads_that_cannot_act_are_refused(ring, workspace, how, kind, why):

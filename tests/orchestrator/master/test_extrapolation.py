@@ -7,6 +7,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from railcosim.orchestrator.fmi.binding.fmi2 import FmuSlave
+from railcosim.orchestrator.master import compiled
 from railcosim.orchestrator.master.extrapolation import polynomial
 from railcosim.orchestrator.run.execution import execute, resume, run
 from railcosim.orchestrator.system import Event, System
@@ -91,6 +92,7 @@ def given_derivatives(monkeypatch):
 
 def test_what_is_held_all_the_same(mine, monkeypatch):
     """What is delayed, sampled or no real number, on either end; and nothing is said to FMUs that cannot hear it."""
+    monkeypatch.setattr(compiled, "kernel", None)  # which calls the FMU itself
     seen = given_derivatives(monkeypatch)
     it = System(stop_time=2.0, step=0.5, extrapolation=1)
     it.add("course", mine("Course"), b=1.0)

@@ -14,6 +14,7 @@ import pytest
 from railcosim.orchestrator.master import compiled
 from railcosim.orchestrator.master.compiled import CompiledLoop
 from railcosim.orchestrator.master.plans import CHANGES, PLACE, SWING
+from railcosim.orchestrator.master.plans.layout import COURSE, LOOP, POINTS
 from railcosim.orchestrator.master.settings import Settings
 
 MASTER = Path(__file__).parents[3] / "orchestrator" / "master"
@@ -36,7 +37,8 @@ def test_a_guard_is_an_address():
 
 
 NAMES = (
-    "operations parts channels instances entries references forms changes kept values history newest table row places "
+    "operations parts channels instances entries references forms courses loops passed points states work stamps "
+    "changes kept values history newest table row places "
     "disturbed every start step first count last"
 )
 
@@ -94,6 +96,24 @@ def changed(array, field, value, at=0):
     return result
 
 
+def going_on(arguments, array, name, value):
+    """A first operation that sets an input that goes on, but for one thing."""
+    made = {"courses": np.zeros(1, COURSE), "points": np.zeros(1, POINTS)}
+    made["courses"][0] = (1, 0, 0, 1, 2, 2, 1)
+    made[array][name] = value
+    return made | {"operations": changed(arguments["operations"], "kind", 7)}
+
+
+def going_round(arguments, *, place=0, **of):
+    """A first operation that begins a loop, and none that ends it."""
+    loops = np.zeros(1, LOOP)
+    loops["limit"] = 1
+    for name, value in of.items():
+        loops[name] = value
+    operations = changed(changed(arguments["operations"], "kind", 9), "index", 0)
+    return {"loops": loops, "work": np.zeros(1000), "passed": np.array([place]), "operations": operations}
+
+
 WRONG = {
     "a place beyond the values": lambda a: {"entries": changed(a["entries"], "place", 10**6)},
     "a negative place": lambda a: {"entries": changed(a["entries"], "place", -1)},
@@ -117,7 +137,7 @@ WRONG = {
     "more references than values": lambda a: {"channels": changed(a["channels"], "reference_count", 10**6)},
     "forms of some values": lambda a: {"forms": np.zeros(1, np.int64)},
     "a step without function": lambda a: {"instances": changed(a["instances"], "function", 0)},
-    "an unknown operation": lambda a: {"operations": changed(a["operations"], "kind", 4)},
+    "an unknown operation": lambda a: {"operations": changed(a["operations"], "kind", 15)},
     "an unknown change": lambda a: {"entries": changed(a["entries"], "change", 1)},
     "a negative change": lambda a: {"entries": changed(a["entries"], "change", -2)},
     "a change beyond the changes": lambda a: {
@@ -147,6 +167,15 @@ WRONG = {
     "an unknown instance": lambda a: {"operations": changed(changed(a["operations"], "kind", 1), "index", 10**6)},
     "an unknown channel": lambda a: {"operations": changed(a["operations"], "index", 10**6)},
     "a negative channel": lambda a: {"operations": changed(a["operations"], "index", -1)},
+    "a course that is not there": lambda a: {"operations": changed(changed(a["operations"], "kind", 7), "index", 1)},
+    "a course of too high an order": lambda a: going_on(a, "courses", "order", 3),
+    "a continued input that is not there": lambda a: going_on(a, "points", "place", 10**6),
+    "stamps of other values": lambda a: {"stamps": a["values"][:-1]},
+    "a state that is not there": lambda a: {"operations": changed(changed(a["operations"], "kind", 12), "index", 0)},
+    "a loop that is not there": lambda a: {"operations": changed(changed(a["operations"], "kind", 9), "index", 0)},
+    "a loop without rounds": lambda a: going_round(a, limit=0),
+    "a loop that compares what is not there": lambda a: going_round(a, kind=1, real_count=1, place=10**6),
+    "a loop that does not end": going_round,
     "a table with half a column": lambda a: {"table": a["table"].ravel()[:-1]},
     "a row before the table": lambda a: {"row": -1},
     "a row behind the table": lambda a: {"row": 9},
@@ -241,7 +270,7 @@ def test_memory_and_threads_that_cannot_be_had(tmp_path, odd, ring, instantiated
         left.value = -1
         for slave in master.slaves.values():
             slave.free()
-    assert said == ["MemoryError "] * 12 + ["RuntimeError kernel: no more threads can be started"] * 3
+    assert said == ["MemoryError "] * 14 + ["RuntimeError kernel: no more threads can be started"] * 3
 
 
 def test_a_kernel_of_another_version_is_refused():

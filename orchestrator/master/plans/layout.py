@@ -1,0 +1,91 @@
+"""What the kernel's arrays hold, and its numbers for what is to be done: as ``native/kernel.h`` has them."""
+
+from __future__ import annotations
+
+from enum import IntEnum
+from typing import Any
+
+import numpy as np
+
+
+class Kind(IntEnum):
+    """What an operation does."""
+
+    SET = 0
+    STEP = 1
+    GET = 2
+    CHANGE = 3
+    READ = 4
+    LOOK = 5
+    STAMP = 6
+    EXTEND = 7
+    SLOPES = 8
+    BEGIN = 9
+    MARK = 10
+    END = 11
+    SAVE = 12
+    RESTORE = 13
+    FORGET = 14
+
+
+AS_IT_IS, TRUE_ABOVE, ROUNDED_UP = 0, 1, 2
+"""What a threshold does."""
+CIRCLE, ITERATION = 0, 1
+"""Kinds of loops."""
+METHODS = {"none": 0, "aitken": 1, "anderson": 2}
+"""Ways to the next guess of an iteration."""
+NONE = 2**32 - 1
+"""What stands where there is no value reference, so that lists of other lengths are others."""
+
+CHANNEL = np.dtype(
+    [(name, "u8") for name in ("function", "component")]
+    + [(name, "i8") for name in ("begin", "count", "is_real", "type", "reference_count")]
+)
+INSTANCE = np.dtype([("function", "u8"), ("component", "u8"), ("told", "u8")])
+ENTRY = np.dtype(
+    [
+        ("place", "i8"),
+        ("age", "i8"),
+        ("change", "i8"),
+        ("scale", "f8"),
+        ("offset", "f8"),
+        ("whole", "i8"),
+        ("threshold", "f8"),
+        ("form", "i8"),
+    ]
+)
+CHANGES = np.dtype(
+    [("active", "i8"), ("place", "i8"), ("is_real", "i8"), *((n, "f8") for n in ("scale", "offset", "slope", "since"))]
+)
+OPERATION = np.dtype([(name, "i4") for name in ("kind", "index", "period", "phase", "is_watched", "is_late")])
+COURSE = np.dtype(
+    [("function", "u8"), *((n, "i8") for n in ("channel", "begin", "count", "depth", "order", "is_of_end"))]
+)
+POINTS = np.dtype(
+    [
+        ("times", "f8", 3),
+        ("values", "f8", 3),
+        ("slopes", "f8", 2),
+        *((n, "i8") for n in ("count", "place", "reference")),
+    ]
+)
+STATE = np.dtype([(name, "u8") for name in ("save", "restore", "forget", "component", "handle")])
+LOOP = np.dtype(
+    [(n, "i8") for n in ("kind", "limit", "work", "begin", "real_count", "guess_count", "other_count", "method")]
+    + [("relaxation", "f8")]
+)
+PLACE = np.dtype([(name, "i8") for name in ("begin", "failed", "status")])
+
+SWING = np.dtype(
+    [(name, "f8") for name in ("peak", "last", "from", "size")] + [(x, "i8") for x in ("way", "rises", "is_begun")]
+)
+"""What the kernel notes of how a signal grows, as growth.h has it."""
+
+_SIZES: dict[str, Any] = {
+    "operations": OPERATION, "parts": "i8", "channels": CHANNEL, "instances": INSTANCE, "entries": ENTRY,
+    "references": "u4", "forms": "i8", "courses": COURSE, "loops": LOOP, "passed": "i8", "points": POINTS,
+    "states": STATE, "work": "f8", "stamps": "f8", "changes": CHANGES, "kept": "i8", "values": "f8", "history": "f8",
+    "table": "f8", "places": PLACE, "disturbed": "i8",
+}  # fmt: skip
+SIZES = tuple(np.dtype(each).itemsize for each in _SIZES.values())
+"""Of what the kernel's buffers hold, in bytes, in the order in which it takes them."""
