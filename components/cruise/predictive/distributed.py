@@ -32,8 +32,8 @@ class DistributedMpc(GuardedCruise):
     cannot all be kept the plan violates them, all by some, and ``infeasible`` is raised; the demand keeps its own.
 
     What the train ahead will do is its own ``plan``, as it comes by radio, where ``has_plan`` says so; else the
-    acceleration that its speeds show is taken to go on. For where it can stop neither counts as long as it was not
-    heard: since its last message it may have braked with ``ahead_braking``. The problem is convex. It is solved by
+    acceleration that its speeds show is taken to go on. For where it can stop the worse of both counts, from now on
+    only: as long as it was not heard it may have braked with ``ahead_braking``. The problem is convex. It is solved by
     ``iterations`` Newton steps of a primal-dual interior point method, always the same work, begun from the last plan.
 
     The safe bound of `GuardedCruise` acts at all times by default, behind a train that does not keep its plan; it knows
@@ -56,7 +56,8 @@ class DistributedMpc(GuardedCruise):
         r" jerk_limit $j_\mathrm{max}$, speed_limit $v_\mathrm{max}$, traction_limit $F_\mathrm{max}$, power_limit"
         r" $P_\mathrm{max}$, demand $u$, force $F$, mass $m$, resistance $R$, line_resistance $r$, and the predicted"
         r" position and speed of the train ahead $x_\mathrm{a}$, $v_\mathrm{a}$; $e$ is what $x_\mathrm{a} +"
-        r" v_\mathrm{a}^2 / (2 b_\mathrm{a})$ is predicted to have gained since the last message.",
+        r" v_\mathrm{a}^2 / (2 b_\mathrm{a})$ is predicted to have gained since the last message. In the limit of the"
+        r" gap they are those of its plan or of its speeds, which of them stop earlier.",
     )
     recommended_step = 0.1
 
@@ -124,7 +125,7 @@ class DistributedMpc(GuardedCruise):
         }
 
     def update(self) -> Values:
-        problem = self._problem(self._ahead())
+        problem = self._problem(*self._ahead())
         jerks = solved(problem, self.jerks, self.iterations)
         worst: Any = 0.0
         for excess in problem.excess(problem.motion(jerks), jerks).ravel().tolist():
@@ -144,8 +145,8 @@ class DistributedMpc(GuardedCruise):
             "infeasible": worst > _TELLING,
         }
 
-    def _ahead(self) -> Motion:
-        """What the train ahead is taken to do; somewhere far away where there is none."""
+    def _ahead(self) -> tuple[Motion, Motion]:
+        """What the train ahead is taken to do, and what it would by its speeds alone; far away where there is none."""
         interval, stages = self.prediction_step, self.stages
         position = where(self.has_ahead, self.ahead_position, self.position + _FAR)
         speed = where(self.has_ahead, self.ahead_speed, self.speed)
@@ -156,21 +157,20 @@ class DistributedMpc(GuardedCruise):
         times = [age + k * interval for k in range(stages + 1)]
         guessed = extrapolated(position, speed, shown, maximum(speed, self.target_speed), times)
         known = planned(position, speed, plan, age, interval)
-        return Motion(
+        taken = Motion(
             *([where(told, a, b) for a, b in zip(x, y, strict=True)] for x, y in zip(known, guessed, strict=True))
         )
+        return taken, guessed
 
-    def _problem(self, ahead: Motion) -> Problem:
+    def _problem(self, ahead: Motion, shown: Motion) -> Problem:
         speed, has_ahead = self.speed, self.has_ahead
         base = self.standstill_gap + self.gap_margin
         error = ahead.position[0] - self.position - base - self.time_headway * speed
         counted = error - clip(error, -_LARGEST_ERROR, _LARGEST_ERROR)
-        stops = [
-            position + maximum(speed, 0.0) ** 2 / (2.0 * self.ahead_braking)
-            for position, speed in zip(ahead.position, ahead.speed, strict=True)
-        ]
+        # No plan is a promise. For where the train ahead can stop the worse of what it says and what is seen counts,
+        # and since its message it may have braked as hard as it can.
+        stops = [minimum(a, b) for a, b in zip(self._stops(ahead), self._stops(shown), strict=True)]
         heard = self.ahead_position + maximum(self.ahead_speed, 0.0) ** 2 / (2.0 * self.ahead_braking)
-        # No plan is a promise: since its message the train ahead may have braked as hard as it can.
         unheard = where(has_ahead, maximum(stops[0] - heard, 0.0), 0.0)
         knee = maximum(speed, self.power_limit / self.traction_limit)
         traction = self.power_limit / (knee * self.mass)
@@ -198,3 +198,8 @@ class DistributedMpc(GuardedCruise):
             ahead_speed=ahead.speed[1:],
             stop=[stop - unheard - self.standstill_gap for stop in stops[1:]],
         )
+
+    def _stops(self, ahead: Motion) -> list[Any]:
+        """Where the train ahead stands if it brakes as hard as it can, m."""
+        hardest = 2.0 * self.ahead_braking
+        return [x + maximum(v, 0.0) ** 2 / hardest for x, v in zip(ahead.position, ahead.speed, strict=True)]

@@ -64,7 +64,7 @@ def test_a_plan_is_answered_before_the_speed_shows_it():
 
 
 def test_without_a_plan_the_acceleration_that_speeds_show_goes_on():
-    ahead = DistributedMpc(**(FOLLOWS | {"ahead_position": KEPT, "ahead_average": 40.5}), ahead_age=0.5)._ahead()
+    ahead, _ = DistributedMpc(**(FOLLOWS | {"ahead_position": KEPT, "ahead_average": 40.5}), ahead_age=0.5)._ahead()
     assert ahead.acceleration[0] == pytest.approx(-0.5)
     assert ahead.speed[1] == pytest.approx(40.0 - 0.5 * 2.5)
 
@@ -74,8 +74,16 @@ def test_the_time_in_which_the_train_ahead_was_not_heard_counts_as_braked(has_pl
     """It ran at 40 m/s when last heard: by what it may have braked since it stops 800 m on, however old that is."""
     values = FOLLOWS | {"ahead_position": 1000.0, "ahead_age": 0.8, "has_plan": has_plan}
     follower = DistributedMpc(**values)
-    stop = follower._problem(follower._ahead()).stop
+    stop = follower._problem(*follower._ahead()).stop
     assert stop == pytest.approx([1000.0 + 80.0 * k + 800.0 - 250.0 for k in range(1, 11)])
+
+
+def test_a_plan_that_says_less_than_is_seen_is_not_relied_on():
+    """Planned are 40 m/s, seen is braking by 0.5 m/s2: after two seconds the train ahead can stop that much earlier."""
+    values = FOLLOWS | {"ahead_position": 1000.0, "ahead_average": 40.5, "has_plan": True}
+    follower = DistributedMpc(**values)
+    stop = follower._problem(*follower._ahead()).stop
+    assert stop[0] == pytest.approx(1000.0 + 80.0 - 1.0 + 39.0**2 / 2.0 - 250.0)
 
 
 def test_it_stops_behind_a_train_that_breaks_down():

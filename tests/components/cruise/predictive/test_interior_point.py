@@ -28,7 +28,7 @@ def drawn(rng, **changes):
         "line_resistance": rng.uniform(-0.1, 0.1),
     }
     component = DistributedMpc(**(values | changes))
-    problem = component._problem(component._ahead())
+    problem = component._problem(*component._ahead())
     return problem._replace(**{name: np.array(getattr(problem, name)) for name in ("wanted", "ahead_speed", "stop")})
 
 
