@@ -4,9 +4,9 @@ Slices include both ends, and take the indices that there are: instances are num
 arrays from anywhere.
 """
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Hashable, Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, TypeVar
 
 import numpy as np
 
@@ -14,9 +14,12 @@ from ..errors import ExpressionError
 from ..problems import Problem, suggestion
 from .functions import ARITHMETIC, LOGIC, WINDOWS, Function, Value, call_problem, logical, where
 from .signals import Part, Signals
-from .syntax import Call, Group, Name, Node, Number, Operation, Reference, Span, Temporal, walk
+from .syntax import Call, Group, Name, Node, Number, Operation, Reference, Span, Temporal, uses_index, walk
 from .terms import Argument, Frame, Plan, Prepared, Reduction, Term
 from .vocabulary import Names, unknown_signal
+
+N = TypeVar("N", bound=Node)
+R = TypeVar("R")
 
 
 class Binding:
@@ -38,8 +41,7 @@ class Binding:
     ) -> None:
         self.text, self.functions, self.constants, self.plan, self._rows = text, functions, constants, plan, rows
         self._terms: dict[int, tuple[Node, Term]] = {}  # by the identity of the node, which is kept for that
-        self.known: dict[int, tuple[Node, bool]] = {}
-        """Whether logic over time stands in a node, as far as it was asked, alike."""
+        self._known: dict[Hashable, tuple[Node, Any]] = {}
 
     def term(self, node: Node) -> Term:
         """What gives the value of a node.
@@ -55,12 +57,23 @@ class Binding:
         self._terms[id(node)] = node, term
         return term
 
+    def known(self, find: Callable[[N], R], node: N) -> R:
+        """What is found of a node, which is looked for once."""
+        key = find, id(node)
+        if key not in self._known:
+            self._known[key] = node, find(node)
+        found: R = self._known[key][1]
+        return found
+
     def error(self, problem: str | Problem) -> ExpressionError:
         """An error that quotes the expression."""
         return ExpressionError(ExpressionError(problem).at(f"'{self.text}'"))
 
     def found(self, reference: Reference) -> list[str]:
         """The full names a reference stands for, in the order of their indices; empty when there are none."""
+        return self.known(self._found, reference)
+
+    def _found(self, reference: Reference) -> list[str]:
         if self._rows and reference.uses_index:
             return [name for row in self._rows for name in row.found(reference)]
         return self.plan.names.find([(name, [self._index(x) for x in indices]) for name, indices in reference.parts])
@@ -157,14 +170,13 @@ class Binding:
         return made
 
     def _reduced(self, node: Call, function: Function) -> Term:
-        signature, plain = function.arguments, len(node.arguments) - len(node.keywords)
-        named = dict(zip(node.keywords, node.arguments[plain:], strict=True))
-        given = signature.bind(*node.arguments[:plain], **named).arguments
+        given = function.given(node)
         bounds = {name: self._argument(given.pop(name)) if name in given else None for name in WINDOWS["span"]}
         terms = {name: self.term(argument) for name, argument in given.items()}
-        fixed = {name: term for name, term in terms.items() if signature.parameters[name].annotation is float}
-        varying = {name: term for name, term in terms.items() if name not in fixed}
-        return self.plan.reduction(Reduction(node.name, function, fixed, bounds, varying))
+        fixed = {name: term for name, term in terms.items() if name not in function.varying}
+        varying = {name: term for name, term in terms.items() if name in function.varying}
+        several = bool(self._rows) and any(uses_index(given[name]) for name in varying)
+        return self.plan.reduction(Reduction(node.name, function, fixed, bounds, varying, several=several))
 
     def _argument(self, node: Node) -> Argument:
         if isinstance(node, Group):

@@ -17,7 +17,7 @@ from .calculation import Binding, Scope, evaluate, names_of, reach
 from .formulas import read
 from .functions import CONSTANTS, ELEMENTWISE, Function, Value, call_problem
 from .signals import Rehearsal, Signals
-from .syntax import Call, Name, Node, Reference, Temporal, walk
+from .syntax import Call, Name, Node, Operation, Reference, Temporal, uses_index, walk
 from .terms import Plan, Prepared
 from .vocabulary import Names, numbers_of, unknown_signal
 
@@ -57,8 +57,7 @@ class Expression:
     @cached_property
     def uses_index(self) -> bool:
         """Whether the free index `i` occurs."""
-        bare = any(isinstance(node, Name) and node.name == "i" for node in walk(self.tree))
-        return bare or any(reference.uses_index for reference in self.references)
+        return uses_index(self.tree)
 
     @property
     def reaches(self) -> int:
@@ -67,13 +66,25 @@ class Expression:
 
     @cached_property
     def stands_in_rows(self) -> bool:
-        """Whether its values for several i can be rows of one: no part makes one number of rows, or has rows itself."""
-        return self.uses_index and not any(
-            isinstance(node, Temporal)
-            or (isinstance(node, Reference) and node.stacked)
-            or (isinstance(node, Call) and (node.name not in self.functions or self.functions[node.name].reduces))
-            for node in walk(self.tree)
-        )
+        """Whether its values for several i can be rows of one: no part compares rows, or has rows itself."""
+        return self.uses_index and self._stands_in_rows(self.tree)
+
+    def _stands_in_rows(self, node: Node) -> bool:
+        function = self.functions.get(node.name) if isinstance(node, Call) else None
+        if function is not None and function.reduces:
+            assert isinstance(node, Call)
+            if not uses_index(node):
+                return True  # one number for all
+            if function.compares or call_problem(node, self.functions):
+                return False
+            return all(
+                self._stands_in_rows(argument) if name in function.varying else not uses_index(argument)
+                for name, argument in function.given(node).items()
+            )
+        if isinstance(node, Temporal) or (isinstance(node, Reference) and node.stacked):
+            return False
+        children = node.operands if isinstance(node, Operation) else node.arguments if isinstance(node, Call) else ()
+        return all(map(self._stands_in_rows, children))
 
     def calls(self, name: str) -> bool:
         """Whether the function of this name is called somewhere."""
@@ -91,7 +102,7 @@ class Expression:
         """
         if not self.uses_index or not any(reference.uses_index for reference in self.references):
             return ()
-        names, key = Names.of(names), tuple(reference.key for reference in self.references)
+        names, key = Names.of(names), ("indices", self.text)
         if key not in names.known:
             names.known[key] = self._indices(names)
         found: tuple[int, ...] = names.known[key]
@@ -209,7 +220,7 @@ class Expression:
             reason = f"its parts differ in their number of rows ({error})"
             raise scope.error(Problem("", reason, "combine arrays of one size")) from None
 
-    def value(self, run: Prepared, index: int | None = None) -> Value:
+    def value(self, run: Prepared, index: Index = None) -> Value:
         """As `evaluate` has it, where numbers may overflow without a word."""
         try:
             return run.whole[self.bound(run.plan, index).term(self.tree)]

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..problems import Problem, suggestion
-from .syntax import Call, Group
+from .syntax import Call, Group, Node
 
 WINDOWS = {"span": ("after", "until", "outside"), "phase": ("after", "until")}
 """The arguments by which a user bounds what is reduced; a phase does not contain the point at its end."""
@@ -29,13 +29,15 @@ class Function:
     that counts. It returns the rows to be looked at, shape (T,) or (n, T), and the `Fold` that looks at them. Arguments
     annotated as `float` are one number for the whole run, the others vary over time. The fold may depend on the span,
     on these numbers and on how many rows the others have, but not on their values: calls that share all that look at
-    the run together, with one fold.
+    the run together, with one fold. Unless it `compares` rows with one another, what it returns has a row for each that
+    they have, so that rows may as well be looked at each alone.
     """
 
     call: Callable[..., Any]
     unit: str = ""  # of the result: a unit, "same" as the first argument, "per s" of it, or unknown
     takes_signals: bool = False
     window: Literal["", "all", "span", "phase"] = ""
+    compares: bool = False
 
     @property
     def reduces(self) -> bool:
@@ -53,6 +55,19 @@ class Function:
         window = [inspect.Parameter(name, inspect.Parameter.KEYWORD_ONLY, default=None) for name in self.bounds]
         return signature.replace(parameters=[*own, *window])
 
+    @cached_property
+    def varying(self) -> frozenset[str]:
+        """The arguments of a reducer that vary over time."""
+        parameters = self.arguments.parameters.values()
+        return frozenset(one.name for one in parameters if one.annotation is not float) - {*WINDOWS["span"]}
+
+    def given(self, call: Call) -> dict[str, Node]:
+        """The arguments in a call of it by their names."""
+        plain = len(call.arguments) - len(call.keywords)
+        named = dict(zip(call.keywords, call.arguments[plain:], strict=True))
+        given: dict[str, Node] = self.arguments.bind(*call.arguments[:plain], **named).arguments
+        return given
+
     @property
     def bounds(self) -> tuple[str, ...]:
         """The arguments that bound the window in time."""
@@ -65,7 +80,7 @@ def logical(operation: Callable[..., Value], *operands: Value) -> Value:
     result = operation(*numbers)
     for x in numbers:
         unknown = np.isnan(x)
-        if unknown.any():
+        if np.count_nonzero(unknown):
             result = np.where(unknown, np.nan, result)
     return np.asarray(result)
 
@@ -112,10 +127,8 @@ def call_problem(call: Call, functions: Mapping[str, Function]) -> Problem | Non
     for word in call.keywords:
         if word not in signature.parameters:
             return Problem("", f"{call.name} has no argument '{word}'", suggestion(word, signature.parameters))
-    plain = len(call.arguments) - len(call.keywords)
-    named = dict(zip(call.keywords, call.arguments[plain:], strict=True))
     try:
-        given = signature.bind(*call.arguments[:plain], **named).arguments
+        given = functions[call.name].given(call)
     except TypeError as error:
         return Problem(f"{call.name}({', '.join(signature.parameters)})", str(error))
     lists = [word for word, argument in given.items() if isinstance(argument, Group) and word != "outside"]

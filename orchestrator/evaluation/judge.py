@@ -9,7 +9,7 @@ import numpy as np
 from ..errors import ExpressionError
 from ..problems import Problem
 from .expressions import parse
-from .metrics import FUNCTIONS, Metric, check_metric, measure
+from .metrics import FUNCTIONS, Metric, check_metric, measure, numbers_of
 from .requirements import Verdict, parse_requirement
 from .signals import Signals
 from .terms import Plan, Prepared
@@ -80,7 +80,12 @@ class Judge:
     @cached_property
     def value_names(self) -> tuple[str, ...]:
         """Every value of the metrics by a name of its own, `settling` or `gap_min[2]`, in order."""
-        return tuple(value_name(name, index) for name, indices in self.indices.items() for index in indices)
+        return tuple(flat for names in self._value_names.values() for flat in names.values())
+
+    @cached_property
+    def _value_names(self) -> dict[str, dict[int | None, str]]:
+        """The same by metric and i."""
+        return {name: {index: value_name(name, index) for index in indices} for name, indices in self.indices.items()}
 
     @property
     def requirement_names(self) -> tuple[str, ...]:
@@ -96,9 +101,15 @@ class Judge:
         found = (binding.found(reference) for look, binding in bindings for reference in look.references)
         return frozenset(name for names in found for name in names)
 
+    def prepared(self, signals: Signals) -> Prepared:
+        """A run to be looked at by metrics and requirements alike: what they share is calculated once."""
+        if isinstance(signals, Prepared) and signals.plan is self._plan:
+            return signals
+        return Prepared(self._plan, signals)
+
     def metrics(self, signals: Signals) -> list[Metric]:
         """The metrics of a run. One that cannot be evaluated is NaN and says why: the others are still wanted."""
-        run = Prepared(self._plan, signals)
+        run = self.prepared(signals)
         with np.errstate(all="ignore"):
             return [
                 Metric(name, self._texts[name], {None: np.nan}, problem=str(metric))
@@ -117,17 +128,17 @@ class Judge:
         Raises:
             ExpressionError: for what was told before the run.
         """
-        run = Prepared(self._plan, signals)
+        run = self.prepared(signals)
         return [_known(requirement).evaluate(run, scaled=scaled) for requirement in self._requirements.values()]
 
     def values(self, signals: Signals) -> dict[str, float]:
         """The values of the metrics of a run by `value_names`; NaN where one cannot be evaluated."""
-        found = {
-            value_name(metric.name, index): value
-            for metric in self.metrics(signals)
-            for index, value in metric.values.items()
-        }
-        return {name: found.get(name, float("nan")) for name in self.value_names}
+        run, found = self.prepared(signals), dict.fromkeys(self.value_names, float("nan"))
+        with np.errstate(all="ignore"):
+            for name, names in self._value_names.items():
+                numbers = numbers_of(self._texts[name], _known(self._metrics[name]), run)
+                found.update((names[index], value) for index, value in numbers.values.items())
+        return found
 
 
 def value_name(metric: str, index: int | None) -> str:

@@ -6,7 +6,7 @@ NaN in the window gives NaN; a window the run does not cover is an error (`Windo
 
 from collections.abc import Callable, Collection, Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -238,24 +238,51 @@ def _not_reduced(text: str) -> Problem:
     return Problem("", f"'{text}' is a signal, not a number", f"reduce it, as in max({text})")
 
 
-def measure(name: str, text: str, expression: Expression, run: Prepared) -> Metric:
-    """A metric of a run, which is written as the text. One that cannot be evaluated is NaN and says why."""
+class Numbers(NamedTuple):
+    """The values of a metric for each i, as far as there are any; whether they are true or false; what is wrong."""
+
+    values: dict[int | None, float]
+    truth: bool = False
+    problem: str = ""
+
+
+def numbers_of(text: str, expression: Expression, run: Prepared) -> Numbers:
+    """The values of a metric of a run, which is written as the text. One that cannot be evaluated is NaN."""
     values: dict[int | None, float] = {}
-    known: list[int | None] = []
-    truth, problem = False, ""
+    truth = False
     try:
-        for index in expression.instances(run.plan.names):
+        indices = expression.instances(run.plan.names)
+        rows = _rows(expression, run, indices)
+        for place, index in enumerate(indices):
             values[index] = np.nan
-            value = expression.value(run, index)
+            value = expression.value(run, index) if rows is None else rows[place]
             if value.ndim:
                 raise ExpressionError(_not_reduced(text))
             values[index], truth = float(value), value.dtype == np.bool_
-            known.append(index)
     except ExpressionError as error:
-        problem, truth = str(error), False
+        return Numbers(values, problem=str(error))
+    return Numbers(values, truth)
+
+
+def measure(name: str, text: str, expression: Expression, run: Prepared) -> Metric:
+    """A metric of a run, which is written as the text. One that cannot be evaluated is NaN and says why."""
+    values, truth, problem = numbers_of(text, expression, run)
+    known = list(values)[: len(values) - bool(problem)]
     unit = _unit(expression, run, known[-1]) if known else ""
     comfort = isinstance(expression.tree, Call) and expression.tree.name == "comfort"
     return Metric(name, text, values or {None: np.nan}, unit, comfort, problem, truth)
+
+
+def _rows(expression: Expression, run: Prepared, indices: tuple[int | None, ...]) -> Array | None:
+    """All values of a metric at once; None where that cannot be, or one of them has to say why it is none."""
+    several = tuple(index for index in indices if index is not None)
+    if len(several) < 2 or not expression.stands_in_rows:
+        return None
+    try:
+        values = expression.value(run, several)
+    except ExpressionError:
+        return None
+    return None if values.shape != (len(several), 1) or np.isnan(values).any() else values[:, 0]
 
 
 def _unit(expression: Expression, run: Prepared, index: int | None) -> str:

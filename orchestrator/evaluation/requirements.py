@@ -24,7 +24,7 @@ from .formulas import says_when, tokens_of
 from .metrics import EVERY_STEP, FUNCTIONS
 from .reducers import Span, ends_of, scalar
 from .signals import Rehearsal, Signals
-from .slack import can_be_true, conditions, decoded
+from .slack import ZERO, can_be_true, conditions
 from .syntax import Call, Node, Reference, Temporal, walk
 from .temporal import (
     Culprit,
@@ -252,8 +252,9 @@ class Requirement:
         """The signals of the comparison that decides, or its parameters if it has none; and the index of its row."""
         names: list[str] = []
         row: int | None = None
-        for reference in (part for part in walk(culprit.node) if isinstance(part, Reference)) if culprit.node else ():
-            (resolved,) = Expression(reference.text, reference).resolve(scope.names, index)
+        binding = self.condition.bound(scope.binding.plan, index)
+        for reference in binding.known(_references, culprit.node) if culprit.node else ():
+            resolved = binding.found(reference)
             if reference.stacked and culprit.row < len(resolved) and culprit.rows == len(resolved):
                 resolved = [resolved[culprit.row]]
                 row = next(iter(SignalName.parse(resolved[0]).indices), None) if row is None else row
@@ -282,9 +283,16 @@ class Requirement:
                         yield Problem(f"'{self.condition.text}', column {reference.column}", message)
 
 
+def _references(node: Node) -> list[Reference]:
+    """Those in a part of a condition."""
+    return [part for part in walk(node) if isinstance(part, Reference)]
+
+
 def _finite(value: float) -> float | None:
     """A value as it is told; None where it is no measure."""
-    return None if np.isinf(value) else float(decoded(np.asarray(value)))
+    if np.isinf(value):
+        return None
+    return 0.0 if abs(value) <= ZERO else value
 
 
 def _rehearse(node: Node, scope: Scope) -> None:

@@ -74,6 +74,11 @@ class Part:
         """As `Signals` has it."""
         return self.columns["time"]
 
+    @property
+    def own_time(self) -> NDArray[np.float64]:
+        """The times without those of the next part."""
+        return self.time[: self.points - self.beyond]
+
     def is_as(self, other: "Part") -> bool:
         """Whether it has the same points of a run as another part."""
         own, others = ((x.first, x.overlap, x.beyond, x.points) for x in (self, other))

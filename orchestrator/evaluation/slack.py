@@ -3,7 +3,7 @@
 Numbers that differ by rounding are equal: their slack is 0. What stands for that says whether the condition holds.
 """
 
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Iterator, Mapping
 from functools import reduce
 
 import numpy as np
@@ -19,13 +19,13 @@ Scales = Mapping[int, float | Array]
 """What the slack of each comparison is divided by, in all rows or in each (n, 1), by the identity of its node."""
 ROUNDING = 4 * float(np.finfo(np.float64).eps)
 """Numbers that differ by less than this share of what they are made of are equal: a start on a bound is on it."""
-_ZERO = float(np.finfo(np.float64).tiny)
+ZERO = float(np.finfo(np.float64).tiny)
 """What stands for 0 where a condition holds; where it does not, its negative does: so a value says both."""
 
 
 def decoded(values: Array) -> Array:
     """Values with a plain 0 where they are 0."""
-    return np.where(np.abs(values) <= _ZERO, 0.0, values)
+    return np.where(np.abs(values) <= ZERO, 0.0, values)
 
 
 def slack_of(node: Node, scope: Scope, scales: Scales | None = None) -> Array:
@@ -60,41 +60,31 @@ def _number(node: Node, scope: Scope) -> Array:
     return np.asarray(evaluate(node, scope), dtype=np.float64)
 
 
-def _size(node: Node, measure: Callable[[Node], Array]) -> Array:
-    """How large the numbers are that a value is made of: the rounding of a gap is that of the two positions.
-
-    Args:
-        node: the value.
-        measure: of a part of it.
-    """
+def _made_of(node: Node) -> list[Node]:
+    """The numbers that a value is made of, whose size is that of its rounding: of a gap the two positions."""
     match node:
-        case Operation(operator="+" | "-" | "negative" | "positive", operands=operands):
-            parts = [_size(operand, measure) for operand in operands]
-        case Call(name="abs" | "minimum" | "maximum", arguments=arguments):
-            parts = [_size(argument, measure) for argument in arguments]
-        case _:
-            return measure(node)
-    return np.asarray(reduce(np.maximum, parts))
+        case (
+            Operation(operator="+" | "-" | "negative" | "positive", operands=parts)
+            | Call(name="abs" | "minimum" | "maximum", arguments=parts)
+        ):
+            return [number for part in parts for number in _made_of(part)]
+    return [node]
 
 
 def _compared(operator: str, left: Node, right: Node, scope: Scope, scale: float | Array | None) -> Array:
     a, b = _number(left, scope), _number(right, scope)
-
-    def rounding(measure: Callable[[Node], Array]) -> Array:
-        return ROUNDING * np.maximum(_size(left, measure), _size(right, measure))
-
-    gap = np.asarray(b - a)
-    most = rounding(lambda part: scope.frame.largest(scope.binding.term(part)))
+    gap, numbers = np.asarray(b - a), [part for side in (left, right) for part in scope.binding.known(_made_of, side)]
+    most = ROUNDING * np.maximum.reduce([scope.frame.largest(scope.binding.term(part)) for part in numbers])
     is_near = not np.abs(gap).min(initial=np.inf) > most
     if is_near:  # somewhere, perhaps
-        close = rounding(lambda part: np.abs(_number(part, scope)))
+        close = ROUNDING * reduce(np.maximum, [np.abs(_number(part, scope)) for part in numbers])
         equal = (a == b) | (np.abs(gap) <= np.where(np.isfinite(close), close, 0.0))
         gap = np.where(equal, 0.0, gap)  # inf - inf would be NaN
     slack = np.abs(gap) if operator in ("==", "!=") else gap
     slack = slack if operator in ("<", "<=", "!=") else -slack
     slack = slack if scale is None else slack / scale
     if is_near:
-        slack = np.where(slack == 0.0, _ZERO if operator in ("<=", ">=", "==") else -_ZERO, slack)
+        slack = np.where(slack == 0.0, ZERO if operator in ("<=", ">=", "==") else -ZERO, slack)
     return np.asarray(slack)
 
 

@@ -142,6 +142,14 @@ def walk(node: Node) -> Iterator[Node]:
                 yield from walk(child)
 
 
+def uses_index(node: Node) -> bool:
+    """Whether the free index `i` occurs."""
+    return any(
+        part.name == "i" if isinstance(part, Name) else isinstance(part, Reference) and part.uses_index
+        for part in walk(node)
+    )
+
+
 _OPERATORS: dict[type[ast.AST], str] = {
     ast.Add: "+", ast.Sub: "-", ast.Mult: "*", ast.Div: "/", ast.Pow: "**", ast.USub: "negative", ast.UAdd: "positive",
     ast.Not: "not", ast.Lt: "<", ast.LtE: "<=", ast.Gt: ">", ast.GtE: ">=", ast.Eq: "==", ast.NotEq: "!=",

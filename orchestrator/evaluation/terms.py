@@ -49,6 +49,7 @@ class Reduction:
         function: the reducer.
         fixed: its arguments that are one number. varying: those that vary over time.
         bounds: `after`, `until` and `outside`, or None.
+        several: whether each row of what varies has a number of its own, (n, 1), or all have one together.
     """
 
     def __init__(
@@ -58,14 +59,17 @@ class Reduction:
         fixed: Mapping[str, Term],
         bounds: Mapping[str, Argument],
         varying: Mapping[str, Term],
+        *,
+        several: bool = False,
     ) -> None:
         self.name, self.function, self.fixed, self.bounds, self.varying = name, function, fixed, bounds, varying
+        self.several = several
         self.half_open = function.window == "phase"
         self.reach = max((term.reach for term in varying.values()), default=0)
         of = [*fixed.values(), *varying.values(), *(term for bound in bounds.values() for term in _flat(bound))]
         self.level = max((term.level for term in of), default=0)
         self.window = (self.half_open, *map(_hashable, bounds.values()))
-        self.key = (function.call, self.window, *fixed.items(), *varying.items())
+        self.key = (function.call, self.window, several, *fixed.items(), *varying.items())
         self.family = (function.call, self.window, *fixed.items(), *varying)
         """What it has in common with those that look at a run in the same way."""
 
@@ -84,6 +88,7 @@ class Plan:
         self.levels: dict[int, dict[Hashable, list[Reduction]]] = {}
         """All reductions by how many reducers stand inside them, and by what they have in common."""
         self._reductions: dict[Hashable, Reduction] = {}
+        self._selected: tuple[NDArray[np.float64], int, dict[Hashable, Selection]] = np.empty(0), 0, {}
         self._terms: dict[Hashable, Term] = {}
 
     @classmethod
@@ -96,7 +101,17 @@ class Plan:
     @cached_property
     def rehearsal(self) -> "Prepared":
         """A run that is made up, to see what can go wrong in one."""
-        return Prepared(self, Rehearsal(self.names))
+        return Prepared(Plan(self.names), Rehearsal(self.names))  # whose terms no run has to look at
+
+    def selected(self, part: Part) -> tuple[NDArray[np.float64], int, dict[Hashable, Selection]]:
+        """The times of a part of a run, its overlap, and which of its points count, by span, as far as that is known.
+
+        It is from the part that was looked at before, if that had the same times: in a batch, that of another run.
+        """
+        time, overlap, _ = self._selected
+        if overlap != part.overlap or not np.array_equal(time, part.own_time):
+            self._selected = part.own_time.copy(), part.overlap, {}  # a view would keep all of the run
+        return self._selected
 
     def term(self, key: Hashable, calculate: "Callable[[Frame], Value]", *of: Term) -> Term:
         """The one term with this key."""
@@ -125,7 +140,6 @@ class Frame:
     def __init__(self, run: "Prepared", signals: Signals) -> None:
         self.run, self.signals = run, signals
         self._values: dict[Term, Value] = {}
-        self._selections: dict[Hashable, Selection] = {}
         self._largest: dict[Term, Value] = {}
 
     def __getitem__(self, term: Term) -> Value:
@@ -165,11 +179,16 @@ class Frame:
 
     def selection(self, span: Span) -> Selection:
         """Which points count, in a part of the run."""
-        assert isinstance(self.signals, Part)
-        found = self._selections.get(span.key)
+        time, overlap, known = self._selected
+        found = known.get(span.key)
         if found is None:
-            found = self._selections[span.key] = Selection.of(self.signals, span)
+            found = known[span.key] = Selection.of(time, overlap, span)
         return found
+
+    @cached_property
+    def _selected(self) -> tuple[NDArray[np.float64], int, dict[Hashable, Selection]]:
+        assert isinstance(self.signals, Part)
+        return self.run.plan.selected(self.signals)
 
 
 class Prepared:
@@ -288,7 +307,7 @@ class _Look:
         self, run: Prepared, members: list[Reduction], found: dict[Reduction, Value | ExpressionError | ValueError]
     ) -> None:
         self._members, self._found = members, found
-        self._folds: dict[Hashable, tuple[Fold, list[Reduction]]] = {}
+        self._folds: dict[Hashable, tuple[Fold, list[Reduction], list[int]]] = {}
         one = members[0]
         try:
             self._fixed = {
@@ -316,21 +335,25 @@ class _Look:
                 self._give_up([member], error)
                 continue
             # A fold depends on how many rows there are, and of what.
-            alike: Hashable = tuple(value.shape[:-1] for value in varying.values())
+            alike: Hashable = tuple(() if member.several else value.shape[:-1] for value in varying.values())
             group = groups.setdefault(alike, (fold, [], []))
             group[1].append(member)
-            group[2].append(rows)
+            group[2].append(rows[:, np.newaxis] if member.several else np.atleast_2d(rows)[np.newaxis])
         for shapes, (new, members, values) in groups.items():
-            fold, _ = self._folds.setdefault(shapes, (new, members))
+            counts = [len(value) for value in values]
+            fold, *_ = self._folds.setdefault(shapes, (new, members, counts))
             fold.see(Window.of(frame.selection(self._span), values))
         return before is self._members
 
     def finish(self) -> None:
         """Find the values."""
-        for fold, members in self._folds.values():
-            for place, member in enumerate(members):
+        for fold, members, counts in self._folds.values():
+            places = iter(range(sum(counts)))
+            for member, count in zip(members, counts, strict=True):
+                own = [next(places) for _ in range(count)]
                 try:
-                    self._found[member] = np.asarray(fold.value(place))
+                    numbers = [fold.value(place) for place in own]
+                    self._found[member] = np.array([numbers]).T if member.several else np.asarray(numbers[0])
                 except WindowError as error:
                     self._found[member] = error
         for member in self._members:

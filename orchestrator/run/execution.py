@@ -298,7 +298,8 @@ def evaluate(outcome: Run, seen: Signals) -> None:
     if not seen.points:
         return
     judge = outcome.checked.judge
-    outcome.metrics, outcome.requirements = judge.metrics(seen), judge.verdicts(seen)
+    run = judge.prepared(seen)
+    outcome.metrics, outcome.requirements = judge.metrics(run), judge.verdicts(run)
     came = system.provenance
     outcome.published, outcome.references = (
         judge_values(

@@ -135,7 +135,8 @@ class Batch:
         metrics: dict[str, float] = {}
         verdicts: list[Verdict] = []
         if self._evaluate and flown.seen.points:
-            metrics, verdicts = checked.judge.values(flown.seen), checked.judge.verdicts(flown.seen)
+            seen = checked.judge.prepared(flown.seen)
+            metrics, verdicts = checked.judge.values(seen), checked.judge.verdicts(seen)
         columns = flown.recorded
         return Row(
             flown.status,

@@ -63,7 +63,7 @@ class Merged:
             return  # no interval into it counts either
         if self._nan == "looked for":
             unknown = np.isnan(window.kept)
-            if unknown.any():
+            if np.count_nonzero(unknown):
                 found = np.asarray(unknown.any(axis=(-2, -1)))
                 self._is_nan = found if self._is_nan is None else self._is_nan | found
         part = self._part(window)
@@ -85,6 +85,8 @@ class Merged:
 
 def largest(values: Array) -> Array:
     """The value of largest magnitude with its sign: one number for rows that each have one."""
+    if values.shape[-1] == 1:
+        return values[..., 0]
     places = np.abs(values).argmax(axis=-1)
     return np.asarray(np.take_along_axis(values, places[..., np.newaxis], axis=-1)[..., 0])
 
@@ -314,10 +316,11 @@ class MeanJerk:
         """At the chords that end by then; what no later one needs is forgotten."""
         time, rows = self._time, self._rows
         chosen = self._starts & (time + self._width <= last + self._forgiven)
-        if chosen.any():
-            ends = time[chosen] + self._width
+        places = np.flatnonzero(chosen)
+        if places.size:
+            ends = time[places] + self._width
             later = np.array([[np.interp(ends, time, row) for row in signal] for signal in rows])
-            steepest = np.abs(later - rows[..., chosen]).max(axis=(-2, -1)) / self._width
+            steepest = np.abs(later - rows.take(places, axis=-1)).max(axis=(-2, -1)) / self._width
             self._largest = np.fmax(self._largest, steepest)
         # Where none counts, chords that have begun do not end: outside is not crossed, nor the end.
         left = self._starts & ~chosen & np.isfinite(last)

@@ -35,7 +35,7 @@ class Span:
     begin: float = 0.0
     forgiven: float = 0.0
 
-    @property
+    @cached_property
     def key(self) -> Hashable:
         """What tells it from others."""
         return self.after, self.until, tuple(self.outside), self.half_open, self.forgiven
@@ -78,13 +78,17 @@ class Selection:
     kept: slice | NDArray[np.intp]
 
     @classmethod
-    def of(cls, part: Part, span: Span) -> "Selection":
-        """That of a span in a part of a run."""
-        time = part.time[: part.points - part.beyond]
+    def of(cls, time: Array, overlap: int, span: Span) -> "Selection":
+        """That of a span at some points, of which the first are those of the part before."""
         ends = span.points(time)
         points = ends.copy()
-        points[: part.overlap] = False
+        points[:overlap] = False
         return cls(time, points, span, ends, _places(points))
+
+    @cached_property
+    def places(self) -> NDArray[np.intp]:
+        """Where points count, those of the part before among them."""
+        return np.flatnonzero(self.ends)
 
     @cached_property
     def between(self) -> slice | NDArray[np.intp]:
@@ -125,14 +129,15 @@ class Window:
 
     @classmethod
     def of(cls, selection: Selection, values: Sequence[Array]) -> "Window":
-        """Of signals of shape (T,) or (n, T) each, or without T where they do not vary."""
-        time = selection.time
-        count = values[0].shape[0] if values[0].ndim > 1 else 1
-        if len(values) == 1 and values[0].ndim and values[0].dtype == np.float64 and values[0].shape[-1] >= time.size:
-            return cls(values[0].reshape(1, count, -1)[..., : time.size], selection)
-        rows = np.empty((len(values), count, time.size))
-        for row, value in zip(rows, values, strict=True):
-            row[...] = value[..., : time.size] if value.ndim else value
+        """Of signals of shape (k, n, T): k of n rows each, or without their values in time where these do not vary."""
+        time, first = selection.time, values[0]
+        if len(values) == 1 and first.dtype == np.float64 and first.shape[-1] >= time.size:
+            return cls(first[..., : time.size], selection)
+        rows, begin = np.empty((sum(map(len, values)), first.shape[1], time.size)), 0
+        for value in values:
+            end = begin + len(value)
+            rows[begin:end] = value[..., : time.size]
+            begin = end
         return cls(rows, selection)
 
     @property
@@ -231,7 +236,7 @@ def ends_of(signals: Signals) -> tuple[float, float]:
 
 def window_of(part: Part, x: Any, span: Span) -> Window:
     """What counts of a signal, shape (T,) or (n, T), in a part of a run."""
-    selection = Selection.of(part, span)
+    selection = Selection.of(part.own_time, part.overlap, span)
     values = np.atleast_2d(np.asarray(x, dtype=np.float64))[:, : selection.time.size]
     return Window(np.broadcast_to(values, (len(values), selection.time.size)), selection)
 

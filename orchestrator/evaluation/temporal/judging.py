@@ -44,14 +44,14 @@ class Decision:
         self._block = (0, 0)
         final = np.empty(0, np.int64)
         for first, last in self._blocks():
-            places = formula.points.within(span, first, last)
+            places = formula.within(span, first, last)
             self.points += len(places)
             if word == "finally":
-                final = places[-1:] if len(places) else final
+                final = first + places[-1:] if len(places) else final
             elif len(places):
                 self._see(first, last, places)
         if len(final):
-            self._see(int(final[0]), int(final[0]) + 1, final)
+            self._see(int(final[0]), int(final[0]) + 1, np.zeros(1, np.int64))
         if word in ("finally", "") and self.points:
             self.points = 1
 
@@ -68,14 +68,15 @@ class Decision:
     def _see(self, first: int, last: int, places: NDArray[np.int64]) -> None:
         values, block = self.formula.values(self._node, first, last), (first, last)
         if len(places) < last - first:
-            values = values.of(lambda x: x[..., places - first])
-        new = _least(values.high, places)
+            values = values.of(lambda x: x.take(places, axis=-1))
+        numbers = first + places
+        new = _least(values.high, numbers)
         if np.isnan(new.value) and (self._missing is None or new.row < self._missing.row):
             self._missing = new
-        high = _best(values.high, places) if self._word == "eventually" else new
+        high = _best(values.high, numbers) if self._word == "eventually" else new
         low = high
         if values.low is not values.high:
-            low = (_best if self._word == "eventually" else _least)(values.low, places)
+            low = (_best if self._word == "eventually" else _least)(values.low, numbers)
         if self._counts(low, self.low):
             self.low = low
         if self._counts(high, self.high):

@@ -1,7 +1,6 @@
 """The points of a run that a formula looks at, wherever they are: in memory or in a file."""
 
 from bisect import bisect_left, bisect_right
-from collections.abc import Hashable
 from typing import NamedTuple
 
 import numpy as np
@@ -9,7 +8,6 @@ from numpy.typing import NDArray
 
 from ...times import slack
 from .. import signals as runs
-from ..reducers import Span
 from ..signals import Part, Signals
 
 Array = NDArray[np.float64]
@@ -44,7 +42,6 @@ class Points:
         self.count = signals.points
         self._parts: dict[tuple[int, int], Part] = {}
         self._times: dict[int, float] = {}
-        self._within: dict[Hashable, Places] = {}
         self.begin, self.end = (self.time(0), self.time(self.count - 1)) if self.count else (np.inf, -np.inf)
         self.forgiven = slack(signals.step, self.begin, self.end)
 
@@ -62,15 +59,6 @@ class Points:
     def times(self, first: int, last: int) -> Array:
         """Of these points, in s."""
         return np.asarray(self.part(first, last).time[: last - first], dtype=np.float64)
-
-    def within(self, span: Span, first: int, last: int) -> Places:
-        """Those of these points that count, by their numbers."""
-        key = span.key, first, last
-        if key not in self._within:
-            if len(self._within) == _KEPT:
-                del self._within[next(iter(self._within))]
-            self._within[key] = first + np.flatnonzero(span.points(self.times(first, last)))
-        return self._within[key]
 
     def time(self, k: int) -> float:
         """Of one point, in s."""

@@ -15,7 +15,7 @@ from ...problems import Problem
 from ...times import digits
 from .. import signals as runs
 from ..calculation import Scope, evaluate
-from ..reducers import scalar
+from ..reducers import Span, scalar
 from ..signals import Part
 from ..slack import Scales, slack_of
 from ..syntax import CHANGES, Node, Operation, Reference, Temporal, walk
@@ -164,10 +164,11 @@ class Formula:
 
     def is_temporal(self, node: Node) -> bool:
         """Whether a word of logic over time stands in a part."""
-        known = self.scope.binding.known
-        if id(node) not in known:
-            known[id(node)] = node, is_temporal(node)
-        return known[id(node)][1]
+        return self.scope.binding.known(is_temporal, node)
+
+    def within(self, span: Span, first: int, last: int) -> Places:
+        """Which of the points from `first` up to `last` count, counted from the first of them."""
+        return self.scope.of(self.points.part(first, last)).frame.selection(span).places
 
     def choice(self, condition: Node, first: int, last: int) -> Array:
         """The truth of the condition of an `if`."""
