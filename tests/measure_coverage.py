@@ -190,13 +190,14 @@ def marked_lines(text: str) -> set[int]:
 
 def read_c() -> dict[str, Reached]:
     """What was reached, by file."""
-    names = {path.name: path for path in [*KERNEL, *RUNTIME]}
+    # The kernel is compiled where it stands; of the runtime a model has a copy, in one folder.
+    names = {str(path): path for path in KERNEL} | {path.name: path for path in RUNTIME}
     found: dict[Path, Lines] = defaultdict(Lines)
     for data in sorted((DATA / "c").rglob("*.gcda")):
         command = ["gcov", "--json-format", "--branch-probabilities", "--stdout", str(data)]
         for text in subprocess.run(command, check=True, capture_output=True, text=True).stdout.splitlines():
             for file in json.loads(text)["files"]:
-                path = names.get(Path(file["file"]).name)
+                path = names.get(file["file"]) or names.get(Path(file["file"]).name)
                 for line in file["lines"] if path else ():
                     found[path].add(line)
     marked = {path: marked_lines(path.read_text()) for path in found}

@@ -9,6 +9,7 @@ import pytest
 from fmpy.validation import validate_fmu
 from lxml import etree
 from railcosim.components import CATALOGUE, Component, Memory, Output, Parameter
+from railcosim.components.tracing import TracingError
 from railcosim.fmus.annotation import read
 from railcosim.fmus.description import write
 from railcosim.fmus.references import resolve
@@ -137,3 +138,26 @@ def test_what_is_not_known_to_depend_is_not_said():
     found = list(dependencies_3(described(Unclear(), "3")))
     assert found
     assert {sources is None for _, name, sources in found if name == "y"} == {True}
+
+
+def test_what_reads_values_as_plain_numbers_says_so_or_is_refused():
+    class Hidden(Unclear):
+        """It does not name the package."""
+
+        requires = ()
+
+    with pytest.raises(TracingError, match="Hidden"):
+        described(Hidden(), "3")
+
+
+def test_where_nothing_has_a_unit_none_is_defined():
+    class Bare(Component):
+        """A number."""
+
+        y = Output("1")
+
+        def outputs(self):
+            return {"y": 1.0}
+
+    assert described(Bare(), "2").find("UnitDefinitions") is None
+    assert [unit.get("name") for unit in described(Bare(), "3").iterfind("UnitDefinitions/Unit")] == ["s"]
