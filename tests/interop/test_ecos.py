@@ -23,9 +23,13 @@ class Simulation:
             structure.add_model(name, str(part.path))
         for link in scene.links:
             source, target = f"{link.source.name}::{link.output.name}", f"{link.target.name}::{link.input.name}"
-            structure.make_real_connection(source, target)
+            {
+                "Real": structure.make_real_connection,
+                "Integer": structure.make_int_connection,
+                "Boolean": structure.make_bool_connection,
+            }[link.input.type](source, target)
         starts = {
-            f"{name}::{variable.name}": {"Real": float, "Boolean": bool}[variable.type](value)
+            f"{name}::{variable.name}": {"Real": float, "Integer": int, "Boolean": bool}[variable.type](value)
             for name, part in scene.parts.items()
             for variable, value in part.starts
         }
@@ -50,12 +54,17 @@ class Simulation:
         self.engine.terminate()
 
 
-@pytest.fixture(scope="module")
-def signals(scene, need, tmp_path_factory):
-    need("ecospy")
+def simulate(scene):
+    """Every Real output, by its name."""
     simulation = Simulation(scene)
     simulation.run(scene.points - 1)
     return simulation.signals
+
+
+@pytest.fixture(scope="module")
+def signals(scene, need):
+    need("ecospy")
+    return simulate(scene)
 
 
 def test_the_scenario_is_our_jacobi(signals, scene):

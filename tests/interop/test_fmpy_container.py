@@ -19,12 +19,16 @@ from fmpy.model_description import CoSimulation, ModelDescription, ModelVariable
 
 pytestmark = pytest.mark.long
 
-FLOAT = {"Real": "Float64", "Boolean": "Boolean"}
+FLOAT = {"Real": "Float64", "Integer": "Int32", "Boolean": "Boolean"}
+FIRST = {"Real": float, "Integer": int}
 
 
 def package(scene, folder, links, first_inputs):
     """The container as FMPy 0.3.32 writes it: Path of the file, names of the outputs."""
-    files = {name: folder / f"{part.interface.model}.fmu" for name, part in scene.parts.items()}
+    kinds = {path: number for number, path in enumerate(dict.fromkeys(part.path for part in scene.parts.values()))}
+    files = {  # FMUs of one model with other data are other files
+        name: folder / f"{part.interface.model}_{kinds[part.path]}.fmu" for name, part in scene.parts.items()
+    }
     for name, part in scene.parts.items():
         shutil.copy(part.path, files[name])
     described = {name: fmpy.read_model_description(file) for name, file in files.items()}
@@ -46,7 +50,13 @@ def package(scene, folder, links, first_inputs):
             add(f"{name}.{v.name}_start", "parameter", "fixed", inner[name, v.name], text)
     for link in links if first_inputs else ():
         name = f"{link.target.name}.{link.input.name}"
-        add(f"{name}_start", "parameter", "fixed", inner[link.target.name, link.input.name], repr(float(link.first)))
+        add(
+            f"{name}_start",
+            "parameter",
+            "fixed",
+            inner[link.target.name, link.input.name],
+            repr(FIRST[link.input.type](link.first)),
+        )
     description = ModelDescription(
         fmiVersion="2.0",
         modelName="platoon",

@@ -32,7 +32,12 @@ class Execution:
         for link in scene.links:
             ends = (self.slaves[link.source.name], link.output.reference)
             ends += (self.slaves[link.target.name], link.input.reference)
-            assert self.engine.connect_real_variables(*ends) == 0
+            connect = {
+                "Real": self.engine.connect_real_variables,
+                "Integer": self.engine.connect_integer_variables,
+                "Boolean": self.engine.connect_boolean_variables,
+            }[link.input.type]
+            assert connect(*ends) == 0
         self.observer = CosimObserver.create_time_series(buffer_size=scene.points)
         assert self.engine.add_observer(self.observer)
         self.signals = {
@@ -45,8 +50,12 @@ class Execution:
             self.observer.start_time_series(slave, reference, CosimVariableType.REAL)
 
     def _start(self, name, variable, value):
-        set_value = {"Real": self.engine.real_initial_value, "Boolean": self.engine.boolean_initial_value}
-        typed = {"Real": float, "Boolean": bool}[variable.type](value)
+        set_value = {
+            "Real": self.engine.real_initial_value,
+            "Integer": self.engine.integer_initial_value,
+            "Boolean": self.engine.boolean_initial_value,
+        }
+        typed = {"Real": float, "Integer": int, "Boolean": bool}[variable.type](value)
         assert set_value[variable.type](self.slaves[name], variable.reference, typed)
 
     def samples(self, name, begin, count):
@@ -55,22 +64,37 @@ class Execution:
         return list(values)
 
 
-@pytest.fixture(scope="module")
-def execution(scene, need):
-    need("libcosimpy")
+def executed(scene):
+    """The scene, run to its end."""
     made = Execution(scene)
     assert made.engine.step(scene.points - 1)
     return made
 
 
-def test_the_scenario_is_our_jacobi(execution, scene):
-    found = {
-        # Points from 0 on lack the last one (see below): the first is read by itself.
+def series(execution, scene):
+    """Every Real output, by its name. Points from 0 on lack the last one (see below): the first is read by itself."""
+    return {
         name: execution.samples(name, 0, 2)[:1] + execution.samples(name, 1, scene.points - 1)
         for name in execution.signals
     }
+
+
+@pytest.fixture(scope="module")
+def execution(scene, need):
+    need("libcosimpy")
+    return executed(scene)
+
+
+def test_the_scenario_is_our_jacobi(execution, scene):
+    found = series(execution, scene)
     assert set(found) == scene.outputs("Real")
     assert scene.deviation("jacobi", found) <= 1e-9
+
+
+def test_known_defect_integers_are_not_connected(execution):
+    """libcosimpy 0.0.6 asks for a function by a wrong name: CAILC, which counts its trips in integers, does not run."""
+    with pytest.raises(AttributeError, match="connect_integer_variables"):
+        execution.engine.connect_integer_variables(0, 0, 0, 0)
 
 
 def test_known_defect_a_series_from_the_first_point_lacks_its_last(execution, scene):
