@@ -13,7 +13,7 @@ Unsettled = Literal["stop", "go-on"]
 UNSETTLED: tuple[Unsettled, ...] = ("stop", "go-on")
 Acceleration = Literal["none", "aitken", "anderson"]
 ACCELERATIONS: tuple[Acceleration, ...] = ("none", "aitken", "anderson")
-ACTIONS = ("set", "override", "freeze", "bias", "ramp")
+ACTIONS = ("set", "override", "freeze", "bias", "ramp", "connect")
 
 
 @dataclass
@@ -88,12 +88,15 @@ class Event:
     Attributes:
         signal: ``"sensor.speed"`` (an output: changed for all who receive it, and recorded so) or
             ``"cruise[2].ahead_speed"`` (an input: changed for this one alone). ``"set"`` takes an unconnected input or
-            a tunable parameter.
+            a tunable parameter, ``"connect"`` a connected input.
         action: ``"set"`` (a new value from now on), ``"override"`` (another value while it lasts), ``"freeze"`` (the
-            value of the beginning), ``"bias"`` (an added value) or ``"ramp"`` (an added value that grows).
+            value of the beginning), ``"bias"`` (an added value), ``"ramp"`` (an added value that grows) or
+            ``"connect"`` (another output that the input follows while it lasts).
         number: which entry of the scenario it belongs to, from 1; 0 where it is its place in the system that counts.
         at: when it begins, s. duration: how long it lasts, s; None for ever. every: period of repetition, s.
         value: of set, override and bias, in the signal's unit. rate: of a ramp, in the signal's unit per second.
+        source: of connect: what the input follows; the signal is its target. fade: for how long, in s, the difference
+            to what passed before fades away, so that nothing jumps.
         origin: where it was written, for messages.
     """
 
@@ -104,6 +107,8 @@ class Event:
     rate: float | None = None
     duration: float | None = None
     every: float | None = None
+    source: Connection | None = None
+    fade: float | None = None
     number: int = field(default=0, compare=False)
     origin: str = field(default="", compare=False)
 

@@ -148,7 +148,14 @@ def _delays(system: System) -> list[str]:
 def _topology(checked: Checked) -> list[str]:
     from ..wiring import describe_topology
 
-    return list(describe_topology({name: model.interface for name, model in checked.models.items()}, checked.wiring))
+    interfaces = {name: model.interface for name, model in checked.models.items()}
+    lines: list[str] = []
+    before: list[str] = []
+    for when, wiring in checked.wiring.routings:
+        now = list(describe_topology(interfaces, wiring))
+        lines += [f"{when}{now[0]}", *now[1:]] if now and now != before else []
+        before = now
+    return lines
 
 
 def _study(system: System) -> list[str]:

@@ -158,7 +158,8 @@ class Loop:
         types = {
             (name, v.name): v.type for name, slave in master.slaves.items() for v in slave.interface.variables.values()
         }
-        real = [x for x in checked.wiring.links if types[x.target] == "Real" and types[x.source] == "Real"]
+        links = master.exchange.links.values()
+        real = [x for x in links if types[x.target] == "Real" and types[x.source] == "Real"]
         self.links = {link.target: link for link in real}
         self.inputs = self._chosen_inputs(inputs)
         self.outputs = self._chosen_outputs(outputs)

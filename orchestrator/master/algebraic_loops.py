@@ -98,11 +98,8 @@ class LoopSolver:
         """How often it had to be solved."""
         at = frozenset(places)
         owners = {exchange.owners[k] for k in places}
-        self._instances = [
-            slave
-            for name, slave in exchange.slaves.items()
-            if name in owners or any(k in at for feed in exchange.feeds[name] for k in feed.sources)
-        ]
+        owners |= {link.target[0] for link in exchange.every_link if exchange.places[link.source] in at}
+        self._instances = [slave for name, slave in exchange.slaves.items() if name in owners]
         self._outputs = {
             slave.name: [n for n, k in enumerate(self._places) if exchange.owners[k] == slave.name]
             for slave in self._instances

@@ -18,11 +18,13 @@ from .compiled import HAS_KERNEL, HAS_THREADS
 
 def check_coupling(system: System, interfaces: Mapping[str, Interface], wiring: Wiring) -> list[Problem]:
     """What is wrong with algorithm, steps and tolerances."""
+    algorithm = ALGORITHMS[system.stepping.algorithm]
+    unfit = [problem for _, now in wiring.routings for problem in algorithm.fit(system, interfaces, now).problems]
     return [
         *_check_rates(system),
         *_check_tolerances(system, interfaces),
         *_check_refresh(system),
-        *ALGORITHMS[system.stepping.algorithm].fit(system, interfaces, wiring).problems,
+        *dict.fromkeys(unfit),
     ]
 
 
@@ -49,7 +51,7 @@ def _against_threads(system: System, models: Mapping[str, Model], wiring: Wiring
     if system.stepping.refresh:
         yield "feed-through is refreshed in one thread"
     interfaces = {name: model.interface for name, model in models.items()}
-    if system.stepping.algebraic_loops == "solve" and find_loops(interfaces, wiring.links, doubtful=True):
+    if system.stepping.algebraic_loops == "solve" and find_loops(interfaces, wiring.every_link, doubtful=True):
         yield "algebraic loops are solved in Python"
     for what, names in _without_threads(system, models).items():
         if names:
@@ -126,7 +128,11 @@ def _check_refresh(system: System) -> Iterable[Problem]:
 def describe_coupling(system: System, interfaces: Mapping[str, Interface], wiring: Wiring) -> list[str]:
     """What a user should know of the coupling though it is no error: loops, and inputs that are held all the same."""
     notes, algorithm = [], ALGORITHMS[system.stepping.algorithm]
-    for loop in find_loops(interfaces, wiring.links):
+    loops: dict[tuple[str, ...], str] = {}
+    for when, now in wiring.routings:
+        for loop in find_loops(interfaces, now.links):
+            loops.setdefault(loop, when)
+    for loop, when in loops.items():
         if system.stepping.algebraic_loops == "solve":
             how = "it is solved at each communication point"
         elif algorithm.solves_loops:
@@ -136,7 +142,7 @@ def describe_coupling(system: System, interfaces: Mapping[str, Interface], wirin
                 "it is solved at initialization and acts one step late from then on; algebraic_loops = 'solve' solves "
                 "it at each communication point"
             )
-        notes.append(f"algebraic loop through {listed(loop)}: {how}")
+        notes.append(f"{when}algebraic loop through {listed(loop)}: {how}")
     notes += algorithm.fit(system, interfaces, wiring).notes
     if system.stepping.extrapolation:
         held = [n for n, x in interfaces.items() if any(link.target[0] == n for link in wiring.links)]

@@ -96,6 +96,7 @@ class CompiledLoop:
         coupling, exchange = self._coupling, self._exchange
         done, stop, count = points
         self._note = own_note()
+        self.plan.follow()
         places = np.zeros(self.plan.threads, PLACE)
         places["failed"] = -1
         disturbed = np.zeros(len(self.plan.operations), np.int64)

@@ -24,7 +24,7 @@ class Coupling:
     Args:
         slaves: the instances by name, in the sequence in which they are recorded.
         sequence: their names in the order of a sweep.
-        links: scalar connections.
+        links: scalar connections, as they are in the beginning.
         settings: how values are continued over a step, and loops treated.
         is_sweeping: whether an instance is given what others have computed in the same step.
         is_of_end: whether the inputs of a step are those of its end; sampled components act on those of its begin, so
@@ -51,11 +51,13 @@ class Coupling:
         self.settings = settings
         self.interfaces = {name: slave.interface for name, slave in slaves.items()}
         parted = set(settings.rates)
+        others = [link for made in settings.routes for link in made]
         if is_of_end:
             parted |= {name for name, interface in self.interfaces.items() if interface.sampled}
         self.exchange = Exchange(
-            slaves, links, sweeping=is_sweeping, parted=parted, refreshing=settings.stepping.refresh
+            slaves, links, others, sweeping=is_sweeping, parted=parted, refreshing=settings.stepping.refresh
         )
+        links = self.exchange.every_link
         order = settings.stepping.extrapolation
         self.extrapolator = Extrapolator(self.exchange, links, order, ended=is_of_end) if order else None
         self.loops: LoopSolver | None = None

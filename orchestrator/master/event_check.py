@@ -56,7 +56,12 @@ def _problems(
 def _misplaced(event: Event, variable: Variable, is_fed: bool) -> Iterator[Problem]:
     """Why such an event cannot happen to such a variable."""
     causality = variable.causality
-    if event.action == "set":
+    if event.action == "connect":
+        if causality != "input":
+            yield Problem("", f"'connect' is for inputs, not for causality {causality}")
+        elif not is_fed:
+            yield Problem("", "it follows nothing before", "connect it to something in [connections]")
+    elif event.action == "set":
         if causality == "parameter" and variable.variability != "tunable":
             yield Problem("", "it is a fixed parameter: only tunable ones can change")
         elif causality not in ("input", "parameter"):
@@ -79,6 +84,11 @@ def _wrong_value(event: Event, variable: Variable) -> Iterator[Problem]:
         key = "value" if event.action == "bias" else "rate"
         if not _is_finite(getattr(event, key)):
             yield Problem("", f"{key} takes a finite number, not {getattr(event, key)!r}")
+    elif event.action == "connect":
+        if event.source is None:
+            yield Problem("", "no source is given", "say what the input follows")
+        if event.fade is not None and variable.type != "Real":
+            yield Problem("", f"fade is for Real variables, not for {variable.type}")
     elif event.action != "freeze":
         try:
             _typed(event.value, variable)
@@ -108,7 +118,7 @@ def _step(system: System, instance: str, variable: Variable) -> float:
 def _wrong_times(event: Event, step: float) -> Iterator[Problem]:
     if not _is_finite(event.at):
         yield Problem("", f"at takes a finite number, not {event.at!r}")
-    for key in ("duration", "every"):
+    for key in ("duration", "every", "fade"):
         length = getattr(event, key)
         if length is None:
             continue

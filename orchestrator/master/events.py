@@ -1,14 +1,15 @@
-"""Events on the way: new values of inputs and parameters, and faults of signals.
+"""Events on the way: new values of inputs and parameters, faults of signals, and inputs that follow other outputs.
 
 An event that changes a signal fills a slot that the exchange applies whenever the value passes. An output is changed
-for all who receive it, and so recorded; an input for that instance alone.
+for all who receive it, and so recorded; an input for that instance alone. What fades after an input was connected anew
+is such a change as well.
 """
 
 from __future__ import annotations
 
 import heapq
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
@@ -18,6 +19,7 @@ from ..system import Event
 from ..times import slack
 from ..wiring import as_text
 from .exchange import Change, Exchange
+from .settings import Settings
 
 
 @dataclass(frozen=True, order=True)
@@ -37,7 +39,10 @@ class _Due:
 
 @dataclass
 class _Fault:
-    """An occurrence of an event that acts on a signal now. ``held`` is the value that a freeze keeps."""
+    """An occurrence of an event that acts on a signal now.
+
+    ``held`` is the value that a freeze keeps, or the difference that fades since an input was connected anew.
+    """
 
     occurrence: tuple[int, int]
     since: float
@@ -48,22 +53,26 @@ class Schedule:
     """The events of a run, in the order in which they are due.
 
     Args:
-        events: found fit by `check_events`; arrays may be named as a whole.
+        settings: with events that were found fit by `check_events`; arrays may be named as a whole.
         exchange: where they act.
         start_time: of the run in s; what began before acts from then on.
-        rates: how many communication steps an instance takes at once, where that is not one.
     """
 
-    def __init__(
-        self, events: Sequence[Event], exchange: Exchange, start_time: float, rates: Mapping[str, int] | None = None
-    ) -> None:
+    def __init__(self, settings: Settings, exchange: Exchange, start_time: float) -> None:
         self._exchange = exchange
+        self._start_time, rates = start_time, settings.rates
         self._events = [
             (event, SignalName(signal.instance, scalar))
-            for event, signal in ((event, SignalName.parse(event.signal)) for event in events)
+            for event, signal in ((event, SignalName.parse(event.signal)) for event in settings.events)
             for scalar in exchange.slaves[signal.instance].interface.scalars(signal.variable) or ()
         ]
-        self._slots = {target: self._slot(target) for event, target in self._events if event.action != "set"}
+        ways = [link for made in settings.routes for link in made]
+        self._ways = dict(zip((n for n, (x, _) in enumerate(self._events) if x.action == "connect"), ways, strict=True))
+        """What an input follows by an event, by the event's number."""
+        self._first = {link.target: exchange.links[link.target] for link in ways}
+        self._led: dict[SignalName, list[tuple[int, int]]] = {target: [] for target in self._first}
+        """The events by which an input does not follow its first output now, the one that counts last."""
+        self._slots = {target: self._slot(target) for event, target in self._events if _changes(event)}
         self._acting: dict[SignalName, list[_Fault]] = {target: [] for target in self._slots}
         self._parts = {
             target: part
@@ -71,7 +80,7 @@ class Schedule:
             for part in exchange.yields[target[0]]
             if target in exchange.places and part.begin <= exchange.places[target] < part.end
         }
-        self._slow = {t: rates[t[0]] for t, part in self._parts.items() if rates and t[0] in rates and not part.direct}
+        self._slow = {t: rates[t[0]] for t, part in self._parts.items() if t[0] in rates and not part.direct}
         """Outputs that appear at the end of a longer step only, with the number of steps in it."""
         self._kept: dict[SignalName, Any] = {}
         """What those were, unchanged, at the last end of such a step."""
@@ -132,16 +141,19 @@ class Schedule:
             held = None
             if event.action == "set":
                 self._set(event, target, time)
+            elif event.action == "connect":
+                held = self._connect(one, time)
             elif one.is_begin:
                 held = self._present(target, time) if event.action == "freeze" else None
                 self._acting[target].append(_Fault(one.occurrence, one.time, held))
             else:
                 self._acting[target] = [f for f in self._acting[target] if f.occurrence != one.occurrence]
-            if event.action != "set":
+            if _changes(event):
                 self._fill(target)
                 if target in true:
                     self._show(target, true[target], time)
-            self._note(time, event, target, one.is_begin, held)
+            if one.count >= 0:
+                self._note(time, event, target, one.is_begin, held)
         return bool(due)
 
     def _take(self, until: float) -> list[_Due]:
@@ -181,6 +193,33 @@ class Schedule:
         slave.channel(variable.type, [target[1]]).set([given(event.value, variable)])
         slave.time = before
 
+    def _connect(self, one: _Due, time: float) -> str:
+        """Let an input follow another output, or the one before; what it follows now.
+
+        A fade, which has a count below 0, begins with that and is over later.
+        """
+        event, target = self._events[one.number]
+        faults = self._acting.get(target, [])
+        if one.count < 0:
+            self._acting[target] = [fault for fault in faults if fault.occurrence != one.occurrence]
+            return ""
+        fades = event.fade is not None and not one.time < self._start_time
+        before = self._present(target, time) if fades else 0.0
+        led = [occurrence for occurrence in self._led[target] if occurrence != one.occurrence]
+        self._led[target] = [*led, one.occurrence] if one.is_begin else led
+        self._lead(target)
+        if fades:
+            self._slots[target].active = False
+            occurrence = one.number, -1 - 2 * one.count - one.is_begin
+            fault = _Fault(occurrence, time, before - self._present(target, time))
+            self._acting[target] = [*(other for other in faults if other.occurrence[1] >= 0), fault]
+            heapq.heappush(self._due, _Due(time + (event.fade or 0.0), False, *occurrence))
+        return str(self._exchange.links[target].source)
+
+    def _lead(self, target: SignalName) -> None:
+        led = self._led[target]
+        self._exchange.lead(self._ways[led[-1][0]] if led else self._first[target])
+
     def _present(self, target: SignalName, time: float) -> Any:
         """The value that passes now."""
         if target in self._exchange.places:
@@ -207,6 +246,8 @@ class Schedule:
                 slot.offset = float(value)
         elif event.action == "bias":
             slot.offset = float(event.value)
+        elif event.action == "connect":
+            slot.offset, slot.slope = fault.held, -fault.held / float(event.fade or 1.0)
         else:
             slot.slope = float(event.rate or 0.0)
 
@@ -225,6 +266,7 @@ class Schedule:
                 [*target, *f.occurrence, f.since, f.held] for target, acting in self._acting.items() for f in acting
             ],
             "due": [[one.time, one.is_begin, one.number, one.count] for one in self._due],
+            "led": [[*target, *occurrence] for target, led in self._led.items() for occurrence in led],
             "kept": [[*target, value] for target, value in self._kept.items()],
             "happened": list(self.happened),
         }
@@ -239,10 +281,20 @@ class Schedule:
             _Due(float(time), bool(begin), int(number), int(count)) for time, begin, number, count in saved["due"]
         ]
         heapq.heapify(self._due)
+        self._led = {target: [] for target in self._led}
+        for instance, variable, number, count in saved["led"]:
+            self._led[SignalName(instance, variable)].append((int(number), int(count)))
+        for target in self._led:
+            self._lead(target)
         self._kept = {SignalName(instance, variable): value for instance, variable, value in saved["kept"]}
         self.happened = list(saved["happened"])
         for target in self._slots:
             self._fill(target)
+
+
+def _changes(event: Event) -> bool:
+    """Whether it changes values that pass, while it lasts or for a while."""
+    return event.action not in ("set", "connect") or event.fade is not None
 
 
 def _first(event: Event, start: float) -> int | None:

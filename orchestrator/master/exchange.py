@@ -14,6 +14,7 @@ from typing import Any
 
 from ..errors import FmuError
 from ..fmi import Channel, Slave, Type
+from ..names import SignalName
 from ..wiring import Link, is_direct
 
 
@@ -91,7 +92,8 @@ class Exchange:
 
     Args:
         slaves: the instances by name, in the sequence in which they are recorded.
-        links: scalar connections.
+        links: scalar connections, as they are in the beginning.
+        others: those that events may make in their place.
         sweeping: whether instances are read one by one while others have not stepped yet, as in a Gauss-Seidel sweep.
         parted: instances whose direct outputs are read apart from the others: they are due at different points.
         refreshing: whether direct outputs of what is not sampled are brought up to date before a point is recorded.
@@ -101,13 +103,19 @@ class Exchange:
         self,
         slaves: Mapping[str, Slave],
         links: Sequence[Link],
+        others: Sequence[Link] = (),
         *,
         sweeping: bool = True,
         parted: Collection[str] = (),
         refreshing: bool = False,
     ) -> None:
         self.slaves = slaves
-        self.links = links
+        self.links = {link.target: link for link in links}
+        """The present connections, by the input that they lead to."""
+        self.every_link = [*links, *others]
+        """All connections that there are at some time."""
+        self.changed_links = 0
+        """How often one of them has taken the place of another."""
         self.signals: list[str] = []
         """Names of the values, in the order in which they are recorded."""
         self.places: dict[tuple[str, str], int] = {}
@@ -117,8 +125,9 @@ class Exchange:
         """Whether values are exchanged at a communication point that is not recorded yet, not for a step from one."""
         wanted: dict[str, set[str]] = {name: set() for name in slaves}
         incoming: dict[str, list[Link]] = {name: [] for name in slaves}
-        for link in links:
+        for link in self.every_link:
             wanted[link.source[0]].add(link.source[1])
+        for link in links:
             incoming[link.target[0]].append(link)
         self.yields = {name: self._plan_outputs(slave, wanted[name], name in parted) for name, slave in slaves.items()}
         self.kinds: list[Type] = [
@@ -129,7 +138,7 @@ class Exchange:
         self.values: list[Any] = [0.0] * len(self.signals)
         self.stamps: list[float] = []
         """What time in s each of the values belongs to; kept only if there is an entry for each."""
-        deepest = max((link.delay for link in links), default=0)
+        deepest = max((link.delay for link in self.every_link), default=0)
         self.depth = deepest + 1 if deepest else 0
         """How many recorded points delayed connections look back on, the present one included."""
         self.history: deque[list[Any]] = deque(maxlen=self.depth)
@@ -164,22 +173,35 @@ class Exchange:
         plan = []
         for kind in types_of(variables[link.target[1]].type for link in mine):
             links = [link for link in mine if variables[link.target[1]].type == kind]
-            plan.append(
-                Feed(
-                    channel=slave.channel(kind, [link.target[1] for link in links]),
-                    kind=kind,
-                    targets=tuple(link.target[1] for link in links),
-                    sources=tuple(self.places[link.source] for link in links),
-                    plain=all(x.is_linear and (x.scale, x.offset, x.delay) == (1.0, 0.0, 0) for x in links),
-                    scales=tuple(link.scale for link in links),
-                    offsets=tuple(link.offset for link in links),
-                    thresholds=tuple(link.threshold for link in links),
-                    mappings=tuple(link.mapping for link in links),
-                    ages=tuple(self.age(link) for link in links),
-                    ages_at_point=tuple(self._age_at_point(link) for link in links),
-                )
-            )
+            channel = slave.channel(kind, [link.target[1] for link in links])
+            plan.append(self._plan_feed(channel, kind, links, []))
         return plan
+
+    def _plan_feed(self, channel: Channel, kind: Type, links: Sequence[Link], changes: list[Change | None]) -> Feed:
+        return Feed(
+            channel=channel,
+            kind=kind,
+            targets=tuple(link.target[1] for link in links),
+            sources=tuple(self.places[link.source] for link in links),
+            plain=all(x.is_linear and (x.scale, x.offset, x.delay) == (1.0, 0.0, 0) for x in links),
+            scales=tuple(link.scale for link in links),
+            offsets=tuple(link.offset for link in links),
+            thresholds=tuple(link.threshold for link in links),
+            mappings=tuple(link.mapping for link in links),
+            ages=tuple(self.age(link) for link in links),
+            ages_at_point=tuple(self._age_at_point(link) for link in links),
+            changes=changes,
+        )
+
+    def lead(self, link: Link) -> None:
+        """Let the input that a connection leads to follow this one from now on."""
+        self.links[link.target] = link
+        self.changed_links += 1
+        instance, variable = link.target
+        for n, feed in enumerate(self.feeds[instance]):
+            if variable in feed.targets:
+                links = [self.links[SignalName(instance, target)] for target in feed.targets]
+                self.feeds[instance][n] = self._plan_feed(feed.channel, feed.kind, links, feed.changes)
 
     def age(self, link: Link) -> int | None:
         """How many recorded points back a delayed connection reads; 0 is the point at the begin of the step.

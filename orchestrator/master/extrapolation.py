@@ -24,10 +24,10 @@ Points = Sequence[tuple[float, float]]
 
 @dataclass(frozen=True)
 class Course:
-    """The inputs of one instance that are continued, all of one feed: their places in it, and their names."""
+    """The inputs of one instance that are continued, all of one feed: its number, their places in it, their names."""
 
     instance: str
-    feed: Feed
+    feed: int
     members: tuple[int, ...]
     names: tuple[str, ...]
 
@@ -37,7 +37,8 @@ class Extrapolator:
 
     Args:
         exchange: whose inputs they are.
-        links: scalar connections. Delayed ones are held, and so is what a sampled component gives or what is discrete.
+        links: scalar connections that there may be. Delayed ones are held, and so is what a sampled component gives or
+            what is discrete; what one of them holds is held always.
         order: of the polynomial: 1 or 2.
         ended: whether the values are always those of the end of the step, as in an iteration; what a source has not
             reached yet is a guess then.
@@ -48,13 +49,13 @@ class Extrapolator:
         self._exchange = exchange
         self.is_of_end = ended
         exchange.stamps = [0.0] * len(exchange.values)
-        smooth = {link.target for link in links if _is_smooth(exchange, link)}
+        smooth = {link.target for link in links} - {link.target for link in links if not _is_smooth(exchange, link)}
         self.courses: dict[str, Course] = {}
         for name, feeds in exchange.feeds.items():
-            for feed in feeds:
+            for n, feed in enumerate(feeds):
                 members = tuple(k for k, target in enumerate(feed.targets) if (name, target) in smooth)
                 if members:
-                    self.courses[name] = Course(name, feed, members, tuple(feed.targets[k] for k in members))
+                    self.courses[name] = Course(name, n, members, tuple(feed.targets[k] for k in members))
         self.orders: dict[str, int] = {}
         """Of instances that refused derivatives of the order wanted: the order they take."""
         self.said: dict[str, str] = {}
@@ -65,7 +66,7 @@ class Extrapolator:
     def begin(self, time: float) -> None:
         """Note the values at the start, in s."""
         for name, course in self.courses.items():
-            values = self._exchange.inputs(course.feed, time)
+            values = self._exchange.inputs(self._exchange.feeds[name][course.feed], time)
             self.past[name] = [[(time, values[k])] for k in course.members]
 
     def write(self, name: str, time: float, length: float, *, ended: bool = False) -> None:
@@ -77,9 +78,9 @@ class Extrapolator:
         if course is None:
             self._exchange.write(name, time)
             return
-        for feed in self._exchange.feeds[name]:
+        for n, feed in enumerate(self._exchange.feeds[name]):
             values = self._exchange.inputs(feed, time)
-            if feed is not course.feed:
+            if n != course.feed:
                 feed.channel.set(values)
                 continue
             for past, k in zip(self.past[name], course.members, strict=True):
@@ -96,7 +97,7 @@ class Extrapolator:
             for points, k in zip(past, course.members, strict=True):
                 given[k], *slopes = polynomial(points[-order - 1 :], time, order)
                 derivatives += slopes
-        course.feed.channel.set(given)
+        self._exchange.feeds[course.instance][course.feed].channel.set(given)
         if not order:
             return
         names = [n for n in course.names for _ in range(order)]
@@ -119,7 +120,8 @@ class Extrapolator:
     def refuse(self, name: str, error: FmuError, time: float) -> None:
         """An instance has refused in the compiled loop what its inputs' past gives for a step from a time in s."""
         course = self.courses[name]
-        self._lower(course, error, self._exchange.inputs(course.feed, time), self.past[name], time)
+        values = self._exchange.inputs(self._exchange.feeds[name][course.feed], time)
+        self._lower(course, error, values, self.past[name], time)
 
     def report(self) -> dict[str, Any]:
         """Whose inputs are continued by less than was wanted, for the record of the run; empty where there are none."""
@@ -132,7 +134,8 @@ class Extrapolator:
     def continued(self, name: str, feed: Feed) -> list[list[tuple[float, float]]] | None:
         """What inputs of a feed are continued by now: the points of each; None where all of them are held."""
         course = self.courses.get(name)
-        return None if course is None or feed is not course.feed else [list(points) for points in self.past[name]]
+        is_held = course is None or feed is not self._exchange.feeds[name][course.feed]
+        return None if is_held else [list(points) for points in self.past[name]]
 
     def give_again(self, name: str, values: Sequence[float], past: Sequence[Points], time: float) -> None:
         """Set the inputs of an instance's continued feed from another time in s on, as `continued` had them."""

@@ -105,10 +105,10 @@ class Master:
     def _make_loop_solver(self, unsettled: Sequence[int]) -> LoopSolver | None:
         """For the loops that the FMUs' dependencies tell of or allow, and those that exchange did not settle."""
         interfaces, exchange = self.coupling.interfaces, self.exchange
-        signals = {signal for loop in find_loops(interfaces, exchange.links, doubtful=True) for signal in loop}
+        signals = {signal for loop in find_loops(interfaces, exchange.every_link, doubtful=True) for signal in loop}
         places = {k for k, signal in enumerate(self.signals) if signal in signals}
         places.update(unsettled)
-        feeders = find_feeders(interfaces, exchange.links, {exchange.owners[k] for k in places})
+        feeders = find_feeders(interfaces, exchange.every_link, {exchange.owners[k] for k in places})
         ordered = [slave for slave in self.coupling.sequence if slave.name in feeders]
         return LoopSolver(exchange, sorted(places), ordered) if places else None
 
@@ -143,7 +143,7 @@ class Master:
         if settings.stepping.algebraic_loops == "solve":
             coupling.loops = self._make_loop_solver(unsettled)
         if settings.events:
-            self._schedule = Schedule(settings.events, self.exchange, start_time, settings.rates)
+            self._schedule = Schedule(settings, self.exchange, start_time)
             self._let_happen(0.0, lambda: None)
         if coupling.extrapolator is not None:
             coupling.extrapolator.begin(start_time)

@@ -45,5 +45,5 @@ def assembled(
             wiring.links,
             wiring.starts,
             system.stepping.algorithm,
-            settings=Settings.of(system, threads),
+            settings=Settings.of(system, wiring, threads),
         )

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections import Counter
-from collections.abc import Collection, Mapping
+from collections.abc import Collection, Iterator, Mapping
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -50,7 +50,7 @@ class Checked:
     @cached_property
     def units(self) -> dict[str, str]:
         """Units by full name, of signals and parameters that have one."""
-        sources = {link.source for link in self.wiring.links}
+        sources = {link.source for link in self.wiring.every_link}
         return {
             f"{name}.{v.name}": v.unit
             for name, model in self.models.items()
@@ -106,7 +106,7 @@ def check(system: System, workspace: Workspace, kind: Kind = "auto", *, trusted:
     if problems:
         raise ScenarioError(problems)
     system, undrawn = _without_unrecorded(system, [*recorded, *parameters.intersection(names)], every_step)
-    order = derive_order(list(system.instances), wiring.links, system.stepping.order)
+    order = derive_order(list(system.instances), wiring.every_link, system.stepping.order)
     large = tell_size(system, sum(name not in parameters for name in recorded))
     notes = [*left_out, *undrawn, *([large] if large else []), *_notes(system, models, wiring, order)]
     return Checked(system, models, wiring, order, tuple(notes), judge, large)
@@ -187,7 +187,7 @@ def _is_there(signal: str, interfaces: Mapping[str, Interface]) -> bool:
 
 def signal_names(interfaces: Mapping[str, Interface], wiring: Wiring) -> list[str]:
     """What expressions may speak of: everything that will be recorded, every parameter, and what a swap left."""
-    sources = {link.source for link in wiring.links}
+    sources = {link.source for link in wiring.every_link}
     return [
         *(
             f"{instance}.{variable.name}"
@@ -258,10 +258,22 @@ def describe_stepping(checked: Checked) -> list[str]:
     lines = [f"{algorithm.name} {line}" for line in (*steps, *algorithm.fit(system, interfaces, checked.wiring).steps)]
     delays = loop_delays(system, interfaces, checked.wiring, checked.order.sequence)
     lines += [str(delay) for delay in delays if not delay.wanted and delay.steps]
+    lines += _describe_routings(checked.wiring)
     for instance in system.instances.values():
         if instance.step is not None:
             lines.append(f"{instance.name} steps every {digits(instance.step)} s")
     return lines
+
+
+def _describe_routings(wiring: Wiring) -> Iterator[str]:
+    """Which inputs follow other outputs than before, from when on."""
+    before = wiring
+    for when, now in wiring.routings:
+        followed = {link.target: link.source for link in before.links}
+        others = [f"{x.target} follows {x.source}" for x in now.links if followed[x.target] != x.source]
+        if others:
+            yield f"{when}{', '.join(others)}"
+        before = now
 
 
 def _notes(system: System, models: Mapping[str, Model], wiring: Wiring, order: Order) -> list[str]:
@@ -271,8 +283,9 @@ def _notes(system: System, models: Mapping[str, Model], wiring: Wiring, order: O
     interfaces = {name: model.interface for name, model in models.items()}
     for interface in {id(interface): interface for interface in interfaces.values()}.values():
         notes.update(dict.fromkeys(interface.remarks))
-    delays = loop_delays(system, interfaces, wiring, order.sequence)
-    notes.update(dict.fromkeys(str(delay) for delay in delays if delay.wanted))
+    for when, now in wiring.routings:
+        delays = [x for x in loop_delays(system, interfaces, now, order.sequence) if x.wanted]
+        notes |= {f"{when}{delay}": None for delay in delays if str(delay) not in notes}
     notes.update(dict.fromkeys(isolation_notes(system, models)))
     notes.update(dict.fromkeys(describe_coupling(system, interfaces, wiring)))
     if ALGORITHMS[system.stepping.algorithm].in_order:

@@ -256,7 +256,11 @@ def read_checkpoint(directory: Path) -> Checkpoint:
 def _system(data: dict[str, Any]) -> System:
     instances = {name: Instance(**entry) for name, entry in data.pop("instances").items()}
     connections = [Connection(**entry) for entry in data.pop("connections")]
-    events = [Event(**entry) for entry in data.pop("events")]
+    sources = [entry.pop("source") for entry in data["events"]]
+    events = [
+        Event(**entry, source=source and Connection(**source))
+        for entry, source in zip(data.pop("events"), sources, strict=True)
+    ]
     data["provenance"]["presets"] = tuple(data["provenance"]["presets"])
     data["provenance"]["command"] = tuple(data["provenance"].get("command", ()))
     data["provenance"]["named"] = ()  # by a file: nobody else knows

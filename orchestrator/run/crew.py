@@ -86,7 +86,7 @@ class Crew:
             assert isinstance(slave, LoadedSlave | IsolatedSlave)  # no other discards a step
             slave.roll_back()
         slaves, starts = {name: self._slaves[name] for name in checked.models}, checked.wiring.starts
-        settings, master = Settings.of(checked.system), self._master
+        settings, master = Settings.of(checked.system, checked.wiring), self._master
         if master is None or restoring or not master.begin_again(slaves, starts, settings):
             algorithm = checked.system.stepping.algorithm
             master = Master(slaves, checked.order.sequence, checked.wiring.links, starts, algorithm, settings=settings)

@@ -63,6 +63,9 @@ class Revision:
 
     def _revised(self, made: System, known: Checked) -> Checked | None:
         """What is known of other values of the same keys, with these; None where the whole has to be checked."""
+        events = [*made.events, *known.system.events]
+        if made.events != known.system.events and any(event.action == "connect" for event in events):
+            return None  # when there are which connections
         events = made.events
         if self._is_swapped:  # what the new model lacks was left out
             if events != self._system.events:

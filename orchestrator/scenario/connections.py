@@ -6,8 +6,10 @@ from collections.abc import Iterator, Mapping
 from typing import Any
 
 from ..errors import ScenarioError
+from ..problems import Problem
 from ..system import Connection
-from .groups import number, shown, truth
+from .groups import Entry, number, shown, truth
+from .groups import whole as counted
 from .patterns import Rule, read_endpoint
 from .reader import Reader
 
@@ -51,44 +53,57 @@ def _lines(
 
 
 def _options(reader: Reader, value: str | Mapping[str, Any], *path: str) -> Connection:
-    made = Connection("", path[-1], origin=reader.source.origin(*path))
-    if isinstance(value, str):
-        made.source = value
-        return made
-    reader.check_keys(value, CONNECTION_KEYS, *path)
-    if not isinstance(value.get("from"), str):
-        reader.problem("names no source", *path, remedy='write { from = "instance.output", ... }')
-    else:
-        made.source = value["from"]
-    delay = value.get("delay", 0)
-    if isinstance(delay, bool) or not isinstance(delay, int) or not 0 <= delay <= 10**6:
-        reader.problem(f"takes a whole number of communication steps, at least 0, not {shown(delay)}", *path, "delay")
-    else:
-        made.delay = delay
-    entries = {key: reader.entry(value[key], *path, key) for key in CONNECTION_KEYS if key in value}
-    if "scale" in entries:
-        made.scale = number(entries["scale"], reader.problems, 1.0)
-    if "threshold" in entries:
-        made.threshold = number(entries["threshold"], reader.problems, 0.5)
-    if "optional" in entries:
-        made.optional = truth(entries["optional"], reader.problems)
-    if "convert" in entries:
-        made.convert = truth(entries["convert"], reader.problems)
-    if "offset" in entries:
-        made.offset = number(entries["offset"], reader.problems)
-    if "map" in entries:
-        made.map = _map(reader, entries["map"].value, *path)
+    entries: dict[str, Entry] = {}
+    if not isinstance(value, str):
+        reader.check_keys(value, CONNECTION_KEYS, *path)
+        entries = {key: reader.entry(value[key], *path, key) for key in CONNECTION_KEYS if key in value}
+    made = read_source(reader.entry(value, *path), entries, reader.problems)
+    made.target = path[-1]
     return made
 
 
-def _map(reader: Reader, table: Any, *path: str) -> dict[str, bool | int | str] | None:
+def read_source(whole: Entry, entries: Mapping[str, Entry], problems: list[Problem]) -> Connection:
+    """What an input is to follow, and how; the connection has no target yet.
+
+    Args:
+        whole: a text, or a table.
+        entries: the keys of the table.
+        problems: where problems go.
+    """
+    made = Connection("", "", origin=whole.origin)
+    if isinstance(whole.value, str):
+        made.source = whole.value
+        return made
+    source, delay = entries.get("from"), entries.get("delay")
+    if source is None or not isinstance(source.value, str):
+        problems.append(whole.problem("names no source", 'write { from = "instance.output", ... }'))
+    else:
+        made.source = source.value
+    if delay is not None:
+        made.delay = counted(
+            delay, problems, lambda x: 0 <= x <= 10**6, "a whole number of communication steps, at least 0", 0
+        )
+    if "scale" in entries:
+        made.scale = number(entries["scale"], problems, 1.0)
+    if "threshold" in entries:
+        made.threshold = number(entries["threshold"], problems, 0.5)
+    if "optional" in entries:
+        made.optional = truth(entries["optional"], problems)
+    if "convert" in entries:
+        made.convert = truth(entries["convert"], problems)
+    if "offset" in entries:
+        made.offset = number(entries["offset"], problems)
+    if "map" in entries:
+        made.map = _map(entries["map"], problems)
+    return made
+
+
+def _map(entry: Entry, problems: list[Problem]) -> dict[str, bool | int | str] | None:
     """What becomes of single values: by the value, as text."""
+    table = entry.value
     if isinstance(table, dict) and table and all(isinstance(value, bool | int | str) for value in table.values()):
         return dict(table)
-    reader.problem(
-        f"takes a table of what becomes of which value, not {shown(table)}",
-        *path,
-        "map",
-        remedy='as in { "1" = 10, "2" = 20 }, { true = false } or { park = "hold" }',
-    )
+    what = f"takes a table of what becomes of which value, not {shown(table)}"
+    remedy = 'as in { "1" = 10, "2" = 20 }, { true = false } or { park = "hold" }'
+    problems.append(entry.problem(what, remedy))
     return None

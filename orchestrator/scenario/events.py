@@ -8,34 +8,41 @@ from typing import Any
 
 from ..errors import ScenarioError
 from ..names import SignalName
-from ..problems import Problem
-from ..system import ACTIONS, Event
+from ..problems import Problem, suggestion
+from ..system import ACTIONS, Connection, Event
 from ..times import digits
+from .connections import CONNECTION_KEYS, read_source
 from .groups import Entry, EventDraft, choice, number, positive, shown
-from .patterns import Counts, members, read_signal
+from .patterns import Counts, Rule, expand, members, read_endpoint, read_signal
 from .reader import Reader
 
-EVENT_KEYS = ("signal", "action", "at", "value", "rate", "duration", "every")
+EVENT_KEYS = ("signal", "action", "at", "value", "rate", "from", "fade", "duration", "every")
 
 _NEEDED = {
     "set": ("value", "say what is set: value = 1.5"),
     "override": ("value", "say what takes the signal's place: value = 1.5"),
     "bias": ("value", "say what is added: value = 1.5"),
     "ramp": ("rate", "say what is added in each second: rate = 0.1"),
+    "connect": ("from", 'say what the input follows: from = "instance.output"'),
 }
 _NOT_TAKEN = {
     ("freeze", "value"): "it keeps the value of the beginning; take 'override' for another one",
     ("ramp", "value"): "say what is added in each second: rate = 0.1",
+    ("connect", "value"): 'say what the input follows: from = "instance.output"',
     ("set", "duration"): "what is set stays; take 'override' for a value that lasts a while",
 }
 
 
 @dataclass(frozen=True)
 class EventRule:
-    """One entry of `[[events]]`: its signals as written, and what all events that it stands for have in common."""
+    """One entry of `[[events]]`: its signals as written, and what all events that it stands for have in common.
+
+    Where it connects, there is a source for each of the signals, or one for all.
+    """
 
     signals: tuple[Entry, ...]
     event: Event
+    sources: tuple[Connection, ...] = ()
 
 
 def draft_events(reader: Reader) -> list[EventDraft]:
@@ -61,10 +68,37 @@ def read_events(drafts: Sequence[EventDraft], problems: list[Problem]) -> list[E
         before = len(problems)
         event.duration = positive(entries["duration"], problems) if "duration" in entries else None
         event.every = positive(entries["every"], problems) if "every" in entries else None
+        event.fade = positive(entries["fade"], problems) if "fade" in entries else None
         if len(problems) == before:
             problems += _repetition(event, entries)
-        rules.append(EventRule(tuple(_signals(entries, whole, problems)), event))
+        signals = _signals(entries, whole, problems)
+        sources = _sources(entries["from"], len(signals), problems) if "from" in entries else []
+        rules.append(EventRule(tuple(signals), event, tuple(sources)))
     return rules
+
+
+def _sources(entry: Entry, count: int, problems: list[Problem]) -> list[Connection]:
+    """What each of so many signals is to follow."""
+    if not isinstance(entry.value, list):
+        return [_source(entry, problems)] * count
+    if count != len(entry.value):
+        problems.append(entry.problem(f"has {len(entry.value)} sources for {count} signals", "give one for each"))
+        return []
+    each = (Entry(value, entry.origin, f"{entry.place}[{k}]") for k, value in enumerate(entry.value, 1))
+    return [_source(one, problems) for one in each]
+
+
+def _source(entry: Entry, problems: list[Problem]) -> Connection:
+    if not isinstance(entry.value, str | dict):
+        what = f'takes "instance.output" or {{ from = "instance.output", ... }}, not {shown(entry.value)}'
+        problems.append(entry.problem(what))
+        return Connection("", "", origin=entry.origin)
+    table = entry.value if isinstance(entry.value, dict) else {}
+    entries = {key: Entry(value, entry.origin, f"{entry.place}.{key}") for key, value in table.items()}
+    for key in entries.keys() - CONNECTION_KEYS:
+        near = suggestion(key, CONNECTION_KEYS) or f"valid here: {', '.join(CONNECTION_KEYS)}"
+        problems.append(entries[key].problem(f"unknown key '{key}'", near))
+    return read_source(entry, entries, problems)
 
 
 def _signals(entries: Mapping[str, Entry], whole: Entry, problems: list[Problem]) -> list[Entry]:
@@ -103,10 +137,16 @@ def _misfits(action: str, entries: Mapping[str, Entry], whole: Entry) -> list[Pr
     problems = []
     if needed and needed not in entries:
         problems.append(whole.problem(f"{needed} is missing", remedy))
-    excluded = [key for key in ("value", "rate") if key != needed] + ["duration"] * (action == "set")
+    excluded = [key for key in ("value", "rate", "from") if key != needed]
+    excluded += ["duration"] * (action == "set") + ["fade"] * (action != "connect")
     for key in excluded:
         if key in entries:
-            why = _NOT_TAKEN.get((action, key), "take 'ramp' for an added value that grows")
+            other = (
+                "ramp' for an added value that grows"
+                if key == "rate"
+                else "connect' for an input that follows another output"
+            )
+            why = _NOT_TAKEN.get((action, key), f"take '{other}")
             problems.append(entries[key].problem(f"'{action}' takes no {key}", why))
     return problems
 
@@ -144,10 +184,13 @@ def expand_events(rules: Sequence[EventRule], counts: Counts, problems: list[Pro
     """The events of every single signal, in the order they are written."""
     events = []
     for k, rule in enumerate(rules, 1):
-        names: dict[SignalName, None] = {}
-        for entry in rule.signals:
+        names: dict[SignalName, Connection | None] = {}
+        for n, entry in enumerate(rule.signals):
             try:
-                found = members(read_signal(entry.value, counts), counts)
+                if rule.sources:
+                    found = _connected(entry.value, rule.sources[n], counts)
+                else:
+                    found = dict.fromkeys(members(read_signal(entry.value, counts), counts))
             except ScenarioError as error:
                 problems += error.at(entry.where)
                 continue
@@ -156,6 +199,12 @@ def expand_events(rules: Sequence[EventRule], counts: Counts, problems: list[Pro
                 for name in found
                 if name in names
             ]
-            names |= dict.fromkeys(found)
-        events += [replace(rule.event, signal=str(name), number=k) for name in names]
+            names |= found
+        events += [replace(rule.event, signal=str(name), source=source, number=k) for name, source in names.items()]
     return events
+
+
+def _connected(signal: str, source: Connection, counts: Counts) -> dict[SignalName, Connection | None]:
+    """The inputs that a line stands for, each with what it follows; both ends may say `i`."""
+    rule = Rule(read_endpoint(signal, counts), read_endpoint(source.source, counts), source)
+    return {SignalName.parse(made.target): made for made in expand(rule, counts)}

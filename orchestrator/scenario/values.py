@@ -13,12 +13,12 @@ from ..names import SignalName
 from ..problems import Problem
 from ..system import Event, System
 from .changes import EVENT, change
-from .events import EVENT_KEYS, expand_events, read_events
+from .events import expand_events, read_events
 from .groups import OPTION_KEYS, Draft, Entry, EventDraft, Group, Member, expand_group
 from .patterns import NAME
 from .simulation import read_seed
 from .toml_source import parse_value
-from .writer import toml_value
+from .writer import event_table, toml_value
 
 SEED = "simulation.seed"
 _STRUCTURE = ("component", "fmu", "count", *OPTION_KEYS)
@@ -31,8 +31,9 @@ def is_structural(key: str) -> bool:
     Args:
         key: as `--set` has it, or ``"preset"``, or an instance alone whose model is swapped.
     """
-    if key == SEED or EVENT.fullmatch(key):
-        return False
+    event = EVENT.fullmatch(key)
+    if key == SEED or event:
+        return bool(event and event[2] == "from")
     name, _, rest = key.partition(".")
     return name == "simulation" or not rest or rest in _STRUCTURE or rest.startswith("build.")
 
@@ -109,10 +110,13 @@ def _entries(events: list[Event]) -> list[EventDraft]:
     entries: dict[int, EventDraft] = {}
     for k, event in enumerate(events, 1):
         number = event.number or k
-        given = {key: getattr(event, key) for key in EVENT_KEYS if key != "signal"} | {"signal": []}
+        table = event_table(event)
+        each: dict[str, list[Any]] = {key: [] for key in ("signal", "from") if table[key] is not None}
+        given: dict[str, Any] = table | each
         written = {key: Entry(x, event.origin, f"events[{number}].{key}") for key, x in given.items() if x is not None}
         entries.setdefault(number, EventDraft(Entry(None, event.origin, f"events[{number}]"), written))
-        entries[number].entries["signal"].value.append(event.signal)
+        for key in each:
+            entries[number].entries[key].value.append(table[key])
     return [entries[number] for number in sorted(entries)]
 
 

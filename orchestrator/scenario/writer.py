@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from ..fmi import is_fmu_name
-from ..system import Connection, Instance, Stepping, System
+from ..system import Connection, Event, Instance, Stepping, System
 from .events import EVENT_KEYS
 from .groups import OPTION_KEYS
 from .simulation import SIMULATION_KEYS
@@ -66,11 +66,11 @@ def tables_of(system: System) -> dict[str, Any]:
         "default_preset": came.preset,
         "simulation": simulation,
         "instances": {one.name: _instance(one) for one in system.instances.values()},
-        "connections": {one.target: _options(one) for one in system.connections},
+        "connections": {one.target: _source(one) for one in system.connections},
         "require": system.judged.requirements,
         "metrics": system.judged.metrics,
         "study": system.study,
-        "events": [{key: getattr(event, key) for key in EVENT_KEYS} for event in system.events],
+        "events": [event_table(event) for event in system.events],
         "published": owed,
         "references": own,
         "figures": system.judged.figures,
@@ -134,7 +134,13 @@ def _instance(instance: Instance) -> dict[str, Any]:
     }
 
 
-def _options(connection: Connection) -> str | dict[str, Any]:
+def event_table(event: Event) -> dict[str, Any]:
+    """The keys of an event as `[[events]]` has them; None where there is nothing to say."""
+    source = None if event.source is None else _source(event.source)
+    return {key: source if key == "from" else getattr(event, key) for key in EVENT_KEYS}
+
+
+def _source(connection: Connection) -> str | dict[str, Any]:
     keys = ("delay", "scale", "offset", "threshold", "optional", "convert", "map")
     given = {key: value for key in keys if (value := getattr(connection, key)) != getattr(Connection, key)}
     return {"from": connection.source, **given} if given else connection.source

@@ -124,7 +124,7 @@ class Batch:
     def _repeater(self, checked: Checked) -> Repeater:
         """What runs systems of this structure: nearly always that of the first run."""
         for known, repeater in self._repeaters:
-            if known.wiring.links == checked.wiring.links and known.order == checked.order:
+            if known.wiring.every_link == checked.wiring.every_link and known.order == checked.order:
                 return repeater
         made = Repeater(checked, self._record)
         self._held.callback(made.crew.dismiss)

@@ -22,7 +22,7 @@ _LISTED = 4
 
 def check_inputs(system: System, interfaces: Mapping[str, Interface], wiring: Wiring) -> None:
     """Note inputs that are fed twice, ours that nothing feeds though they need it, and what others' then keep."""
-    fed = _fed(interfaces, wiring)
+    fed = check_fed_once(interfaces, wiring)
     # Of an input that something is meant to feed, nothing more is said than what is wrong with its connection.
     broken = set(_targets(system, interfaces)) if wiring.problems else set()
     for instance, interface in interfaces.items():
@@ -84,8 +84,8 @@ def _slot(instance: str, variable: Variable) -> tuple[str, str, int, int]:
     return instance, variable.fmi_type or kind, variable.reference, variable.element[1] if variable.element else 0
 
 
-def _fed(interfaces: Mapping[str, Interface], wiring: Wiring) -> set[tuple[str, str, int, int]]:
-    """Inputs that a connection feeds."""
+def check_fed_once(interfaces: Mapping[str, Interface], wiring: Wiring) -> set[tuple[str, str, int, int]]:
+    """Inputs that a connection feeds; those that two do are noted."""
     fed: dict[tuple[str, str, int, int], Link] = {}
     for link in wiring.links:
         slot = _slot(link.target[0], interfaces[link.target[0]].variables[link.target[1]])

@@ -10,7 +10,8 @@ from ..errors import ScenarioError
 from ..fmi import Interface, Variable
 from ..names import SignalName, shape_of
 from ..problems import Problem, suggestion
-from ..system import Connection
+from ..system import Connection, Event
+from ..times import digits
 from .conversion import fit
 
 _MOST_COMPARED = 50_000
@@ -50,12 +51,22 @@ class Link:
         return self.threshold is None and self.mapping is None
 
 
+@dataclass(frozen=True)
+class Route:
+    """The scalar connections that an event makes, in the place of those that lead to the same inputs."""
+
+    event: Event
+    links: tuple[Link, ...]
+
+
 @dataclass
 class Wiring:
     """The resolved system.
 
     Attributes:
-        starts: start values by instance and scalar variable. links: scalar connections.
+        starts: start values by instance and scalar variable. links: scalar connections, as they are in the beginning.
+        routes: those that events make later, in the place of others. later: from when on, in s, there are which others:
+            the wiring as it is then, each routing once.
         left: numbers that a scenario gives to a variable which the model that was swapped in does not have, by full
             name: a requirement that reads a bound from there still finds it.
         problems: with one the system cannot run. notes: sentences.
@@ -65,11 +76,23 @@ class Wiring:
 
     starts: dict[str, dict[str, Any]] = field(default_factory=dict)
     links: list[Link] = field(default_factory=list)
+    routes: list[Route] = field(default_factory=list)
+    later: list[tuple[float, Wiring]] = field(default_factory=list)
     left: dict[str, float | bool] = field(default_factory=dict)
     problems: list[Problem] = field(default_factory=list)
     notes: list[str] = field(default_factory=list)
     told: set[str] = field(default_factory=set, repr=False)
     compared: int = field(default=0, repr=False)
+
+    @property
+    def every_link(self) -> list[Link]:
+        """All connections that there may be at some time."""
+        return [*self.links, *(link for route in self.routes for link in route.links)]
+
+    @property
+    def routings(self) -> list[tuple[str, Wiring]]:
+        """The wiring of the beginning and of later, each with when it is, as the begin of a sentence."""
+        return [("", self), *((f"from {digits(since)} s on: ", wiring) for since, wiring in self.later)]
 
     def near(self, name: str, valid: Iterable[str]) -> str:
         """The nearest right name, as a remedy; not for ever."""

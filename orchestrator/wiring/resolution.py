@@ -11,6 +11,7 @@ from ..names import SignalName
 from ..system import System
 from .inputs import check_inputs, check_sampling
 from .links import Wiring, described, find_links
+from .routing import find_routes
 from .starts import find_starts
 
 
@@ -49,5 +50,6 @@ def wire(system: System, interfaces: Mapping[str, Interface]) -> Wiring:
             wiring.notes.append(f"{described(connection)} stands for nothing: there are no such elements")
     _connect_beside(system, interfaces, wiring)
     check_inputs(system, interfaces, wiring)
+    find_routes(system, interfaces, wiring)
     check_sampling(system, interfaces, wiring)
     return wiring

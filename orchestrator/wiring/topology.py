@@ -89,7 +89,8 @@ def topologies(interfaces: Mapping[str, Interface], wiring: Wiring) -> list[Topo
     fed: dict[str, dict[str, str]] = {}
     for link in wiring.links:
         fed.setdefault(link.target[0], {})[link.target[1]] = link.source[0]
-    controllers = [name for name, face in interfaces.items() if f"has_{SIDES[0]}" in face.variables]
+    acting = {link.source[0] for link in wiring.links}  # of two that know a train one may wait for its turn
+    controllers = [name for name, face in interfaces.items() if name in acting and f"has_{SIDES[0]}" in face.variables]
     vehicle = {name: fed[name]["position"] for name in controllers if "position" in fed.get(name, {})}
     feeders = _feeders(wiring.links)
     known = set(vehicle.values())

@@ -129,7 +129,11 @@ def _changed(one: Connection) -> str:
 
 
 def _event(event: Event) -> tuple[str, str, str]:
-    size = {"value": event.value, "rate": event.rate, "for": event.duration, "every": event.every}
+    source, size = event.source, {"value": event.value, "rate": event.rate}
+    if source is not None:
+        changed = _changed(source)
+        size |= {"from": f"{source.source} ({changed})" if changed else source.source, "fade": event.fade}
+    size |= {"for": event.duration, "every": event.every}
     return (
         f"{digits(event.at)} s",
         event.signal,

@@ -67,7 +67,7 @@ class Iterative(Programmed):
         super().__init__(coupling)
         settings, exchange = coupling.settings, coupling.exchange
         self.exchange = exchange
-        self.blocks = find_blocks(coupling.interfaces, exchange.links)
+        self.blocks = find_blocks(coupling.interfaces, exchange.every_link)
         self.tolerances = coupling.tolerances(_TOLERANCE, own_tolerances(self.blocks, coupling.interfaces))
         self._iterations = {
             group: Iteration(exchange, *self._find_exchanged(group), self.tolerances, settings.stepping)
@@ -80,7 +80,7 @@ class Iterative(Programmed):
     @classmethod
     def fit(cls, system: System, interfaces: Mapping[str, Interface], wiring: Wiring) -> Fit:
         """States must be saved where steps are repeated."""
-        blocks = find_blocks(interfaces, wiring.links)
+        blocks = find_blocks(interfaces, wiring.every_link)
         lost = cannot(
             [name for name in interfaces if name in blocks.cyclic and not interfaces[name].can_save_state],
             "in a cycle, and the state that iterative comes back to cannot be saved (canGetAndSetFMUstate is false)",
@@ -109,13 +109,11 @@ class Iterative(Programmed):
 
         These come first: they are needed before their source has stepped.
         """
-        owners, at = self.exchange.owners, {name: k for k, name in enumerate(group)}
+        at = {name: k for k, name in enumerate(group)}
         passed = {
-            (k, at[owners[k]] >= at[name])
-            for name in group
-            for feed in self.exchange.feeds[name]
-            for k, age in zip(feed.sources, feed.ages, strict=True)
-            if age is None and owners[k] in at
+            (self.exchange.places[source], at[source[0]] >= at[target[0]])
+            for source, target in ((link.source, link.target) for link in self.exchange.every_link if not link.delay)
+            if source[0] in at and target[0] in at
         }
         guessed = {k for k, early in passed if early}
         return [*sorted(guessed), *sorted({k for k, _ in passed} - guessed)], len(guessed)

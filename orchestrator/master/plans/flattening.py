@@ -14,7 +14,8 @@ from numpy.typing import NDArray
 from ...fmi import Channel
 from ...fmi.binding import ElementsChannel, FmuChannel, MixedChannel
 from ...isolation import IsolatedChannel
-from ..exchange import Exchange
+from ..exchange import Exchange, Feed
+from .layout import AS_IT_IS, ROUNDED_UP, TRUE_ABOVE
 
 _NUMBERS = "Float64", "Float32", "Int8", "UInt8", "Int16", "UInt16", "Int32", "UInt32", "Int64", "UInt64", "Boolean"
 TYPES = {name: number for number, name in enumerate(_NUMBERS, 1)} | {"Enumeration": 9}
@@ -25,6 +26,9 @@ _FORMS = {"Int64": SIGNED_BITS, "Enumeration": SIGNED_BITS, "UInt64": UNSIGNED_B
 _WIDEST = 2.0**53
 """Beyond that a whole number of 64 bits is compared with a threshold in Python."""
 _BITS = {SIGNED_BITS: np.int64, UNSIGNED_BITS: np.uint64}
+
+Entry = tuple[int, int, int, float, float, int, float, int]
+"""A value's place, age and change; scale, offset, threshold and what that does; what the value is."""
 
 Parts = list[tuple[FmuChannel | IsolatedChannel, Sequence[int]]]
 
@@ -49,6 +53,22 @@ class Wide:
     def form(self, place: int) -> int:
         """What the value at a place is."""
         return int(self.forms[place]) if self._wide else NUMBER
+
+    def entries(self, feed: Feed, changes: Sequence[int], *, late: bool) -> list[Entry]:
+        """Where the inputs of a feed come from.
+
+        Args:
+            feed: the inputs.
+            changes: of each, the number of the change that events may make, or -1.
+            late: whether they are set at a communication point that is not recorded yet.
+        """
+        made: list[Entry] = []
+        ages = feed.ages_at_point if late else feed.ages
+        for k, (source, age, threshold) in enumerate(zip(feed.sources, ages, feed.thresholds, strict=True)):
+            whole = AS_IT_IS if threshold is None else TRUE_ABOVE if feed.kind == "Boolean" else ROUNDED_UP
+            place = source, -1 if age is None else age, changes[k]
+            made.append((*place, feed.scales[k], feed.offsets[k], whole, threshold or 0.0, self.form(source)))
+        return made
 
     def packed(self, values: Sequence[Any]) -> NDArray[np.float64]:
         """Values as the kernel takes them."""
@@ -92,10 +112,8 @@ def can_exchange(exchange: Exchange) -> bool:
     channels += [part.channel for parts in exchange.yields.values() for part in parts]
     wide = Wide(exchange)
     compared = (
-        abs(threshold or 0.0) >= _WIDEST and wide.form(source)
-        for feeds in exchange.feeds.values()
-        for feed in feeds
-        for source, threshold in zip(feed.sources, feed.thresholds, strict=True)
+        abs(link.threshold or 0.0) >= _WIDEST and wide.form(exchange.places[link.source])
+        for link in exchange.every_link
     )
     return (
         None not in map(parts_of, channels) and not any(map(wide.form, exchange.output_changes)) and not any(compared)

@@ -16,7 +16,7 @@ from ..coupling import Coupling
 from ..exchange import Change, Exchange, Yield
 from ..refresh import Refresher
 from .courses import Courses
-from .flattening import TYPES, Wide, can_exchange, parts_of
+from .flattening import TYPES, Entry, Wide, can_exchange, parts_of
 from .layout import (
     AS_IT_IS,
     CHANNEL,
@@ -28,13 +28,11 @@ from .layout import (
     METHODS,
     NONE,
     OPERATION,
-    ROUNDED_UP,
     STATE,
     TRUE_ABOVE,
     Kind,
 )
 
-_Entry = tuple[int, int, int, float, float, int, float, int]
 Called = FmuSlave | Fmi3Slave | Ride
 """What the kernel calls."""
 _NOBODY = None, ""
@@ -69,7 +67,9 @@ class Plan:
         self.courses = Courses(coupling.extrapolator, coupling.exchange)
         self._channels: list[tuple[int, ...]] = []
         self.channels: list[ElementsChannel] = []
-        self._entries: list[_Entry] = []
+        self._entries: list[Entry] = []
+        self._feeds: list[tuple[str, int, list[int], bool, int]] = []
+        self._changed_links = self._exchange.changed_links
         self._references: list[int] = []
         self.operations: list[tuple[int, int, int, int]] = []
         self.late: list[bool] = []
@@ -127,7 +127,7 @@ class Plan:
         exchange, slaves, refresher = coupling.exchange, coupling.slaves, coupling.refresher
         repeated = [n for part in algorithm.program() if isinstance(part, Repeated) for n in part.batch.names]
         able = all(_can_be_called(x, exchange) for x in slaves.values())
-        able = able and not any(link.mapping is not None for link in exchange.links)
+        able = able and not any(link.mapping is not None for link in exchange.every_link)
         able = able and all(can_be_restored(slaves[name]) for name in repeated)
         able = able and Courses.are_able(coupling.extrapolator, exchange)
         here = not any(isinstance(slave, IsolatedSlave) for slave in slaves.values())
@@ -146,6 +146,17 @@ class Plan:
     def rank(self, operation: int) -> tuple[bool, int]:
         """Where an operation of several that failed would stand without threads: all are set before any steps."""
         return self.operations[operation][0] not in (Kind.SET, Kind.EXTEND, Kind.SLOPES), operation
+
+    def follow(self) -> None:
+        """Let inputs follow what they are connected to now."""
+        if self._changed_links == self._exchange.changed_links:
+            return
+        self._changed_links, entries = self._exchange.changed_links, self.arrays[4]
+        for name, n, changes, late, begin in self._feeds:
+            feed = self._exchange.feeds[name][n]
+            places = [k for _, places in parts_of(feed.channel) or () for k in places]
+            made = self.wide.entries(feed, changes, late=late)
+            entries[begin : begin + len(places)] = [made[k] for k in places]
 
     def _add(self, names: Sequence[str], operations: Sequence[Operation], *, final: bool = True) -> None:
         for operation in operations:
@@ -241,17 +252,12 @@ class Plan:
         """Set inputs: as of a step's begin, continued if they are to be, or ``late``, at a communication point."""
         extrapolator = self._coupling.extrapolator
         course = None if extrapolator is None or late else extrapolator.courses.get(slave.name)
-        for feed in self._exchange.feeds[slave.name]:
-            entries = []
-            for k, source in enumerate(feed.sources):
-                age, slot = (feed.ages_at_point if late else feed.ages)[k], feed.changes[k] if feed.changes else None
-                threshold = feed.thresholds[k]
-                whole = AS_IT_IS if threshold is None else TRUE_ABOVE if feed.kind == "Boolean" else ROUNDED_UP
-                change = -1 if slot is None else self._add_change(slot, -1, feed.is_real)
-                place = (source, -1 if age is None else age, change)
-                changed = feed.scales[k], feed.offsets[k], whole, threshold or 0.0
-                entries.append((*place, *changed, self.wide.form(source)))
-            if course is None or feed is not course.feed:
+        for n, feed in enumerate(self._exchange.feeds[slave.name]):
+            slots = feed.changes or [None] * len(feed.targets)
+            changes = [-1 if slot is None else self._add_change(slot, -1, feed.is_real) for slot in slots]
+            self._feeds.append((slave.name, n, changes, late, len(self._entries)))
+            entries = self.wide.entries(feed, changes, late=late)
+            if course is None or n != course.feed:
                 self._add_channels(Kind.SET, slave, feed.channel, entries, feed.is_real, due=(rate, 0), late=late)
                 continue
             number = self.courses.number(slave.name)
@@ -288,7 +294,7 @@ class Plan:
         kind: int,
         slave: Called,
         channel: Channel,
-        entries: Sequence[_Entry],
+        entries: Sequence[Entry],
         is_real: bool,
         *,
         due: tuple[int, int],

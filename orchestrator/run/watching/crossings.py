@@ -57,7 +57,8 @@ class Crossings:
         quantity = np.full(len(time), self._offsets[number])
         for column, weight in self._terms[number]:
             quantity += weight * values[:, column]
-        broken = np.flatnonzero(quantity <= 0.0)
+        rule = self._rules[number]
+        broken = np.flatnonzero((quantity <= 0.0) & (time >= rule.begin) & (time < rule.end))
         if not broken.size:
             return
         lowest = int(broken[np.argmin(quantity[broken])])

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping
+import math
+from collections.abc import Callable, Collection, Iterator, Mapping
 from dataclasses import dataclass
 from functools import partial
 from typing import NamedTuple
@@ -47,23 +48,42 @@ class Rule:
     Attributes:
         quantity: what is watched.
         tell: what to say where it does not.
+        begin, end: from and until when in s it is watched.
     """
 
     quantity: Quantity
     tell: Callable[[Seen], Finding]
+    begin: float = -math.inf
+    end: float = math.inf
 
 
 def rules_of(interfaces: Mapping[str, Interface], wiring: Wiring) -> list[Rule]:
     """Everything that is watched in a system."""
     trains = find_trains(interfaces, wiring)
     return [
-        *(_gap(following) for following in find_followings(interfaces, wiring, {train.name for train in trains})),
+        *_gaps(interfaces, wiring, {train.name for train in trains}),
         *(rule for train in trains for rule in _speeds(train)),
         *(rule for name, face in interfaces.items() for rule in _flags(name, face)),
     ]
 
 
-def _gap(following: Following) -> Rule:
+def _gaps(interfaces: Mapping[str, Interface], wiring: Wiring, trains: Collection[str]) -> Iterator[Rule]:
+    """Of each pair of trains that run one behind the other, for as long as they do: one may leave."""
+    found = [
+        (since, {(one.ahead, one.behind): one for one in find_followings(interfaces, now, trains)})
+        for since, now in [(-math.inf, wiring), *wiring.later]
+    ]
+    stays = all(route.event.duration is None for route in wiring.routes)
+    before: Collection[tuple[str, str]] = ()
+    for n, (since, pairs) in enumerate(found if stays else found[:1]):
+        for pair in pairs:
+            if pair not in before:
+                end = next((other for other, later in found[n:] if pair not in later), math.inf)
+                yield _gap(pairs[pair], since, end)
+        before = pairs
+
+
+def _gap(following: Following, begin: float, end: float) -> Rule:
     ahead, behind = following.ahead, following.behind
 
     def tell(seen: Seen) -> Finding:
@@ -76,7 +96,7 @@ def _gap(following: Following) -> Rule:
         signal = f"{ahead}.position - {behind}.position"
         return Finding("collision", (behind, ahead), signal, seen.since, seen.worst, seen.worst_time, what)
 
-    return Rule(following.gap, tell)
+    return Rule(following.gap, tell, begin, end)
 
 
 def _speeds(train: Train) -> Iterator[Rule]:

@@ -232,7 +232,7 @@ def _of_stepping(checked: Checked) -> Iterator[Problem]:
     for message, applies in found.items():
         if applies:
             yield Problem("--method gradient", message, _REMEDY)
-    for name in Settings.of(system).rates:
+    for name in Settings.of(checked.system, checked.wiring).rates:
         yield _problem(name, "it takes steps of its own")
     for link in checked.wiring.links:
         if link.delay or not link.is_linear:

@@ -7,7 +7,7 @@ from railcosim.orchestrator.errors import ScenarioError
 from railcosim.orchestrator.run.checking import check
 from railcosim.orchestrator.run.execution import run
 from railcosim.orchestrator.scenario.loading import loads
-from railcosim.orchestrator.system import Event, System
+from railcosim.orchestrator.system import Connection, Event, System
 
 BODY = """
 class Outputs(Base):
@@ -188,3 +188,35 @@ def test_each_instance_s_mistake_stands_at_its_place_in_the_file(components, wor
     assert str(caught.value).splitlines() == [
         f"x.toml:6: event on 'source[{k}].xx': Outputs has no variable 'xx'; did you mean 'x'?" for k in (1, 2, 3)
     ]
+
+
+def connect(signal="sink.u", source="source.x", at=1.0, **how):
+    return Event(signal, "connect", at, source=source and Connection(source, signal), **how)
+
+
+@pytest.mark.parametrize(
+    ("event", "problem"),
+    [
+        (connect("sink.free"), "it follows nothing before; connect it to something in [connections]"),
+        (connect("source.x"), "'connect' is for inputs, not for causality output"),
+        (connect(source=None), "no source is given; say what the input follows"),
+        (connect(fade=-1.0), "fade takes a number greater than 0, not -1.0"),
+        (connect(fade=0.1), "fade = 0.1 s is shorter than the step, 0.5 s: it may pass between two points unnoticed"),
+        (connect(every=5.0), "what begins again must end before: give a duration that is not longer than every"),
+    ],
+)
+def test_a_connection_that_cannot_be_made(problems, event, problem):
+    assert problems(event) == [f"event on {event.signal!r}: {problem}"]
+
+
+def test_a_source_that_is_not_there(problems):
+    (problem,) = problems(connect(source="source.y"))
+    assert problem.startswith("event on 'sink.u', from 'source.y': Outputs (source) has no variable 'y'")
+
+
+def test_only_what_is_real_can_fade(mine, workspace):
+    system = System(events=[connect("a.n", "a.m", fade=1.0)])
+    system.add("a", mine("EveryType"))
+    system.connect("a.m", "a.n")
+    with pytest.raises(ScenarioError, match=r"'a\.n': fade is for Real variables, not for Integer"):
+        check(system, workspace, "plain")

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from railcosim.orchestrator.master import compiled
 from railcosim.orchestrator.run.execution import execute, run
-from railcosim.orchestrator.system import Event, System
+from railcosim.orchestrator.system import Connection, Event, System
 
 pytestmark = pytest.mark.skipif(compiled.kernel is None, reason="installed without the compiled step loop")
 STEP = 0.25
@@ -115,12 +115,18 @@ def some_event(draw, system, names, fed):
     at = system.stepping.start_time + draw.choice([draw.uniform(-2.0, 10.0), STEP * draw.randrange(36)])
     if variable in INPUTS and (name, variable) not in fed:
         return Event(f"{name}.{variable}", "set", at, some_value(draw, kind), every=draw.choice([None, 2.0]))
-    action = draw.choice(["override", "freeze"] + ["bias", "ramp"] * (kind == "Real"))
+    connects = ["connect", "connect"] * ((name, variable) in fed)
+    action = draw.choice(["override", "freeze", *connects] + ["bias", "ramp"] * (kind == "Real"))
     duration = draw.choice([None, 0.75, draw.uniform(0.75, 4.0)])
     every = None if duration is None else draw.choice([None, duration, duration + 0.5])
     value = some_value(draw, kind) if action in ("override", "bias") else None
     rate = draw.uniform(-1, 1) if action == "ramp" else None
-    return Event(f"{name}.{variable}", action, at, value, rate, duration, every)
+    event = Event(f"{name}.{variable}", action, at, value, rate, duration, every)
+    if action == "connect":
+        others = [k for k, other in OUTPUTS.items() if other == kind and (variable, k) != ("v", "y")]
+        event.source = Connection(f"{draw.choice(names)}.{draw.choice(others)}", "", delay=draw.choice([0, 0, 2, 6]))
+        event.fade = draw.choice([None, 1.3, 5.0]) if kind == "Real" else None
+    return event
 
 
 @pytest.mark.unmeasured
@@ -147,7 +153,7 @@ def test_the_random_systems_are_of_many_kinds(odd):
     systems = [some_system(random.Random(seed), odd) for seed in range(40)]
     happened = [what for system in systems for what in execute(system).coupling["events"]]
     assert {event.action for system in systems for event in system.events} == {
-        "set", "override", "freeze", "bias", "ramp",
+        "set", "override", "freeze", "bias", "ramp", "connect",
     }  # fmt: skip
     assert len(happened) > 500
     slow = {x.name for x in systems[0].instances.values() if x.step}

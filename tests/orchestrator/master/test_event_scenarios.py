@@ -70,3 +70,21 @@ def test_a_linear_model_says_that_it_knows_nothing_of_events():
     system.events = [Event("cruise[2].speed", "freeze", 0.5)]
     noted = [note for note in linearize(system, 1.0, kind="plain").notes if "events" in note]
     assert noted == ["events act on the way; signals that they change at that time are taken as unchanged"]
+
+
+def test_a_controller_hands_over_without_a_jump(tmp_path):
+    """The second example: with a fade no step of the force is larger than those that the two controllers take alone."""
+    page = Path(__file__).parents[3] / "docs" / "faults_and_checkpoints.md"
+    example = re.search(r"```toml\n(# leaving.toml\n.*?)```", page.read_text(encoding="utf-8"), re.DOTALL)[1]
+    (tmp_path / "leaving.toml").write_text(example)
+    result = execute(load(tmp_path / "leaving.toml"))
+    (tmp_path / "abrupt.toml").write_text(re.sub(r"fade = .*", "", example))
+    abrupt = execute(load(tmp_path / "abrupt.toml"))
+    acceleration = result["train[2].acceleration"]
+    at = int(np.argmin(acceleration))
+    assert (result.time[at], acceleration[at]) == (pytest.approx(70.0, abs=0.2), pytest.approx(-0.53, abs=0.005))
+    assert np.abs(np.diff(acceleration)).max() < 0.01
+    assert np.diff(abrupt["train[2].acceleration"]).min() == pytest.approx(-0.594, abs=0.001)
+    assert result["train[2].speed"][-1] == pytest.approx(50.0, abs=0.02)
+    assert result["train[3].speed"][-1] > 80.0, "it closes up to the first"
+    assert not result.findings

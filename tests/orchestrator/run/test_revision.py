@@ -6,7 +6,7 @@ from railcosim.orchestrator.errors import ScenarioError
 from railcosim.orchestrator.fmi import Workspace
 from railcosim.orchestrator.run import Revision, check, revision
 from railcosim.orchestrator.scenario import changed
-from railcosim.orchestrator.system import Event
+from railcosim.orchestrator.system import Connection, Event
 
 
 @pytest.fixture
@@ -102,3 +102,15 @@ def test_sets_of_keys_are_remembered_but_not_for_ever(system, checks, monkeypatc
         for changes in ({"a.rate": 3.0}, {"a.gain": 4.0}, {"a.gain": 5.0}, {"a.u": 4.0}, {"a.rate": 2.0}):
             revised.of(changes)
     assert len(checks) == 5
+
+
+def test_when_there_are_which_connections_is_looked_at_anew(system, checks, workspace):
+    system.connect("b.y", "a.u")
+    system.events.append(Event("a.u", "connect", 0.25, source=Connection("c.y", "a.u")))
+    revised = Revision(system, workspace, "plain")
+    for at in (0.5, 0.75):
+        ((since, _),) = revised.of({"events[2].at": at}).wiring.later
+        assert since == at
+    assert len(checks) == 3
+    revised.of({"events[2].at": 0.75})
+    assert len(checks) == 3

@@ -3,7 +3,9 @@
 import pytest
 from railcosim.orchestrator.errors import ScenarioError
 from railcosim.orchestrator.scenario.loading import loads
-from railcosim.orchestrator.system import Event
+from railcosim.orchestrator.scenario.values import changed, is_structural
+from railcosim.orchestrator.scenario.writer import dump
+from railcosim.orchestrator.system import Connection, Event
 
 TEXT = """[simulation]
 stop_time = 100.0
@@ -130,9 +132,9 @@ def test_they_follow_the_number_of_instances():
             9,
             ".signal[2]: 'cruise[2].x' stands there twice; an event happens to a signal once",
         ),
-        ({"action": None}, 8, ": action is missing; say what happens: set, override, freeze, bias, ramp"),
+        ({"action": None}, 8, ": action is missing; say what happens: set, override, freeze, bias, ramp, connect"),
         ({"action": '"frezee"'}, 10, ".action: there is no action 'frezee'; did you mean 'freeze'?"),
-        ({"action": "1"}, 10, ".action: there is no action 1; there are set, override, freeze, bias, ramp"),
+        ({"action": "1"}, 10, ".action: there is no action 1; there are set, override, freeze, bias, ramp, connect"),
         ({"at": None}, 8, ": at is missing; say when it begins, in s: at = 60.0"),
         ({"at": '"later"'}, 11, ".at: takes a finite number, not 'later'"),
         ({"at": "inf"}, 11, ".at: takes a finite number, not inf"),
@@ -205,10 +207,10 @@ def test_what_an_action_needs_and_what_it_does_not_take(keys, message):
 def test_every_entry_is_read_and_all_is_told_at_once():
     found = problems(entry(**BIAS), entry(), entry(**BIAS | {"action": '"hold"', "at": '"x"'}))
     assert found == [
-        "x.toml:13: events[2]: action is missing; say what happens: set, override, freeze, bias, ramp",
+        "x.toml:13: events[2]: action is missing; say what happens: set, override, freeze, bias, ramp, connect",
         "x.toml:13: events[2]: at is missing; say when it begins, in s: at = 60.0",
         'x.toml:13: events[2]: signal is missing; name what it happens to: signal = "instance.variable"',
-        "x.toml:16: events[3].action: there is no action 'hold'; there are set, override, freeze, bias, ramp",
+        "x.toml:16: events[3].action: there is no action 'hold'; there are set, override, freeze, bias, ramp, connect",
         "x.toml:17: events[3].at: takes a finite number, not 'x'",
     ]
 
@@ -218,3 +220,80 @@ def test_one_table_is_no_list_of_them_and_the_name_is_taken():
     assert problems('[instances.events]\ncomponent = "A"\n') == [
         "x.toml:8: instances.events: an instance's name is taken; choose another for 'events'"
     ]
+
+
+def connects(**keys):
+    return entry(**{"signal": '"cruise[i].u"', "action": '"connect"', "at": "5", "from": '"gust.y"'} | keys)
+
+
+@pytest.mark.parametrize(
+    ("keys", "found"),
+    [
+        ({"signal": '"cruise[2].u"'}, [("cruise[2].u", "gust.y")]),
+        ({}, [("cruise[1].u", "gust.y"), ("cruise[2].u", "gust.y"), ("cruise[3].u", "gust.y")]),
+        ({"from": '"cruise[i-1].y"'}, [("cruise[2].u", "cruise[1].y"), ("cruise[3].u", "cruise[2].y")]),
+        (
+            {"signal": '["gust.u", "cruise[1].u[3]"]', "from": '["cruise[2].y", "gust.z[1]"]'},
+            [("gust.u", "cruise[2].y"), ("cruise[1].u[3]", "gust.z[1]")],
+        ),
+    ],
+)
+def test_what_follows_what(keys, found):
+    made = events(connects(**keys))
+    assert [(event.signal, event.source.source) for event in made] == found
+    assert {(event.action, event.at, event.fade, event.number) for event in made} == {("connect", 5.0, None, 1)}
+
+
+def test_a_table_has_what_connections_have():
+    table = '{ from = "gust.y", delay = 2, scale = 3.0, offset = -1, convert = false }'
+    (event,) = events(connects(signal='"cruise[1].u"', fade=2, duration=7, **{"from": table}))
+    assert event.source == Connection("gust.y", "cruise[1].u", 2, 3.0, -1.0, convert=False)
+    assert (event.fade, event.duration) == (2.0, 7.0)
+    (event,) = events(
+        connects(signal='"gust.u"', **{"from": '{ from = "gust.m", map = { "1" = 2 }, threshold = 0.5 }'})
+    )
+    assert (event.source.map, event.source.threshold) == ({"1": 2}, 0.5)
+
+
+@pytest.mark.parametrize(
+    ("keys", "message"),
+    [
+        ({"from": None}, 'events[1]: from is missing; say what the input follows: from = "instance.output"'),
+        ({"from": 3}, '.from: takes "instance.output" or { from = "instance.output", ... }, not 3'),
+        ({"from": "[]"}, ".from: has 0 sources for 1 signals; give one for each"),
+        ({"from": "{ delay = 1 }"}, '.from: names no source; write { from = "instance.output", ... }'),
+        ({"from": '{ from = "gust.y", dely = 1 }'}, ".from.dely: unknown key 'dely'; did you mean 'delay'?"),
+        (
+            {"from": '{ from = "gust.y", delay = -1 }'},
+            "takes a whole number of communication steps, at least 0, not -1",
+        ),
+        ({"from": '{ from = "gust.y", map = 3 }'}, ".from.map: takes a table of what becomes of which value, not 3"),
+        ({"from": '"gusty.y"'}, "there is no instance 'gusty'; did you mean 'gust'?"),
+        ({"value": 3}, ".value: 'connect' takes no value; say what the input follows: from = \"instance.output\""),
+        ({"fade": 0}, ".fade: takes a number greater than 0, in s, not 0"),
+        ({"every": 3}, ".every: what begins again must end before; give a duration, in s: duration = 5.0"),
+    ],
+)
+def test_what_is_wrong_with_what_follows(keys, message):
+    found = problems(connects(**{"signal": '"cruise[1].u"'} | keys))
+    assert any(message in problem for problem in found), found
+
+
+def test_fade_and_from_are_for_connect_alone():
+    found = problems(entry(**BIAS, fade=1, **{"from": '"gust.y"'}))
+    why = "take 'connect' for an input that follows another output"
+    assert [one.partition(": ")[2] for one in found] == [
+        f"events[1].from: 'bias' takes no from; {why}",
+        f"events[1].fade: 'bias' takes no fade; {why}",
+    ]
+
+
+def test_it_is_written_and_changed_as_it_was_read():
+    text = connects(fade=1.5, **{"from": '{ from = "cruise[i].y", delay = 1 }'}) + connects(signal='"gust.u"')
+    system = loads(TEXT + text, "x.toml")
+    assert loads(dump(system), "y.toml").events == system.events
+    later = changed(system, {"events[1].at": 9.0})
+    assert [event.at for event in later.events] == [9.0, 9.0, 9.0, 5.0]
+    assert [event.source for event in later.events] == [event.source for event in system.events]
+    assert is_structural("events[1].from")
+    assert not is_structural("events[1].fade")

@@ -10,6 +10,7 @@ from railcosim.orchestrator import System, load, run
 from railcosim.orchestrator.errors import ScenarioError
 from railcosim.orchestrator.run.execution import resume
 from railcosim.orchestrator.run.watching import watching
+from railcosim.orchestrator.system import Connection, Event
 
 TOYS = Path(__file__).parents[3] / "toys.py"
 
@@ -245,3 +246,41 @@ def test_a_run_that_fails_tells_what_it_found():
         run(system, kind="plain")
     assert [told.kind for told in caught.value.run.findings] == ["reversing"]
     assert math.isclose(caught.value.run.findings[0].since, 0.0)
+
+
+def leaving(**how):
+    """The second runs through the first, which it hears ahead, at 6 s; from 4 s on it hears the third, far ahead."""
+    system = System(stop_time=10.0, step=0.5)
+    for name, position, speed in (("first", 30.0, 0.0), ("second", 0.0, 5.0), ("third", 900.0, 0.0)):
+        system.add(name, toy("Cart"), position=position, speed=speed)
+    system.add("cruise", "ComfortCruise", has_ahead=True, has_behind=False, target_speed=5.0)
+    for name in ("position", "speed"):
+        system.connect(f"second.{name}", f"cruise.{name}")
+        system.connect(f"first.{name}", f"cruise.ahead_{name}")
+        source = Connection(f"third.{name}", f"cruise.ahead_{name}")
+        at = 4.0 if name == "position" else 3.0
+        system.events.append(Event(f"cruise.ahead_{name}", "connect", at, source=source, **how))
+    system.connect("cruise.force", "second.force", scale=0.0)
+    return system
+
+
+def reached(system):
+    return [told for told in found(system) if told.kind == "collision"]
+
+
+def test_who_has_left_is_not_collided_with():
+    """Nothing pushes: the second does its 5 m/s."""
+    before = leaving()
+    before.events.clear()
+    (told,) = reached(before)
+    assert (told.kind, told.instances, told.since) == ("collision", ("second", "first"), pytest.approx(6.0, abs=0.5))
+    assert reached(leaving()) == []
+    assert reached(leaving(duration=1.0)) == [], "what comes back is not watched: nobody knows when"
+
+
+def test_who_is_met_on_the_way_is_watched_from_then_on():
+    system = leaving()
+    system.instances["first"].start["position"] = 300.0
+    system.instances["third"].start["position"] = 40.0
+    (told,) = reached(system)
+    assert (told.instances, told.since) == (("second", "third"), pytest.approx(8.0, abs=0.5))
