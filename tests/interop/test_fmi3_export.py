@@ -2,12 +2,15 @@
 
 import csv
 import itertools
+import shutil
 import zipfile
 from dataclasses import replace
+from pathlib import Path
 
 import fmpy
 import numpy as np
 import pytest
+from fmpy.build import build_platform_binary
 from fmpy.validation import validate_fmu
 from railcosim.components import CATALOGUE
 from railcosim.fmus.build import build, native_problem
@@ -70,6 +73,19 @@ def test_a_component_gives_the_bits_of_fmi_2(name):
 @pytest.mark.parametrize("name", [pytest.param(n, marks=pytest.mark.campaign) for n in CATALOGUE])
 def test_every_component_gives_the_bits_of_fmi_2(name):
     check(name)
+
+
+@pytest.mark.long
+@pytest.mark.skipif(shutil.which("cmake") is None, reason="needs cmake")
+def test_fmpy_builds_the_sources_as_they_are_described(tmp_path):
+    path = build("PointMassTrain", kind="native", fmi="3")
+    folder = Path(fmpy.extract(str(path), str(tmp_path / "sources")))
+    shutil.rmtree(folder / "binaries")
+    (tmp_path / "build").mkdir()
+    build_platform_binary(folder, tmp_path / "build")
+    starts = {"speed_start": 60.0, "force": 250e3}
+    one, other = (fmpy.simulate_fmu(str(fmu), stop_time=10.0, start_values=starts) for fmu in (path, folder))
+    assert np.abs(one["speed"] - other["speed"]).max() < 1e-12  # cmake's flags let the compiler contract
 
 
 def swapped(system):
