@@ -1,6 +1,6 @@
-"""The component of benchmarks/ring.py."""
+"""The components of benchmarks/ring.py and benchmarks/iterations.py."""
 
-from railcosim.components import Component, Input, Parameter, State
+from railcosim.components import Component, Input, Parameter, State, maths
 
 
 class Lag(Component):
@@ -12,3 +12,13 @@ class Lag(Component):
 
     def derivatives(self):
         return {"x": self.rate * (self.u - self.x)}
+
+
+class DrivenLag(Component):
+    """A first-order lag that never rests: der(x) = u / 2 + sin(t) - x."""
+
+    u = Input("1", 0.0, description="what it follows")
+    x = State("1", 0.0, output=True, description="the state")
+
+    def derivatives(self):
+        return {"x": 0.5 * self.u + maths.sin(self.time) - self.x}

@@ -1,11 +1,13 @@
 """Compiled: inputs that go on, feed-through that is refreshed, steps that are repeated. The same bits as in Python."""
 
+import re
 import sys
 
 import numpy as np
 import pytest
 from railcosim.orchestrator.errors import CouplingError
 from railcosim.orchestrator.master import compiled
+from railcosim.orchestrator.master.plans.plan import can_be_restored
 from railcosim.orchestrator.run.execution import execute
 from railcosim.orchestrator.system import System
 
@@ -54,30 +56,77 @@ def test_a_circle_that_does_not_settle_is_left_as_it_was(both, able):
     assert abs(result["a.y"] - solved)[1:].min() > 1e-3
 
 
+def test_one_that_refuses_to_be_refreshed(both, species):
+    """In the first step, and is left alone from then on; it has to be read before it is set, in a step."""
+    system = System(stop_time=2.0, step=0.25, refresh=True)
+    for name in ("shy", "plain"):
+        system.add(name, species(["u"], *["-DSHY"] * (name == "shy")), b=-0.1, c=0.3, d=0.5, start=1.0)
+    system.connect("plain.y", "shy.u")
+    system.connect("shy.y", "plain.u", delay=1)
+    assert both(system).status == "completed"
+    assert set(execute(system).coupling["refresh"]["refused"]) == {"shy"}
+
+
+def test_one_that_fails_when_it_is_refreshed(both, able):
+    """It has been refreshed before, so that this is no refusal."""
+    system = system_of(able, [("a.x", "b.v", 0.5)], 8.0, refresh=True)
+    system.instances["b"].start["mode"] = 33
+    result = both(system)
+    assert (result.error.instance, result.error.time, result.time[-1]) == ("b", 5.0, 4.75)
+
+
 @pytest.mark.parametrize("acceleration", ["none", "aitken", "anderson"])
 def test_several_unknowns(both, able, acceleration):
-    """x of each after a step is x + 0.25 (u - x), with u of the others: a linear system for every step."""
-    links = [("a.x", "b.u", 1.1), ("b.x", "c.u", -0.7), ("c.x", "d.u", 1.3), ("d.x", "a.u", -0.9), ("c.x", "b.v", 1.0)]
-    system = system_of(able, links, algorithm="iterative", acceleration=acceleration, tolerance=1e-12)
+    """x of each after a step is x + 0.25 (u - x), with u of the one after it: a linear system for every step."""
+    names, scales = "abcdefgh", [1.1, -0.7, 1.3, -0.9, 1.2, 0.8, -1.4, 1.5]
+    links = [(f"{names[(k + 1) % 8]}.x", f"{name}.u", scales[k]) for k, name in enumerate(names)]
+    system = system_of(able, links, 0.5, algorithm="iterative", acceleration=acceleration, tolerance=1e-12)
     result = both(system)
-    matrix = np.zeros((4, 4))
-    for source, target, scale in links[:4]:
-        matrix["abcd".index(target[0]), "abcd".index(source[0])] = scale
-    x = np.array([result[f"{name}.x"][0] for name in "abcd"])
+    matrix = np.roll(np.diag(scales), 1, axis=1)
+    x = np.array([result[f"{name}.x"][0] for name in names])
     for k in range(1, len(result.time)):
-        x = np.linalg.solve(np.eye(4) - 0.25 * matrix, 0.75 * x + 0.25)
-        assert [result[f"{name}.x"][k] for name in "abcd"] == pytest.approx(x, rel=1e-10)
+        x = np.linalg.solve(np.eye(8) - 0.25 * matrix, 0.75 * x + 0.25)
+        assert [result[f"{name}.x"][k] for name in names] == pytest.approx(x, rel=1e-10)
 
 
-@pytest.mark.parametrize("how", [{"acceleration": "none"}, {}, {"max_iterations": 1}])
-def test_what_leads_nowhere(both, able, how):
+@pytest.mark.parametrize(
+    ("gain", "how"),
+    [
+        (1e9, {"acceleration": "none"}),
+        (1e9, {"max_iterations": 1}),
+        (1e9, {"tolerance": 1e-300}),
+        (1e12, {"tolerance": 1e-310}),
+    ],
+)
+def test_what_leads_nowhere(both, able, gain, how):
     """Values that outgrow all tolerance, and too few iterations: the same words from both."""
-    tolerance = 1e-300 if not how else 1e-9
-    links = [("a.x", "b.u", 1e9), ("b.x", "a.u", 1e9)]
-    how = {"algorithm": "iterative", "tolerance": tolerance, **how}
-    result = both(system_of(able, links, **how))
+    links = [("a.x", "b.u", gain), ("b.x", "a.u", gain)]
+    result = both(system_of(able, links, **({"algorithm": "iterative", "tolerance": 1e-9} | how)))
     assert isinstance(result.error, CouplingError)
     assert len(result.time) == 1
+
+
+def test_an_fmu_that_fails_with_a_later_guess(both, able):
+    """What was guessed first leads to a value that with the gain is beyond all numbers."""
+    links = [("a.x", "b.u", 1e200), ("b.x", "a.u", 1e200)]
+    result = both(system_of(able, links, algorithm="iterative", acceleration="none"))
+    assert re.search(r"with the next guess an FMU fails \([ab], t = 0.25 s: output 'x' is inf\)", str(result.error))
+
+
+def test_sampled_ones_step_first(both, mine):
+    """They act on what the step begins with."""
+    system = System(stop_time=2.0, step=0.25, algorithm="iterative")
+    system.add("course", mine("Course"), b=1.0)
+    system.add("sampled", mine("Keep"))
+    system.add("lag", mine("Lag"))
+    system.connect("course.y", "sampled.u")
+    system.connect("sampled.seen", "lag.u")
+    result = both(system, kind="python")
+    assert result.status == "completed"
+
+
+def test_only_instances_here_are_restored():
+    assert not can_be_restored(object())
 
 
 @pytest.mark.parametrize("status", [2, 3, 4, 9])

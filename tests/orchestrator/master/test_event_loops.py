@@ -24,7 +24,7 @@ def both(monkeypatch):
             loop = compiled.CompiledLoop.run
             patch.setattr(compiled.CompiledLoop, "run", lambda *args, **how: used.append(1) or loop(*args, **how))
             fast = execute(system)
-        assert used or len(fast.time) == 0
+        assert used or len(fast.time) <= 1  # in the first step nobody knows who refuses to be refreshed
         with monkeypatch.context() as patch:
             patch.setattr(compiled, "kernel", None)
             slow = execute(system)

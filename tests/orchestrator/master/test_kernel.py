@@ -296,7 +296,10 @@ def test_the_compiler_has_nothing_to_say(tmp_path, flags):
     compile_kernel(tmp_path / "kernel.so", *flags)
 
 
-PARTS = ("test_compiled.py", "test_compiled_blocks.py", "test_compiled_fmi3.py", "test_kernel.py", "test_threads.py")
+PARTS = (
+    *("test_compiled.py", "test_compiled_blocks.py", "test_compiled_coupling.py", "test_compiled_fmi3.py"),
+    *("test_kernel.py", "test_threads.py"),
+)
 SANITIZERS = {
     ("address", "undefined"): (
         "not sanitized and not compiler and not ctrl_c and not without_the_extension and not short_in_time"

@@ -18,6 +18,15 @@ def test_what_is_written_into_the_room_is_seen_as_rows_and_as_columns():
     assert table.count == 3
 
 
+def test_rows_of_all_values_are_kept_and_shown():
+    table, shown = Table([2, 0]), []
+    observe = table.keeping(lambda steps, rows: shown.append((steps, rows.tolist())) or True)
+    assert observe(1, [[0.5, 1, 2, 3.0]])
+    assert observe(2, ())
+    assert shown == [(1, [[0.5, 3.0, 1.0]]), (2, [])]
+    assert table.columns().tolist() == [[0.5], [3.0], [1.0]]
+
+
 def test_columns_are_views():
     table = Table([0], 5000)
     table.append(np.zeros((3, 2)))
