@@ -12,7 +12,7 @@ static const double dependent = 1e-14; /* part of a column that is left of one w
 /* The first product is not added to zero: a sum of one number is that number, its sign included. */
 static double dot(const double *a, const double *b, size_t count)
 {
-    double sum = count > 0 ? a[0] * b[0] : 0.0;
+    double sum = count > 0 ? a[0] * b[0] : 0.0; /* uncovered: no test comes here yet */
     for (size_t k = 1; k < count; k++) {
         sum += a[k] * b[k];
     }
