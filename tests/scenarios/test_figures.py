@@ -9,8 +9,8 @@ from railcosim.orchestrator.fmi import Workspace
 from railcosim.orchestrator.run import check
 from railcosim.orchestrator.scenario import shipped
 
-STATED = {"Fig. 5: target speed"}
-"""Figures of reconstructed models that show what the source states."""
+STATED = {"Fig. 5: target speed", "Constant time headway, not in the article", "Predictive, not in the article"}
+"""Figures beside reconstructed models that show none of them."""
 
 
 def titles(name):
