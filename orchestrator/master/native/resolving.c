@@ -62,7 +62,7 @@ int resolve_channel(const Plan *plan, const Py_buffer *buffers, const Operation 
     call->entries = entries;
     if (operation->kind == OPERATION_LOOK || operation->kind == OPERATION_STAMP) {
         group->kind = operation->kind == OPERATION_LOOK ? LOOK : STAMP;
-        return group->kind == LOOK || plan->stamps != NULL; /* uncovered: no test comes here yet */
+        return group->kind == LOOK || plan->stamps != NULL;
     }
     return group->function != 0;
 }
@@ -73,14 +73,14 @@ int resolve_course(Plan *plan, const Py_buffer *buffers, const Operation *operat
         return 0;
     }
     const Course *course = (const Course *)buffers[COURSES].buf + operation->index;
-    if (!resolve_channel(plan, buffers, operation, course->channel, group, call) || group->type != 0 || course->function == 0 || /* uncovered: no test comes here yet */
-        course->count < 1 || !is_within(course->begin, course->count, length(buffers, POINTS)) || course->depth < 0 || /* uncovered: no test comes here yet */
-        course->depth > 2 || course->order < 0 || course->order > course->depth || (!course->is_of_end && plan->stamps == NULL)) { /* uncovered: no test comes here yet */
+    if (!resolve_channel(plan, buffers, operation, course->channel, group, call) || group->type != 0 || course->function == 0 ||
+        course->count < 1 || !is_within(course->begin, course->count, length(buffers, POINTS)) || course->depth < 0 ||
+        course->depth > 2 || course->order < 0 || course->order > course->depth || (!course->is_of_end && plan->stamps == NULL)) {
         return 0;
     }
     for (int64_t n = course->begin; n < course->begin + course->count; n++) {
         const Points *points = &plan->points[n];
-        if (!is_within(points->place, 1, group->count) || points->count < 0 || points->count > 3) { /* uncovered: no test comes here yet */
+        if (!is_within(points->place, 1, group->count) || points->count < 0 || points->count > 3) {
             return 0;
         }
     }
@@ -115,10 +115,10 @@ int resolve_state(const Py_buffer *buffers, const Operation *operation, Group *g
 static int is_sound(const Plan *plan, const Py_buffer *buffers, const Loop *loop)
 {
     size_t room = length(buffers, WORK), passed = length(buffers, PASSED);
-    if ((loop->kind != CIRCLE && loop->kind != ITERATION) || loop->limit < 1 || (uint64_t)loop->limit > room || /* uncovered: no test comes here yet */
-        loop->method < RELAXED || loop->method > ANDERSON || loop->real_count < 0 || loop->other_count < 0 || /* uncovered: no test comes here yet */
-        loop->guess_count < 0 || loop->guess_count > loop->real_count || !is_within(loop->begin, loop->real_count, passed) || /* uncovered: no test comes here yet */
-        !is_within(loop->begin + loop->real_count, loop->other_count, passed) || /* uncovered: no test comes here yet */
+    if ((loop->kind != CIRCLE && loop->kind != ITERATION) || loop->limit < 1 || (uint64_t)loop->limit > room ||
+        loop->method < RELAXED || loop->method > ANDERSON || loop->real_count < 0 || loop->other_count < 0 ||
+        loop->guess_count < 0 || loop->guess_count > loop->real_count || !is_within(loop->begin, loop->real_count, passed) ||
+        !is_within(loop->begin + loop->real_count, loop->other_count, passed) ||
         !is_within(loop->work, (int64_t)work_of(plan, loop), room)) {
         return 0;
     }
@@ -128,12 +128,12 @@ static int is_sound(const Plan *plan, const Py_buffer *buffers, const Loop *loop
         }
     }
     const double *head = plan->work + loop->work;
-    return head[COMPARED] >= 0.0 && head[COMPARED] < (double)loop->limit; /* uncovered: no test comes here yet */
+    return head[COMPARED] >= 0.0 && head[COMPARED] < (double)loop->limit;
 }
 
 int resolve_loop(Plan *plan, const Py_buffer *buffers, const Operation *operation, Group *group, Call *call)
 {
-    if (plan->thread_count != 1 || !is_within(operation->index, 1, length(buffers, LOOPS))) { /* uncovered: no test comes here yet */
+    if (plan->thread_count != 1 || !is_within(operation->index, 1, length(buffers, LOOPS))) {
         return 0;
     }
     Loop *loop = &plan->loops[operation->index];
@@ -143,15 +143,15 @@ int resolve_loop(Plan *plan, const Py_buffer *buffers, const Operation *operatio
     if (group->kind == BEGIN) {
         groups[0] = next;
     } else if (group->kind == MARK) {
-        groups[1] = groups[0] > 0 ? next : 0; /* uncovered: no test comes here yet */
+        groups[1] = groups[0] > 0 ? next : 0;
     }
-    return is_sound(plan, buffers, loop) && (group->kind != END || groups[1] > 0); /* uncovered: no test comes here yet */
+    return is_sound(plan, buffers, loop) && (group->kind != END || groups[1] > 0);
 }
 
 int are_loops_closed(const Plan *plan, const Py_buffer *buffers)
 {
     for (size_t n = 0; n < length(buffers, LOOPS); n++) {
-        if (plan->loop_groups[2 * n] > 0 && plan->loop_groups[2 * n + 1] <= plan->loop_groups[2 * n]) { /* uncovered: no test comes here yet */
+        if (plan->loop_groups[2 * n] > 0 && plan->loop_groups[2 * n + 1] <= plan->loop_groups[2 * n]) {
             return 0;
         }
     }

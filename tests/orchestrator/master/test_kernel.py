@@ -7,6 +7,7 @@ import shutil
 import subprocess
 import sys
 import sysconfig
+from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -70,6 +71,7 @@ def test_a_sound_plan(arguments):
     assert list(arguments["table"][1:, 3]) == list(arguments["values"])
     assert arguments["places"].tolist() == [(0, -1, 0)]
     assert call(arguments, count=0) == (0, 0, 1)
+    assert call(arguments, loops=np.zeros(1, LOOP)) == (4, 4, 1), "a loop of which no operation speaks"
 
 
 def test_a_block_ends_where_there_is_no_room_for_a_row(arguments):
@@ -104,14 +106,21 @@ def going_on(arguments, array, name, value):
     return made | {"operations": changed(arguments["operations"], "kind", 7)}
 
 
-def going_round(arguments, *, place=0, **of):
+def going_round(arguments, *, place=0, compared=0.0, **of):
     """A first operation that begins a loop, and none that ends it."""
-    loops = np.zeros(1, LOOP)
+    loops, work = np.zeros(1, LOOP), np.zeros(1000)
     loops["limit"] = 1
     for name, value in of.items():
         loops[name] = value
+    work[1] = compared
     operations = changed(changed(arguments["operations"], "kind", 9), "index", 0)
-    return {"loops": loops, "work": np.zeros(1000), "passed": np.array([place]), "operations": operations}
+    return {"loops": loops, "work": work, "passed": np.array([place]), "operations": operations}
+
+
+def ending(arguments):
+    """A loop that nothing begins."""
+    operations = changed(changed(arguments["operations"], "kind", [10, 11], [0, 1]), "index", 0, [0, 1])
+    return going_round(arguments) | {"operations": operations}
 
 
 WRONG = {
@@ -169,12 +178,44 @@ WRONG = {
     "a negative channel": lambda a: {"operations": changed(a["operations"], "index", -1)},
     "a course that is not there": lambda a: {"operations": changed(changed(a["operations"], "kind", 7), "index", 1)},
     "a course of too high an order": lambda a: going_on(a, "courses", "order", 3),
+    **{
+        f"a course whose {name} is {value}": partial(going_on, array="courses", name=name, value=value)
+        for name, value in [
+            *(("function", 0), ("channel", 10**6), ("count", 0), ("begin", -1), ("begin", 10**6)),
+            *(("depth", -1), ("depth", 3), ("order", -1), ("is_of_end", 0)),
+        ]
+    },
+    "a course of whole numbers": lambda a: (
+        going_on(a, "courses", "order", 2)
+        | {
+            "channels": changed(a["channels"], "type", 1),
+        }
+    ),
+    "fewer points than none": lambda a: going_on(a, "points", "count", -1),
+    "more points than there is room for": lambda a: going_on(a, "points", "count", 4),
     "a continued input that is not there": lambda a: going_on(a, "points", "place", 10**6),
+    "a stamp where there is no room for one": lambda a: {"operations": changed(a["operations"], "kind", 6)},
     "stamps of other values": lambda a: {"stamps": a["values"][:-1]},
     "a state that is not there": lambda a: {"operations": changed(changed(a["operations"], "kind", 12), "index", 0)},
     "a loop that is not there": lambda a: {"operations": changed(changed(a["operations"], "kind", 9), "index", 0)},
     "a loop without rounds": lambda a: going_round(a, limit=0),
     "a loop that compares what is not there": lambda a: going_round(a, kind=1, real_count=1, place=10**6),
+    **{
+        f"a loop whose {name} is {value}": partial(going_round, **{name: value})
+        for name, value in [
+            *(("kind", 2), ("limit", 10**6), ("method", -1), ("method", 3), ("real_count", -1), ("other_count", -1)),
+            *(("guess_count", -1), ("guess_count", 1), ("begin", -1), ("other_count", 2), ("work", 10**6)),
+            *(("compared", -1.0), ("compared", 1.0)),
+        ]
+    },
+    "a loop of several threads": lambda a: (
+        going_round(a)
+        | {
+            "parts": np.array([1, 2, 3, len(a["operations"])]),
+            "places": np.tile(a["places"], 2),
+        }
+    ),
+    "a loop that does not begin": ending,
     "a loop that does not end": going_round,
     "a table with half a column": lambda a: {"table": a["table"].ravel()[:-1]},
     "a row before the table": lambda a: {"row": -1},
