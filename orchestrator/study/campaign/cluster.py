@@ -20,8 +20,9 @@ from . import worker
 from .flight import Flight, Future, Point
 from .parcel import Parcel
 
+_LOG = logging.getLogger(__name__)
 _PATIENCE = 30.0
-"""How long, in s, a scheduler may be away."""
+"""How long, in s, a scheduler may be away, or the end of workers may take."""
 _LOOK = 1.0
 """How often, in s, workers are counted."""
 _KEPT = 256 << 20
@@ -153,7 +154,24 @@ class Cluster:
                 silence_logs=logging.CRITICAL,
                 env={"TMPDIR": str(folder)},
             )
-        return dask.Client(held.enter_context(self._own), set_as_default=False, timeout=_PATIENCE)
+        held.callback(self._close_own)
+        return dask.Client(self._own, set_as_default=False, timeout=_PATIENCE)
+
+    def _close_own(self) -> None:
+        """End the scheduler and the workers on this machine, within a time.
+
+        Of a worker that is killed while it is being started Dask waits for ever to hear: ``multiprocessing`` goes on
+        writing what it is to do into a pipe that nobody reads.
+        """
+        try:
+            self._own.close(timeout=_PATIENCE)
+        except TimeoutError:
+            import psutil
+
+            _LOG.warning("Dask does not end its workers within %g s: they are killed", _PATIENCE)
+            for number in filter(None, [nanny.pid for nanny in self._own.workers.values()]):
+                with suppress(psutil.Error):
+                    psutil.Process(number).kill()
 
     def _remote(self) -> Any:
         try:

@@ -1,10 +1,13 @@
 """Runs on Dask: with a scheduler and a worker in this process, as on any that is there."""
 
+import asyncio
 import os
 import signal
 import threading
+from contextlib import suppress
 from typing import ClassVar
 
+import psutil
 import pytest
 from distributed import LocalCluster
 from railcosim.orchestrator import Study, world
@@ -141,3 +144,25 @@ def test_a_local_cluster_leaves_nothing(how, tmp_path, undisturbed, started, mon
     for digest in list(worker._OPEN):  # those of processes of their own go with them
         worker.forget(digest)
     assert not list((tmp_path / "temporary").iterdir())
+
+
+def test_workers_that_do_not_end_are_not_waited_for(system, how, monkeypatch):
+    """As where one is killed while it is being started, of which Dask never hears."""
+    said, made = [], Cluster(packed(how, [system], "plain"), workers=1)
+    monkeypatch.setattr(cluster_module._LOG, "warning", lambda text, *_: said.append(text))
+    with made:
+        own = made._own
+        (number,) = (nanny.pid for nanny in own.workers.values())
+        close = own._close
+
+        async def never():
+            await asyncio.sleep(3600.0)
+
+        monkeypatch.setattr(own, "_close", never)
+        monkeypatch.setattr(cluster_module, "_PATIENCE", 0.2)
+    assert [text.endswith("they are killed") for text in said] == [True]
+    monkeypatch.setattr(cluster_module, "_PATIENCE", 30.0)
+    with suppress(psutil.NoSuchProcess):
+        psutil.Process(number).wait(10.0)
+    monkeypatch.setattr(own, "_close", close)
+    own.close()
