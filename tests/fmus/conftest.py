@@ -262,9 +262,12 @@ FEW = {"PointMassTrain", "ComfortCruise", "RadioLink", "Chain", "Dice", "Estimat
 
 @pytest.hookimpl(tryfirst=True)
 def pytest_collection_modifyitems(items):
-    """What every model is put through, the large ones are in the long tier; where that is much, all but a few are."""
+    """What every model is put through, the large ones are in the long tier; where that is much, all but a few are.
+
+    What is a campaign stays one.
+    """
     for item in items:
         model = item.name.partition("[")[2].partition("]")[0].partition("-")[0] if item.path.parent == HERE else ""
         many = item.get_closest_marker("few") and model not in FEW
-        if model and (many or model.startswith(LARGE)):
+        if model and (many or model.startswith(LARGE)) and not item.get_closest_marker("campaign"):
             item.add_marker(pytest.mark.long)
