@@ -45,7 +45,7 @@ class Ours:
         self.workspace = Workspace()
         checked = check(system, self.workspace)
         slaves = {name: model.instantiate(name) for name, model in checked.models.items()}
-        wiring, settings = checked.wiring, Settings.of(system)
+        wiring, settings = checked.wiring, Settings.of(system, checked.wiring)
         self.master = Master(
             slaves, checked.order.sequence, wiring.links, wiring.starts, "iterative", settings=settings
         )
