@@ -90,7 +90,7 @@ def page(
         layout: Any = figure.get_layout_engine()
         if path.suffix == ".png":  # laid out now, or it would be drawn twice: once to lay it out
             layout.execute(figure)
-            figure.set_layout_engine("none")
+            figure.set_layout_engine(None)  # "none" would leave a place for one, for whose sake it is drawn twice
         drawn = io.BytesIO()  # of a figure that cannot be drawn, no file is begun
         figure.savefig(drawn, format=path.suffix[1:], metadata=_NAMELESS[path.suffix])
         world.write_bytes(path, drawn.getvalue())

@@ -6,6 +6,7 @@ import sys
 from pathlib import Path
 
 import pytest
+from matplotlib.figure import Figure
 from railcosim.orchestrator.figures.style import _folded, page, wrapped
 
 
@@ -77,3 +78,12 @@ def test_panels_beside_one_another_leave_no_empty_one(tmp_path, ending):
     with page("Three", 3, tmp_path / f"three.{ending}", size=(6.0, 4.0), columns=2) as axes:
         assert len(axes) == len(axes[0].figure.axes) == 3
     assert (tmp_path / f"three.{ending}").stat().st_size > 1000
+
+
+def test_a_png_is_drawn_once(tmp_path, monkeypatch):
+    drawings = []
+    draw = Figure.draw
+    monkeypatch.setattr(Figure, "draw", lambda self, renderer: drawings.append(draw(self, renderer)))
+    with page("Once", 2, tmp_path / "once.png", size=(4.0, 3.0)):
+        pass
+    assert len(drawings) == 1
