@@ -1,8 +1,8 @@
 """The optimal control problem on a mesh over place, by Gauss-Legendre collocation; IPOPT solves it.
 
 The state is the kinetic energy per mass, z = v^2 / 2, because dz/dx is the train's acceleration itself, which has no
-pole at low speed as dv/dx has. The running time is the integral of 1 / v. Forces are free at every collocation point
-and may jump between intervals, as optimal ones do.
+pole at low speed as dv/dx has. The running time is the integral of 1 / v (`intervals.pace`). Forces are free at
+every collocation point and may jump between intervals, as optimal ones do.
 """
 
 from __future__ import annotations
@@ -16,13 +16,8 @@ import numpy as np
 from ..errors import ScenarioError
 from ..problems import Problem
 from .dynamics import FORCES, Dynamics, Floats
+from .intervals import DEGREE, END, POINTS, SLOPES, WEIGHTS, basis, pace
 
-DEGREE = 3
-"""Collocation points in an interval: integrals are exact for polynomials of degree 5."""
-_PLACES = ca.collocation_points(DEGREE, "legendre")
-_POINTS = np.array(_PLACES)
-_C, _D, _B = (np.array(each) for each in ca.collocation_coeff(_PLACES))
-_B = _B.ravel()
 _TIE = 1e-3
 """Share of the energy beside the time: which brake brakes is nothing to a running time."""
 _SMOOTH = 1e-7
@@ -79,25 +74,27 @@ class Solution:
     @property
     def time(self) -> float:
         """Running time in s."""
-        return float(np.diff(self.nodes) @ ((1.0 / self.inside) @ _B))
+        return float(self.node_times[-1])
 
     @property
     def energy(self) -> float:
         """Drawn less given back, J."""
         costs = self.dynamics.costs.items()
-        return float(np.diff(self.nodes) @ sum((cost * self.forces[name] @ _B for name, cost in costs), start=0.0))
+        return float(np.diff(self.nodes) @ sum((cost * self.forces[name] @ WEIGHTS for name, cost in costs), start=0.0))
 
     @property
     def node_times(self) -> Floats:
         """At the nodes in s, shape (n + 1,)."""
-        times: Floats = np.concatenate([[0.0], np.cumsum(np.diff(self.nodes) * ((1.0 / self.inside) @ _B))])
-        return times
+        return np.concatenate([[0.0], np.cumsum(self._times_until(1.0))])
 
     @property
     def times(self) -> Floats:
         """At the collocation points in s, shape (n, DEGREE)."""
-        lengths = np.diff(self.nodes)[:, None]
-        times: Floats = self.node_times[:-1, None] + lengths * ((1.0 / self.inside) @ _INTEGRALS.T)
+        return self.node_times[:-1, None] + np.column_stack([self._times_until(float(point)) for point in POINTS])
+
+    def _times_until(self, share: float) -> Floats:
+        """From each interval's begin to a share of it in s, shape (n,)."""
+        times: Floats = np.diff(self.nodes) * pace(share, self.node_speeds[:-1], self.node_speeds[1:], self.inside.T)
         return times
 
     def speeds(self, places: Floats) -> Floats:
@@ -112,7 +109,7 @@ class Solution:
         """One of `FORCES` in N at places in m: that of the nearest point of its interval."""
         row = np.clip(np.searchsorted(self.nodes, places, side="right") - 1, 0, len(self.nodes) - 2)
         share = (places - self.nodes[row]) / np.diff(self.nodes)[row]
-        nearest = np.abs(share[..., None] - _POINTS).argmin(axis=-1)
+        nearest = np.abs(share[..., None] - POINTS).argmin(axis=-1)
         found: Floats = self.forces[name][row, nearest]
         return found
 
@@ -124,23 +121,8 @@ class Solution:
 
     def net_at(self, share: float) -> Floats:
         """The same in N at a share of each interval, by its polynomial, shape (n,)."""
-        others = [np.delete(_POINTS, k) for k in range(DEGREE)]
-        weights = [np.prod(share - other) / np.prod(_POINTS[k] - other) for k, other in enumerate(others)]
-        net: Floats = self.net @ np.array(weights)
+        net: Floats = self.net @ np.array(basis(share))
         return net
-
-
-def _integrals() -> Floats:
-    """Integrals of the Lagrange polynomials from the interval's begin to each collocation point."""
-    rows = np.empty((DEGREE, DEGREE))
-    for k in range(DEGREE):
-        others = np.delete(_POINTS, k)
-        polynomial = np.polyint(np.poly(others) / np.prod(_POINTS[k] - others))
-        rows[:, k] = np.polyval(polynomial, _POINTS)
-    return rows
-
-
-_INTEGRALS = _integrals()
 
 
 def solve(dynamics: Dynamics, nodes: Floats, guess: Guess, time: float | None, *, warm: bool) -> Solution:
@@ -173,7 +155,7 @@ class _Transcription:
 
     def __init__(self, dynamics: Dynamics, nodes: Floats, guess: Guess) -> None:
         self.dynamics, self.nodes, self.lengths = dynamics, nodes, np.diff(nodes)
-        self.places = nodes[:-1, None] + self.lengths[:, None] * _POINTS
+        self.places = nodes[:-1, None] + self.lengths[:, None] * POINTS
         self.force = dynamics.forces["traction"]
         self.squared = dynamics.top_speed**2
         self.variables: list[Any] = []
@@ -193,8 +175,9 @@ class _Transcription:
         each = [dynamics.law(here[:, k], speeds[k], net[k]) for k in range(self.places.size)]
         self.accelerations = ca.vertcat(*each)
         self.roughness = ca.sumsqr((net[1:] - net[:-1]) / self.force)
-        weights = ca.DM((self.lengths[:, None] * _B).ravel())
-        self.duration = ca.dot(weights, 1.0 / self.speeds)
+        weights = ca.DM((self.lengths[:, None] * WEIGHTS).ravel())
+        ends, points = ca.sqrt(self.at_nodes), [self.speeds[k::DEGREE] for k in range(DEGREE)]
+        self.duration = ca.dot(ca.DM(self.lengths), pace(1.0, ends[:-1], ends[1:], points))
         self.energy = sum(cost * ca.dot(weights, self.forces[name]) for name, cost in dynamics.costs.items())
 
     def _ends(self) -> tuple[Floats, Floats]:
@@ -222,10 +205,10 @@ class _Transcription:
         count = len(self.lengths)
         inside, a = (ca.reshape(each, DEGREE, count) for each in (self.inside, self.accelerations))
         values = ca.vertcat(self.at_nodes[:-1].T, inside)
-        slopes = ca.DM(_C).T @ values
+        slopes = ca.DM(SLOPES).T @ values
         scale = ca.repmat(ca.DM(0.5 / self.lengths).T, DEGREE, 1)
         self.within(ca.vec(slopes * scale - a), 0.0, 0.0)
-        self.within((ca.DM(_D).T @ values).T / self.squared - self.at_nodes[1:] / self.squared, 0.0, 0.0)
+        self.within((ca.DM(END).T @ values).T / self.squared - self.at_nodes[1:] / self.squared, 0.0, 0.0)
 
     def limit(self) -> None:
         """Powers, comfort and jerk."""

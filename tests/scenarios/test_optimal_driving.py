@@ -16,11 +16,11 @@ PUBLISHED = 440.1406 * 3.6e6
 def test_both_controllers_drive_near_the_optimum_and_arrive():
     result = run(load("optimal_driving"))
     assert {check.verdict for check in result.requirements} == {"pass"}
-    last, arrival = result.time[-1], 10.0 + 1544.88
+    last, arrival = result.time[-1], 10.0 + 1544.96
     for k in (1, 2):
         used = result[f"drive[{k}].drawn_energy"][-1] - result[f"drive[{k}].recovered_energy"][-1]
         assert PUBLISHED < used < 1.003 * PUBLISHED
-        assert abs(result[f"train[{k}].position"][-1] - 48531.94) < 0.3
+        assert abs(result[f"train[{k}].position"][-1] - 48531.96) < 0.3
         moving = result.time[np.abs(result[f"train[{k}].speed"]) > 0.01]
         assert moving.max() <= arrival + 1.0 < last
 
