@@ -27,6 +27,7 @@ from .options import (
     Step,
     Stop,
     Swap,
+    Variant,
     With,
     draw_as,
     interrupted,
@@ -211,6 +212,7 @@ def linearize(
         bool, typer.Option("--sampled", help="The model of one communication step, also of a continuous system.")
     ] = False,
     duration: Annotated[float | None, typer.Option(help="Length of the step responses in s.")] = None,
+    variant: Variant = None,
     preset: Preset = None,
     settings: Set = None,
     builds: With = None,
@@ -244,7 +246,7 @@ def linearize(
 
     if duration is not None and not 0.0 < duration < float("inf"):
         raise typer.BadParameter("it must be a positive time in s.", param_hint="'--duration'")
-    system = load_system(scenario, preset, settings, builds, swaps, step=step)
+    system = load_system(scenario, preset, settings, builds, swaps, variant=variant, step=step)
     with show_progress(system.provenance.name, quiet, system.stepping.start_time) as progress:
         model = linearize_system(
             system,

@@ -27,8 +27,10 @@ from .options import (
     Stop,
     Swap,
     Trust,
+    Variant,
     With,
     build_arguments,
+    is_scenario,
     load_system,
 )
 
@@ -43,6 +45,7 @@ def describe(
         ),
     ],
     builds: Annotated[list[str] | None, typer.Option("--with", help="Give a build argument: carriages=8.")] = None,
+    variant: Variant = None,
     quiet: Quiet = False,
 ) -> Answer:
     """Show what a component, any FMU or a scenario is.
@@ -57,18 +60,17 @@ def describe(
     from ..fmi import Workspace, is_fmu_name, load_fmu
     from ..problems import Problem, suggestion
     from ..scenario import shipped
-    from ..ssp import is_ssp_name
     from ..times import digits
     from .documents import describe_document, scenario_document
     from .printing import open_console, show_compilations, show_model, show_system
 
     arguments = build_arguments(builds)
-    is_scenario = name.endswith(".toml") or is_ssp_name(name) or name in dict(shipped())
+    known_scenario = is_scenario(name)
     # Any other file is told for what it is: a folder with an unpacked FMU, a program.
-    is_file = not (is_scenario or name in CATALOGUE or ".py" in name) and Path(name).exists()
+    is_file = not (known_scenario or name in CATALOGUE or ".py" in name) and Path(name).exists()
     is_fmu = is_fmu_name(name) or is_file
-    if is_scenario:
-        system = load_system(name, None, None, builds, None)
+    if known_scenario or variant is not None:
+        system = load_system(name, None, None, builds, None, variant=variant)
         return Answer(lambda: scenario_document(system), lambda: show_system(open_console(), system))
     if not (is_fmu or name in CATALOGUE or ".py:" in name):
         known = (*CATALOGUE, *dict(shipped()))
@@ -157,6 +159,7 @@ def pack(
             autocompletion=completing.signals,
         ),
     ] = None,
+    variant: Variant = None,
     preset: Preset = None,
     settings: Set = None,
     builds: With = None,
@@ -179,7 +182,9 @@ def pack(
     from .documents import pack_document
     from .printing import open_console, say, show_compilations, show_notes
 
-    system = load_system(scenario, preset, settings, builds, swaps, stop=stop, step=step, algorithm=algorithm)
+    system = load_system(
+        scenario, preset, settings, builds, swaps, variant=variant, stop=stop, step=step, algorithm=algorithm
+    )
     with show_compilations(quiet):
         packed = pack_system(system, output, expose=expose or (), platforms=(platforms or "").split(","), trusted=trust)
 

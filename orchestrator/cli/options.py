@@ -12,6 +12,7 @@ from ..errors import ScenarioError
 from . import completing
 
 if TYPE_CHECKING:
+    from ..run import Run, StepCheck
     from ..system import System
 
 OK, FAILED, WRONG_INPUT, FMU_FAILED = 0, 1, 2, 3
@@ -59,6 +60,14 @@ Scenario = Annotated[
         metavar="SCENARIO",
         help="A shipped scenario (see 'orchestrate list'), or a .toml, .ssp or .ssd file (a.ssp#Name is a variant).",
         autocompletion=completing.scenarios,
+    ),
+]
+Variant = Annotated[
+    str | None,
+    typer.Option(
+        metavar="NAME",
+        help="Of an .ssp that holds several system structures: which one, by its file or name.",
+        autocompletion=completing.variants,
     ),
 ]
 Preset = Annotated[str | None, typer.Option(help="Apply a preset of the scenario.", autocompletion=completing.presets)]
@@ -203,6 +212,25 @@ def check_workers(workers: int | None, scheduler: str | None) -> None:
         raise typer.BadParameter("the scheduler has the workers that it has.", param_hint="'--workers'")
 
 
+def is_scenario(name: str) -> bool:
+    """Whether a name on the command line is that of a scenario, and of nothing else."""
+    from ..scenario import shipped
+    from ..ssp import is_ssp_name
+
+    return name.endswith(".toml") or is_ssp_name(name) or name in dict(shipped())
+
+
+def variant_of(scenario: str, variant: str) -> str:
+    """The name of one of the system structures of an SSP."""
+    from ..ssp import is_ssp_name
+
+    if not is_ssp_name(scenario):
+        raise ScenarioError(f"--variant {variant}: {scenario} is no .ssp, and has no variants; presets have --preset")
+    if "#" in scenario:
+        raise ScenarioError(f"--variant {variant}: {scenario} names a variant already; give one of the two")
+    return f"{scenario}#{variant}"
+
+
 def load_system(
     scenario: str,
     preset: str | None,
@@ -210,6 +238,7 @@ def load_system(
     builds: list[str] | None,
     swaps: list[str] | None,
     *,
+    variant: str | None = None,
     stop: float | None = None,
     step: float | None = None,
     algorithm: str | None = None,
@@ -218,7 +247,7 @@ def load_system(
     from ..scenario import load
 
     return load(
-        scenario,
+        scenario if variant is None else variant_of(scenario, variant),
         preset=preset,
         settings=settings or (),
         builds=builds or (),
@@ -234,3 +263,12 @@ def draw_as(system: System, format: FormatName | None, dpi: float | None) -> Non
     from ..figures import written_as
 
     system.judged.figures = written_as(system.judged.figures, format and format.value, dpi)
+
+
+def exit_code(outcome: Run, second: Run | None = None, verdict: StepCheck | None = None) -> int:
+    """The exit code of a run; of one that was repeated at half the step, with what that has shown."""
+    for ended in (outcome, second):
+        if ended is not None and ended.status == "interrupted":
+            return interrupted(ended.signal)
+    coarse = verdict is not None and verdict.verdict == "too coarse"
+    return FAILED if outcome.failed or coarse else OK

@@ -31,15 +31,17 @@ from .options import (
     Step,
     Stop,
     Swap,
+    Variant,
     WhenLate,
     With,
     draw_as,
+    exit_code,
     interrupted,
     load_system,
 )
 
 if TYPE_CHECKING:
-    from ..run import Results, Run, StepCheck
+    from ..run import Results, Run
     from .documents import CaseDocument
 
 
@@ -53,6 +55,7 @@ def run(
         ),
     ] = None,
     *,
+    variant: Variant = None,
     preset: Preset = None,
     settings: Set = None,
     builds: With = None,
@@ -140,7 +143,7 @@ def run(
         **_pace(real_time, late),
     }
     if resume_from is not None:
-        given = (preset, settings or None, builds or None, step, algorithm, isolated or None, output)
+        given = (variant, preset, settings or None, builds or None, step, algorithm, isolated or None, output)
         changed = any(x is not None for x in (*given, figure_format, dpi)) or kind is not KindName.auto or verify_step
         if changed or (swaps and scenario is None):
             raise ScenarioError(
@@ -158,7 +161,9 @@ def run(
     else:
         if scenario is None:
             raise ScenarioError("name a scenario (see 'orchestrate list'), or a run to go on with by --resume DIR")
-        system = load_system(scenario, preset, settings, builds, swaps, stop=stop, step=step, algorithm=algorithm)
+        system = load_system(
+            scenario, preset, settings, builds, swaps, variant=variant, stop=stop, step=step, algorithm=algorithm
+        )
         system = isolate(system, isolated or ())
         draw_as(system, figure_format, dpi)
         if live:
@@ -188,7 +193,7 @@ def run(
     return Answer(
         lambda: run_document(outcome, second, verdict, page),
         show,
-        _exit_code(outcome, second, verdict),
+        exit_code(outcome, second, verdict),
         next((each.error for each in (outcome, second) if each and each.status == "failed" and each.error), None),
     )
 
@@ -203,14 +208,6 @@ def _at_half_the_step(outcome: Run, kind: KindName, quiet: bool) -> Run | None:
     system = outcome.system
     with show_progress(f"{system.provenance.name} at half the step", quiet, system.stepping.start_time) as progress:
         return execute(at_half_the_step(system), kind=kind.value, progress=progress)
-
-
-def _exit_code(outcome: Run, second: Run | None, verdict: StepCheck | None) -> int:
-    for ended in (outcome, second):
-        if ended is not None and ended.status == "interrupted":
-            return interrupted(ended.signal)
-    coarse = verdict is not None and verdict.verdict == "too coarse"
-    return FAILED if outcome.failed or coarse else OK
 
 
 def reproduce(

@@ -10,7 +10,21 @@ import typer
 from .. import world
 from . import completing
 from .documents import Answer
-from .options import Algorithm, Preset, Quiet, Scenario, Set, Step, Stop, Swap, Trust, With, load_system
+from .options import (
+    Algorithm,
+    Preset,
+    Quiet,
+    Scenario,
+    Set,
+    Step,
+    Stop,
+    Swap,
+    Trust,
+    Variant,
+    With,
+    load_system,
+    variant_of,
+)
 
 if TYPE_CHECKING:
     from ..run import Checked
@@ -37,6 +51,7 @@ def list_all() -> Answer:
 def check(
     scenario: Scenario,
     *,
+    variant: Variant = None,
     preset: Preset = None,
     settings: Set = None,
     builds: With = None,
@@ -57,7 +72,9 @@ def check(
     from .documents import check_document
     from .printing import show_check, show_compilations
 
-    system = load_system(scenario, preset, settings, builds, swaps, stop=stop, step=step, algorithm=algorithm)
+    system = load_system(
+        scenario, preset, settings, builds, swaps, variant=variant, stop=stop, step=step, algorithm=algorithm
+    )
     study = _study(system)
     with Workspace() as workspace, show_compilations(quiet, doing="reading what it is made of"):
         checked = check_system(system, workspace, trusted=trust)
@@ -72,9 +89,7 @@ def import_ssp(
     archive: Annotated[str, typer.Argument(metavar="SSP", help="An .ssp archive, or a bare .ssd file.")],
     output: Annotated[Path, typer.Option("--output", "-o", help="The scenario to write, such as platoon.toml.")],
     *,
-    variant: Annotated[
-        str | None, typer.Option(help="A system structure of the archive other than the default, by file or name.")
-    ] = None,
+    variant: Variant = None,
     quiet: Quiet = False,
 ) -> Answer:
     """Make a scenario of an SSP, to read and to change; its FMUs go to a folder beside it.
@@ -86,7 +101,7 @@ def import_ssp(
 
     folder = output.with_name(f"{output.stem}_fmus")
     world.mkdir(output.parent, parents=True, exist_ok=True)
-    text = make(f"{archive}#{variant}" if variant else archive, folder, output.parent)
+    text = make(archive if variant is None else variant_of(archive, variant), folder, output.parent)
     world.write_text(output, text, encoding="utf-8")
     return written([output], quiet)
 
@@ -98,6 +113,7 @@ def export(
         typer.Option("--output", "-o", help="The file to write: platoon.ssp, or OspSystemStructure.xml for libcosim."),
     ],
     *,
+    variant: Variant = None,
     preset: Preset = None,
     settings: Set = None,
     builds: With = None,
@@ -125,7 +141,9 @@ def export(
     from .lines import printable
     from .printing import open_console, show_compilations, show_notes
 
-    system = load_system(scenario, preset, settings, builds, swaps, stop=stop, step=step, algorithm=algorithm)
+    system = load_system(
+        scenario, preset, settings, builds, swaps, variant=variant, stop=stop, step=step, algorithm=algorithm
+    )
     wanted = [name.strip() for name in (platforms or "").split(",") if name.strip()]
     with show_compilations(quiet):
         exported = write(system, output, platforms=wanted, trusted=trust)

@@ -29,6 +29,7 @@ from .options import (
     Step,
     Stop,
     Swap,
+    Variant,
     With,
     Workers,
     check_workers,
@@ -87,6 +88,7 @@ def falsify(
     workers: Workers = None,
     scheduler: Scheduler = None,
     resume: Resume = False,
+    variant: Variant = None,
     preset: Preset = None,
     settings: Set = None,
     builds: With = None,
@@ -113,7 +115,7 @@ def falsify(
     from .printing import show_falsified, show_search
 
     check_workers(workers, scheduler)
-    system = load_system(scenario, preset, settings, builds, swaps, stop=stop, step=step)
+    system = load_system(scenario, preset, settings, builds, swaps, variant=variant, stop=stop, step=step)
     name = requirement or _only_requirement(system)
     directory = output or _directory("falsify", system, preset, name)
     with show_search(f"{system.provenance.name}: {name}", quiet) as shown, _resumable():
@@ -160,6 +162,7 @@ def optimize(
     workers: Workers = None,
     scheduler: Scheduler = None,
     resume: Resume = False,
+    variant: Variant = None,
     preset: Preset = None,
     settings: Set = None,
     builds: With = None,
@@ -188,7 +191,7 @@ def optimize(
     check_workers(workers, scheduler)
     if not objectives:
         raise ScenarioError(Problem("", "nothing is to be least", "name a metric, as in --minimize settling"))
-    system = load_system(scenario, preset, settings, builds, swaps, stop=stop, step=step)
+    system = load_system(scenario, preset, settings, builds, swaps, variant=variant, stop=stop, step=step)
     directory = output or _directory("optimize", system, preset)
     how: Any = {"requirements": requirements or (), "budget": budget, "seed": seed, "kind": kind.value}
     with show_search(system.provenance.name, quiet) as shown, _resumable():

@@ -27,6 +27,7 @@ from .options import (
     Step,
     Stop,
     Swap,
+    Variant,
     With,
     Workers,
     check_workers,
@@ -60,6 +61,7 @@ def study(
             metavar="NAME", help="grid, random, latin-hypercube, sobol or saltelli.", autocompletion=completing.designs
         ),
     ] = None,
+    variant: Variant = None,
     preset: Preset = None,
     settings: Set = None,
     builds: With = None,
@@ -106,7 +108,9 @@ def study(
         from ..report import check_drawable
 
         check_drawable()
-    system = load_system(scenario, preset, settings, builds, swaps, stop=stop, step=step, algorithm=algorithm)
+    system = load_system(
+        scenario, preset, settings, builds, swaps, variant=variant, stop=stop, step=step, algorithm=algorithm
+    )
     plan = make_plan(system, vary or (), runs=runs, seed=seed, design=design)
     how: dict[str, Any] = {
         "scenario": scenario,

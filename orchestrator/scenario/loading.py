@@ -125,7 +125,7 @@ def _system_of_ssp(name: str, changes: _Changes) -> System:
     annotation = read.provenance.origins["scenario"]
     places |= {(key,): annotation for key in tables if key not in STANDARD}
     system = _system(Source(text_of(tables), read.provenance.path, places), Path(read.provenance.path), changes)
-    system.provenance.notes = read.provenance.notes
+    system.provenance.name, system.provenance.notes = read.provenance.name, read.provenance.notes
     return system
 
 

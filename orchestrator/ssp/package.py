@@ -144,6 +144,17 @@ class Package:
         return Package(self.extract(path), f"{self.label}/{path}" if self.is_archive else path, folder)
 
 
+def list_variants(path: Path) -> list[str]:
+    """The system structures of an archive, as ``--variant`` names them; the default one first, none where none is read.
+
+    Only the archive's table of contents is looked at.
+    """
+    try:
+        return [PurePosixPath(root).stem for root in Package(path, str(path), path.parent).roots]
+    except ScenarioError:
+        return []
+
+
 def digest_of(path: Path) -> str:
     """SHA-256 of a file.
 

@@ -13,10 +13,11 @@ from ...fmus.build import cache_folder
 from ..errors import FmuFileError, ScenarioError
 from ..fmi import Interface, Workspace, load_fmu
 from ..names import SignalName
-from ..problems import Problem, suggestion
+from ..problems import Problem
 from ..system import Connection, Instance, System
 from ..wiring import convert
 from .annotations import own_names, read_stepping, scenario_of, set_options, step_of
+from .documents import Document
 from .network import Hop, Network, Node, Path, own_unit
 from .package import DEFAULT, Package, digest_of
 from .settings import Settings
@@ -47,7 +48,8 @@ def read_system(name: str, folder: FilePath | None = None) -> System:
         raise ScenarioError(Problem("", f"there is no file '{file}'"))
     package = Package(path, file, folder or cache_folder().with_name("ssp") / digest_of(path)[:32])
     reader = StructureReader()
-    document, root = reader.top(package, _variant(package, variant))
+    chosen = _variant(package, variant)
+    document, root = reader.top(package, chosen)
     with Workspace() as workspace:
         interfaces = dict(_interfaces(root, (), workspace, reader.problems, {}))
     network, settings = Network(root, interfaces), Settings(root, interfaces)
@@ -64,7 +66,8 @@ def read_system(name: str, folder: FilePath | None = None) -> System:
     if problems:
         raise ScenarioError(list(dict.fromkeys(problems)))
     came = system.provenance
-    came.name, came.path = path.stem.encode(errors="replace").decode(), file
+    name = path.stem if chosen in (DEFAULT, path.name) else f"{path.stem}-{_stem(chosen)}"
+    came.name, came.path = name.encode(errors="replace").decode(), file
     came.text, came.origins["scenario"] = scenario_of(document)
     came.notes = tuple(dict.fromkeys([*reader.notes, *network.notes, *settings.notes, *flat.notes]))
     return system
@@ -74,25 +77,42 @@ def _variant(package: Package, wanted: str) -> str:
     """The file of a variant, which is called by its file or by the name in it."""
     roots = package.roots
     if not wanted:
-        if package.is_archive and DEFAULT not in roots:
-            raise ScenarioError(Problem(package.label, f"it is no SSP: there is no {DEFAULT} at its top"))
-        return roots[0]
+        if not package.is_archive or DEFAULT in roots:
+            return roots[0]
+        what = f"it is no SSP: there is no {DEFAULT} at its top" + " but others" * bool(roots)
+        choose = f"choose a variant by --variant: {_listed(_titles(package))}" if roots else ""
+        raise ScenarioError(Problem(package.label, what, choose))
     for root in roots:
         if wanted in (root, FilePath(root).stem):
             return root
-    names = {_name(package, root): root for root in roots}
-    if wanted in names:
-        return names[wanted]
-    near = suggestion(wanted, [*roots, *names]) or f"there are {', '.join(roots)}"
-    raise ScenarioError(Problem(package.label, f"there is no variant {wanted!r}", near))
+    titles = _titles(package)
+    for root, title in titles.items():
+        if wanted == title:
+            return root
+    what = f"there is no variant {wanted!r}"
+    raise ScenarioError(Problem(package.label, what, f"there are {_listed(titles)}"))
 
 
-def _name(package: Package, root: str) -> str:
+def _titles(package: Package) -> dict[str, str]:
+    """The name that stands in each system structure at the top; empty where it cannot be read."""
+    return {root: _title(package, root) for root in package.roots}
+
+
+def _title(package: Package, root: str) -> str:
     try:
-        document, _ = StructureReader().top(package, root)
+        document = Document.read(package, root, "SystemStructureDescription", [])
     except ScenarioError:  # of another variant than the one that is wanted
-        return root
+        return ""
     return str(document.root.get("name", ""))
+
+
+def _listed(titles: Mapping[str, str]) -> str:
+    """Variants as ``--variant`` takes them, with their names where these say more."""
+    return ", ".join(_stem(root) + f" ({title})" * (title not in ("", _stem(root))) for root, title in titles.items())
+
+
+def _stem(root: str) -> str:
+    return FilePath(root).stem
 
 
 def _interfaces(

@@ -17,6 +17,7 @@ from .words import (
     signals,
     swaps,
     things,
+    variants,
     varied,
 )
 
@@ -39,5 +40,6 @@ __all__ = [
     "signals",
     "swaps",
     "things",
+    "variants",
     "varied",
 ]

@@ -14,6 +14,7 @@ from typing import Any
 from ... import world
 
 _DESIGNS = ("grid", "random", "latin-hypercube", "sobol", "saltelli")
+_SCENARIOS = (".toml", ".ssp", ".ssd")
 _PLATFORMS = ("all", "linux64", "win64", "darwin64", "aarch64-linux", "wasm")
 
 
@@ -21,7 +22,14 @@ def scenarios(incomplete: str) -> list[tuple[str, str]]:
     """Shipped scenarios with their titles, and files."""
     from ...scenario import shipped
 
-    return [*shipped(), *((path, "") for path in _files(incomplete, ".toml"))]
+    return [*shipped(), *((path, "") for path in _files(incomplete, *_SCENARIOS))]
+
+
+def variants() -> list[str]:
+    """Of the SSP on the command line."""
+    from ...ssp import list_variants
+
+    return [name for word in _typed() if word.endswith(_SCENARIOS[1:]) for name in list_variants(Path(word))]
 
 
 def comparable(incomplete: str) -> list[tuple[str, str]]:

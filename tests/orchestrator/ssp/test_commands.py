@@ -1,8 +1,10 @@
 """SSPs as the commands and `load` take them: what options change, what is told, and a run of known numbers."""
 
+import json
+
 import pytest
 from railcosim.fmus.build import build
-from railcosim.orchestrator import ScenarioError, load, run
+from railcosim.orchestrator import Results, ScenarioError, load, run
 from railcosim.orchestrator.cli.app import call
 
 from .conftest import binding, bindings, component, connection, connectors, packed, parameters, real, structure, system
@@ -64,6 +66,47 @@ def test_the_commands(passing, tmp_path, capsys):
     assert call(["run", passing, "-o", str(tmp_path / "out"), "--quiet", "--no-figures"]) == 0
     assert (tmp_path / "out" / "run.json").is_file()
     assert call(["check", f"{passing}#None"]) == 2
+
+
+def test_a_variant_by_option(passing, tmp_path, capsys, monkeypatch):
+    """y = 3 u + 1 = 13 for its u = 4; its results stand beside those of the default, not in their place."""
+    monkeypatch.chdir(tmp_path)
+    assert call(["describe", passing, "--variant", "Four", "--json"]) == 0
+    assert json.loads(capsys.readouterr().out)["result"]["instances"][0]["start"]["u"] == 4.0
+    assert call(["check", passing, "--variant", "Four.ssd", "--quiet"]) == 0
+    assert call(["run", passing, "--variant", "Four", "--quiet", "--no-figures"]) == 0
+    assert set(Results.load(tmp_path / "results" / "system-Four")["first.y"]) == {13.0}
+    capsys.readouterr()
+    for words, said in (
+        ([passing, "--variant", "Fuor"], "no variant 'Fuor'; there are SystemStructure (root), Four (root)"),
+        ([f"{passing}#Four", "--variant", "Four"], "names a variant already"),
+        (["comfort_cruise", "--variant", "Four"], "comfort_cruise is no .ssp, and has no variants"),
+    ):
+        assert call(["check", *words]) == 2
+        assert said in " ".join(capsys.readouterr().err.split())
+    assert call(["describe", "PointMassTrain", "--variant", "Four"]) == 2
+    assert call(["run", "--resume", str(tmp_path / "results" / "system-Four"), "--variant", "Four"]) == 2
+
+
+def test_an_archive_without_a_default_asks_for_a_variant(archive, capsys):
+    top = structure(system(component("a")))
+    path = archive({"A.ssd": top, "B.ssd": top.replace('name="root" version', 'name="B" version'), "C.ssd": "no XML"})
+    assert call(["check", path]) == 2
+    told = " ".join(capsys.readouterr().err.split())
+    assert "no SystemStructure.ssd at its top but others; choose a variant by --variant: A (root), B, C" in told
+    assert load(f"{path}#B").provenance.name == "system-B"
+
+
+def test_a_page_of_an_archive(passing, tmp_path, capsys, monkeypatch):
+    """It is run first, like any scenario; a directory of the same name is one of results."""
+    monkeypatch.chdir(tmp_path)
+    assert call(["report", passing, "--quiet"]) == 0
+    assert (tmp_path / "results" / "system" / "report.html").is_file()
+    assert call(["report", passing, str(tmp_path / "results" / "system"), "--variant", "Four", "-o", "both.html"]) == 0
+    assert capsys.readouterr().out.endswith("both.html\n")
+    assert "system-Four" in (tmp_path / "both.html").read_text(encoding="utf-8")
+    assert call(["report", str(tmp_path / "results" / "system"), "--variant", "Four"]) == 2
+    assert "is of an .ssp that is to be run" in capsys.readouterr().err
 
 
 def test_a_scenario_of_an_archive(passing, tmp_path, capsys):

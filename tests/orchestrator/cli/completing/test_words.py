@@ -122,6 +122,18 @@ def test_scenarios_presets_components_and_what_else_has_a_name(offered, folder):
     assert offered("orchestrate run nothing.toml --preset ") == []
 
 
+def test_variants_of_an_archive(offered, folder):
+    """Its own alone, by the table of contents: what is in the files is not looked at."""
+    with zipfile.ZipFile(folder / "line.ssp", "w") as archive:
+        for name in ("Winter.ssd", "SystemStructure.ssd", "inner/Summer.ssd", "Winter.txt"):
+            archive.writestr(name, "")
+    (folder / "bad.ssp").write_text("no archive")
+    assert offered("orchestrate run lin") == ["line.ssp"]
+    assert offered("orchestrate run line.ssp --variant ") == ["SystemStructure", "Winter"]
+    assert offered("orchestrate check line.ssp --variant W") == ["Winter"]
+    assert offered("orchestrate run bad.ssp --variant ") == offered("orchestrate run own.toml --variant ") == []
+
+
 def test_an_open_quote_hides_no_scenario(folder, monkeypatch):
     monkeypatch.setenv("_TYPER_COMPLETE_ARGS", "orchestrate optimize own.toml --minimize 'gap")
     assert metrics() == ["gap_min"]
