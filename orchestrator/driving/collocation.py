@@ -94,7 +94,8 @@ class Solution:
 
     def _times_until(self, share: float) -> Floats:
         """From each interval's begin to a share of it in s, shape (n,)."""
-        times: Floats = np.diff(self.nodes) * pace(share, self.node_speeds[:-1], self.node_speeds[1:], self.inside.T)
+        speeds = self.node_speeds
+        times: Floats = np.diff(self.nodes) * pace(share, speeds[:-1], speeds[1:], list(self.inside.T))
         return times
 
     def speeds(self, places: Floats) -> Floats:
