@@ -124,6 +124,9 @@ def _system_of_ssp(name: str, changes: _Changes) -> System:
     tables = _tables_of_ssp(read)
     annotation = read.provenance.origins["scenario"]
     places |= {(key,): annotation for key in tables if key not in STANDARD}
+    if isinstance(tables["events"], list):  # those of other tools stand behind our own
+        own = len(tables["events"]) - len(read.events)
+        places |= {("events", own + k): event.origin for k, event in enumerate(read.events)}
     system = _system(Source(text_of(tables), read.provenance.path, places), Path(read.provenance.path), changes)
     system.provenance.name, system.provenance.notes = read.provenance.name, read.provenance.notes
     return system
@@ -144,6 +147,8 @@ def _tables_of_ssp(read: System) -> dict[str, Any]:
     if isinstance(own.get("simulation", {}), dict):
         own["simulation"] = tables["simulation"] | own.get("simulation", {}) | times
     merged = own | {key: tables[key] for key in STANDARD}
+    if isinstance(events := merged.setdefault("events", []), list):
+        merged["events"] = events + tables["events"]
     try:
         text_of(merged)
     except TypeError as error:

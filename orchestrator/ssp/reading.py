@@ -16,6 +16,7 @@ from ..names import SignalName
 from ..problems import Problem
 from ..system import Connection, Instance, System
 from ..wiring import convert
+from .actions import Actions
 from .annotations import own_names, read_stepping, scenario_of, set_options, step_of
 from .documents import Document
 from .network import Hop, Network, Node, Path, own_unit
@@ -60,7 +61,9 @@ def read_system(name: str, folder: FilePath | None = None) -> System:
     except ScenarioError as error:
         problems += error.problems
     flat = _Flat(root, interfaces, network, settings, system)
-    problems += flat.problems
+    actions = Actions(document, interfaces, flat.names, {one.target for one in system.connections})
+    system.events = actions.events
+    problems += flat.problems + actions.problems
     if not system.instances:
         problems.append(Problem(root.place, "it has no component with a source: there is nothing to run"))
     if problems:
@@ -69,7 +72,7 @@ def read_system(name: str, folder: FilePath | None = None) -> System:
     name = path.stem if chosen in (DEFAULT, path.name) else f"{path.stem}-{_stem(chosen)}"
     came.name, came.path = name.encode(errors="replace").decode(), file
     came.text, came.origins["scenario"] = scenario_of(document)
-    came.notes = tuple(dict.fromkeys([*reader.notes, *network.notes, *settings.notes, *flat.notes]))
+    came.notes = tuple(dict.fromkeys([*reader.notes, *network.notes, *settings.notes, *flat.notes, *actions.notes]))
     return system
 
 
@@ -142,7 +145,12 @@ def _elements(element: Element, path: Path) -> Iterator[tuple[Path, Element]]:
 
 @final
 class _Flat:
-    """Instances, start values and connections of a system without nesting, put into a `System`."""
+    """Instances, start values and connections of a system without nesting, put into a `System`.
+
+    Attributes:
+        names: of instances, by the path of their component.
+        problems: what makes it useless. notes: what a user should know.
+    """
 
     def __init__(
         self,
@@ -156,9 +164,9 @@ class _Flat:
         self.notes: list[str] = []
         self._interfaces, self._network, self._settings, self._system = interfaces, network, settings, system
         own = own_names({path: one for path, one in _elements(root, ()) if path in interfaces})
-        self._names = _instance_names(interfaces, own)
+        self.names = _instance_names(interfaces, own)
         changed = [
-            f"{'.'.join(path)} is {name}" for path, name in self._names.items() if path != (name,) and path not in own
+            f"{'.'.join(path)} is {name}" for path, name in self.names.items() if path != (name,) and path not in own
         ]
         if changed:
             more = f", and {len(changed) - 8} more" if len(changed) > 8 else ""
@@ -181,7 +189,7 @@ class _Flat:
 
     def _add(self, element: Element, path: Path) -> None:
         if path in self._interfaces:
-            name = self._names[path]
+            name = self.names[path]
             instance = Instance(name, os.fspath(element.fmu or ""), origin=element.place)
             self._system.instances[name] = instance
             self._try(self._rate, instance, element)
@@ -224,7 +232,7 @@ class _Flat:
         way = way.to(network.unit(given), setting.suppressed, setting.transformation, setting.place)
         for hop in hops:
             way = way.to(network.unit(hop.target), hop.suppressed, hop.transformation, hop.place)
-        name = self._names[target.path]
+        name = self.names[target.path]
         self._system.instances[name].start[target.name] = way.apply(setting.value, setting.place)
         self._system.provenance.origins[f"{name}.{target.name}"] = setting.place if not hops else place
 
@@ -239,7 +247,7 @@ class _Flat:
         for hop in hops:
             way = way.to(self._network.unit(hop.target), hop.suppressed, hop.transformation, hop.place)
             plain = plain.to(None, False, hop.transformation, hop.place)
-        ends = [f"{self._names[node.path]}.{node.name}" for node in (source, target)]
+        ends = [f"{self.names[node.path]}.{node.name}" for node in (source, target)]
         made = Connection(ends[0], ends[1], sum(hop.delay for hop in hops), origin=place)
         made.threshold = next((hop.threshold for hop in hops if hop.threshold is not None), None)
         if way.entries is not None:

@@ -12,11 +12,12 @@ from ..problems import Problem
 from .documents import Document, children, first, local, only_child
 
 _INTEGERS = {"Integer", *(f"{sign}Int{bits}" for sign in ("", "U") for bits in (8, 16, 32, 64))}
-_TRUTH = {"true": True, "1": True, "false": False, "0": False}
+TRUTH = {"true": True, "1": True, "false": False, "0": False}
+"""What XML has for Booleans."""
 _READ: dict[str, Callable[[str], Any]] = {
     **dict.fromkeys(("Real", "Float64", "Float32"), float),
     **dict.fromkeys(_INTEGERS, int),
-    "Boolean": lambda text: _TRUTH[text.strip()],
+    "Boolean": lambda text: TRUTH[text.strip()],
     "String": str,
     "Enumeration": str,
 }
@@ -73,7 +74,7 @@ def _truth(text: str) -> str:
 
 def is_suppressed(element: Any) -> bool:
     """Whether units are not converted."""
-    return _TRUTH.get(element.get("suppressUnitConversion", "false"), False)
+    return TRUTH.get(element.get("suppressUnitConversion", "false"), False)
 
 
 def read_bindings(document: Document, element: Any, source: str | None) -> list[Setting]:

@@ -5,8 +5,11 @@ its inputs were set to that point's values, so a feed-through output is already 
 """
 
 import csv
+import zipfile
 
 import pytest
+from railcosim.fmus.build import package
+from railcosim.orchestrator import load, run
 
 pytestmark = pytest.mark.long
 
@@ -96,3 +99,49 @@ def test_known_defect_its_csv_keeps_six_decimals(scene, need, tmp_path):
     column = next(k for k, name in enumerate(names) if "train[1]::c1" in name)
     assert float(row[column]) == 0.000776
     assert simulation.engine.get_real("train[1]::c1") == 0.00077616
+
+
+SCENARIO = """<?xml version="1.0" encoding="UTF-8"?>
+<ssd:SystemStructureDescription name="actions" version="1.0"
+    xmlns:ssd="http://ssp-standard.org/SSP1/SystemStructureDescription"
+    xmlns:ssc="http://ssp-standard.org/SSP1/SystemStructureCommon"
+    xmlns:ecos="http://github.com/Ecos-platform/libecos/resources/schema/ScenarioConfig">
+  <ssd:System name="line"><ssd:Elements>
+    <ssd:Component name="my train" source="resources/train.fmu"><ssd:Connectors>
+      <ssd:Connector name="disturbance" kind="input"><ssc:Real/></ssd:Connector>
+      <ssd:Connector name="force" kind="input"><ssc:Real/></ssd:Connector>
+      <ssd:Connector name="speed" kind="output"><ssc:Real/></ssd:Connector>
+    </ssd:Connectors></ssd:Component>
+  </ssd:Elements></ssd:System>
+  <ssd:DefaultExperiment startTime="0" stopTime="4"><ssd:Annotations>
+    <ssc:Annotation type="com.github.ecos-platform.scenario"><ecos:Scenario name="pushes">
+      <ecos:action t="1">
+        <ecos:variable id="my train::disturbance"><ecos:real value="2"/></ecos:variable>
+      </ecos:action>
+      <ecos:action t="2.5">
+        <ecos:variable id="my train::disturbance"><ecos:real value="-1"/></ecos:variable>
+      </ecos:action>
+    </ecos:Scenario></ssc:Annotation>
+  </ssd:Annotations></ssd:DefaultExperiment>
+</ssd:SystemStructureDescription>"""
+
+
+def test_actions_of_a_scenario_act_at_the_same_points(native, need, tmp_path):
+    """A train is pushed at 1 s and braked at 2.5 s, as an annotation of Ecos says."""
+    need("ecospy")
+    from ecospy import EcosSimulation
+
+    path = tmp_path / "pushed.ssp"
+    with zipfile.ZipFile(path, "w") as archive:
+        archive.writestr("SystemStructure.ssd", SCENARIO)
+        archive.write(package("PointMassTrain", {})[0], "resources/train.fmu")
+    speeds = []
+    with EcosSimulation(step_size=0.5, ssp_path=str(path)) as engine:
+        assert engine.init()
+        for _ in range(8):
+            speeds.append(engine.get_real("my train::speed"))
+            engine.step(1)
+        engine.terminate()
+    ours = run(load(str(path), step=0.5, settings=["my_train.force=0"]))["my_train.speed"][:8]
+    assert speeds[2] == 0.0 < speeds[3] < speeds[5] > speeds[6]
+    assert ours == pytest.approx(speeds, abs=1e-9)
