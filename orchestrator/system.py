@@ -13,6 +13,8 @@ Unsettled = Literal["stop", "go-on"]
 UNSETTLED: tuple[Unsettled, ...] = ("stop", "go-on")
 Acceleration = Literal["none", "aitken", "anderson"]
 ACCELERATIONS: tuple[Acceleration, ...] = ("none", "aitken", "anderson")
+Together = Literal["together"]
+TOGETHER: Together = "together"
 ACTIONS = ("set", "override", "freeze", "bias", "ramp", "connect")
 
 
@@ -29,7 +31,7 @@ class Instance:
         index: 1-based place among its siblings; None where there is no count.
         count: how many siblings, itself included.
         step: communication step of its own in s, a whole multiple of the system's; None for the system's.
-        isolate: whether it runs in a process of its own.
+        isolate: whether it runs in a process of its own, or ``"together"`` with others of the same FMU that do so.
         step_timeout: wall time in s after which a call of an isolated instance counts as hanging.
         memory_limit: what an isolated instance may use, in MiB.
         swapped: whether another model stands here than the scenario wrote; start values it lacks are then dropped.
@@ -43,7 +45,7 @@ class Instance:
     index: int | None = None
     count: int = 1
     step: float | None = None
-    isolate: bool = False
+    isolate: bool | Together = False
     step_timeout: float | None = None
     memory_limit: float | None = None
     swapped: bool = False

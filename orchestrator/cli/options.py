@@ -108,8 +108,9 @@ Isolate = Annotated[
         "--isolate",
         metavar="NAME",
         autocompletion=completing.instances,
-        help="Run an instance, a group such as 'train', 'all', or, by 'auto', FMUs that this machine does not know in "
-        "processes of their own: a crash there ends no more than the run.",
+        help="Run an instance, a group such as 'train', or 'all' in processes of their own: a crash there ends no more "
+        "than the run. By 'together' instances of one FMU share a process; by 'auto' so do those of FMUs that this "
+        "machine does not know.",
     ),
 ]
 

@@ -160,11 +160,13 @@ def study(
 def _isolating(system: System, names: list[str]) -> list[str]:
     """The settings that isolate instances; groups of them by their name, however many they are in a run."""
     from ..isolation import ALL, AUTO, isolate, strangers
+    from ..system import TOGETHER
 
     isolate(system, names)  # tells which are unknown
-    names = [*(name for name in names if name != AUTO), *(strangers(system) if AUTO in names else ())]
-    groups = dict.fromkeys(SignalName(name).group for name in system.instances)
-    return [f"{name}.isolate=true" for name in (groups if ALL in names else names)]
+    groups = list(dict.fromkeys(SignalName(name).group for name in system.instances))
+    shared = groups if TOGETHER in names else strangers(system) if AUTO in names else []
+    alone = groups if ALL in names else [name for name in names if name not in (TOGETHER, AUTO)]
+    return [*(f"{x}.isolate='{TOGETHER}'" for x in shared), *(f"{x}.isolate=true" for x in alone)]
 
 
 def replay(

@@ -1,4 +1,4 @@
-"""The process of an isolated instance: it loads the FMU and does what the master asks for, until told to end.
+"""The process of isolated instances: it loads their FMUs and does what the master asks for, until told to end.
 
 It is started without the rest of the package (see `launch`), so what is imported here at the top is little.
 """
@@ -7,13 +7,13 @@ from __future__ import annotations
 
 import contextlib
 import ctypes
-import errno
 import mmap
 import os
 import socket
 import sys
 from collections import deque
 from collections.abc import Callable, Iterable, Sequence
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -23,8 +23,9 @@ import psutil
 from .. import world
 from . import guard, messages
 from .guard import Look
-from .messages import NOTE_BASE, NOTE_CALL, NOTE_LINE, NOTE_MEMORY, Cells, Door, note
-from .service import Service
+from .line import Line
+from .messages import NOTE_BASE, NOTE_CALL, NOTE_MEMORY, Cells, Door, note
+from .service import Service, serve
 
 if TYPE_CHECKING:
     from ..fmi import Channel, Slave
@@ -45,23 +46,22 @@ class _Heard(deque[str]):
 
 
 class Host:
-    """Does what the frames of the master say.
+    """Does with one instance what the frames of the master say.
 
     Args:
-        door: to the master.
+        line: to the master.
         memory: shared with it.
-        notes: the head of that memory, as whole numbers.
+        begin: where the instance's part of that begins.
         before: what the process had allocated before there was an FMU, in KiB.
         limit: what it may allocate beyond that, in KiB; None for no limit.
     """
 
-    def __init__(self, door: Door, memory: mmap.mmap, notes: memoryview, before: int, limit: int | None) -> None:
-        self._door = door
+    def __init__(self, line: Line, memory: mmap.mmap, begin: int, before: int, limit: int | None) -> None:
+        self._line = line
         self._memory = memory
-        self._notes = notes
+        self._notes = _notes(memory, begin)
         self._before = before
         self._limit = limit
-        self._process = os.getpid()
         self._slave: Slave | None = None
         self._channels: list[tuple[Channel, Cells | None]] = []
         self._texts: dict[int, Sequence[Any]] = {}
@@ -69,7 +69,14 @@ class Host:
         self._states: dict[int, Any] = {}
         self._problem: Exception | None = None
         """What went wrong since the last answer."""
-        self._service = Service(memory, notes)
+        self.service = Service(memory, begin)
+        self._quiet: dict[int, Callable[[Any], None]] = {
+            messages.CHANNEL: self._add_channel,
+            messages.WATCH: self._watch,
+            messages.VALUES: self._keep_values,
+            messages.RESTORE: self._restore,
+            messages.FORGET: self._forget,
+        }
 
     def instantiate(self, make: Callable[[deque[str]], Slave]) -> None:
         """Make the instance, whose messages go where they outlive a crash, and tell how it went."""
@@ -80,27 +87,23 @@ class Host:
         except Exception as error:
             self._report({"error": self._describe(error)})
 
-    def serve(self) -> None:
-        """Obey until the master leaves."""
-        quiet: dict[int, Callable[[Any], None]] = {
-            messages.CHANNEL: self._add_channel,
-            messages.WATCH: self._watch,
-            messages.VALUES: self._keep_values,
-            messages.RESTORE: self._restore,
-            messages.FORGET: self._forget,
-        }
-        while True:
-            kind, body = self._receive()
-            if kind == messages.STEP:
-                self._step(body)
-            elif kind == messages.CALL:
-                self._call(*messages.content(body))
-            else:
-                try:
-                    quiet[kind](messages.content(body))
-                except Exception as error:
-                    self._problem = self._problem or error
-                self._notes[NOTE_CALL] = 0
+    def obey(self, kind: int, body: bytes) -> None:
+        """Do what a frame says."""
+        if kind == messages.STEP:
+            self._step(body)
+        elif kind == messages.CALL:
+            self._call(*messages.content(body))
+        else:
+            try:
+                self._quiet[kind](messages.content(body))
+            except Exception as error:
+                self._problem = self._problem or error
+            self._notes[NOTE_CALL] = 0
+
+    def come_back(self) -> None:
+        """Go on by messages, at the time that the master has got to by calls through the lane."""
+        if self._slave is not None and self.service.operations:
+            self._slave.time = self.service.time
 
     # ---------------------------------------------------------------- answered
 
@@ -123,27 +126,14 @@ class Host:
     def _call(self, dirty: Sequence[int], operation: str, arguments: tuple[Any, ...]) -> None:
         """Set what waits to be set, then do what has a name."""
         if operation == "free":
-            self._free()
+            self._free(*arguments)
+            return
         try:
             self._set(dirty)
             told = self._read(arguments[0]) if operation == "get" else {"result": self._do(operation, arguments)}
         except Exception as error:
             told = {"error": self._describe(error)}
         self._report(told)
-        if operation == "board" and "result" in told:
-            self._instance.time = self._service.serve()
-
-    def _receive(self) -> tuple[int, bytes]:
-        try:
-            return self._door.receive()
-        except OSError as error:
-            self._note_line(error)
-            raise
-
-    def _note_line(self, error: OSError) -> None:
-        """Tell the master why it will not hear any more, where the FMU has closed the line."""
-        if error.errno in _NO_LINE:
-            self._notes[NOTE_LINE] = 1
 
     def _do(self, operation: str, arguments: tuple[Any, ...]) -> Any:
         if not operation:
@@ -158,28 +148,22 @@ class Host:
         call = own[operation] if operation in own else getattr(self._instance, operation)
         return call(*arguments)
 
-    def _free(self) -> None:
+    def _free(self, is_last: bool) -> None:
         self._notes[NOTE_CALL] = note("free")
+        self.service.leave()
         if self._slave is not None:
             self._slave.free()
+            self._slave = None
         self._answer(messages.ANSWER)
-        # Not by the usual way: some FMUs crash when their libraries are torn down, and all has been given back.
-        world.exit_at_once(0)
+        if is_last:  # not by the usual way: some FMUs crash when their libraries are torn down, and all was given back
+            world.exit_at_once(0)
 
     def _report(self, told: dict[str, Any]) -> None:
         time = self._slave.time if self._slave else 0.0
         self._answer(messages.frame(messages.REPORT, told | {"time": time}))
 
     def _answer(self, frame: bytes) -> None:
-        if os.getpid() != self._process:  # a process that an FMU has forked, and that came back from the call
-            world.exit_at_once(0)
-        call, self._notes[NOTE_CALL] = self._notes[NOTE_CALL], 0
-        try:
-            self._door.send(frame)
-        except OSError as error:
-            self._notes[NOTE_CALL] = call
-            self._note_line(error)
-            raise
+        self._line.answer(frame, self._notes)
 
     @property
     def _instance(self) -> Slave:
@@ -188,7 +172,7 @@ class Host:
 
     def _describe(self, error: Exception) -> dict[str, Any]:
         told = messages.describe(error)
-        used = _memory_in_use(self._process) - self._before
+        used = _memory_in_use(os.getpid()) - self._before
         if isinstance(error, MemoryError) and self._limit is not None:
             used = self._limit
         told["message"] += messages.memory_hint(used, self._limit)
@@ -235,9 +219,9 @@ class Host:
         self._texts[content[0]] = content[1]
 
     def _board(self, table: Sequence[tuple[int, int]]) -> None:
-        """Make ready for calls that come through the lane from now on."""
+        """Make ready for calls that come through the lane."""
         channels = [self._channels[k] if k >= 0 else (None, None) for _, k in table]
-        self._service.board(self._instance, [(*entry, *found) for entry, found in zip(table, channels, strict=True)])
+        self.service.board(self._instance, [(*entry, *found) for entry, found in zip(table, channels, strict=True)])
 
     # ---------------------------------------------------------------- saved states
 
@@ -262,15 +246,13 @@ class Host:
 
 
 _STEPPING = note("step")
-_NO_LINE = (errno.EBADF, errno.ENOTSOCK)
-"""What the system says of a line that was closed on this side, and of a file that has its number since."""
 
 
 # -------------------------------------------------------------------- the process
 
 
 def main(folder: str, door: str) -> None:
-    """Serve one instance; called by the few lines that `launch` starts.
+    """Serve some instances; called by the few lines that `launch` starts.
 
     Args:
         folder: of the files that are shared with the master.
@@ -281,27 +263,45 @@ def main(folder: str, door: str) -> None:
     sys.path[:] = start["path"]
     _be_chosen_first()
     _print_by_lines()
-    memory, notes = _shared(folder)
+    memory = _shared(folder)
+    notes = _notes(memory)
     from ..fmi.binding import SLAVES, read_interface  # noqa: PLC0415 (after the path is set; and what it needs is not the FMU's memory)
     from ..fmi.guard import stand_aside  # noqa: PLC0415
 
     stand_aside()  # this process may end as it likes: the master tells how
 
-    name, folder_of_fmu, interface = start["name"], Path(start["folder"]), read_interface(start["interface"])
+    guests = [(x["name"], read_interface(x["interface"]), Path(x["folder"])) for x in start["guests"]]
     before = notes[NOTE_BASE] = _memory_in_use(os.getpid())
     limit = _limit_memory(before, start["memory_limit"])
-    host = Host(end, memory, notes, before, limit)
+    line = Line(end, notes)
+    hosts = [Host(line, memory, guest["begin"], before, limit) for guest in start["guests"]]
     try:
         end.send(messages.frame(messages.READY, [limit, os.getpid()]))
-        host.instantiate(lambda log: SLAVES[interface.version](name, interface, folder_of_fmu, log))
-        host.serve()
+        for host, (name, interface, where) in zip(hosts, guests, strict=True):
+            host.instantiate(partial(SLAVES[interface.version], name, interface, where))
+        _serve(line, memory, hosts)
     except (EOFError, OSError):  # the master is gone
         world.exit_at_once(1)
 
 
+def _serve(line: Line, memory: mmap.mmap, hosts: Sequence[Host]) -> None:
+    """Obey until the master leaves."""
+    host = hosts[0]
+    while True:
+        kind, body = line.receive()
+        if kind == messages.SEAT:
+            host = hosts[messages.content(body)]
+        elif kind == messages.RIDE:
+            serve(memory, [host.service for host in hosts])
+            for each in hosts:
+                each.come_back()
+        else:
+            host.obey(kind, body)
+
+
 def watching(folder: str, door: str) -> Look:
     """What the guard does now and then: it notes the most memory that is used."""
-    _, notes = _shared(folder)
+    notes = _notes(_shared(folder))
 
     def look(process: int) -> None:
         with contextlib.suppress(psutil.Error):
@@ -311,11 +311,15 @@ def watching(folder: str, door: str) -> Look:
     return look
 
 
-def _shared(folder: str) -> tuple[mmap.mmap, memoryview]:
-    """The memory that is shared with the master, and the notes at its head."""
+def _shared(folder: str) -> mmap.mmap:
+    """The memory that is shared with the master."""
     with world.open(Path(folder) / "memory", "r+b") as stream:
-        memory = world.map_memory(stream.fileno(), 0)
-    return memory, memoryview(memory)[: messages.HEAD].cast("q")
+        return world.map_memory(stream.fileno(), 0)
+
+
+def _notes(memory: mmap.mmap, begin: int = 0) -> memoryview:
+    """The notes at the head of an instance's part of it, as whole numbers."""
+    return memoryview(memory)[begin : begin + messages.HEAD].cast("q")
 
 
 def _connect(door: str) -> Door:

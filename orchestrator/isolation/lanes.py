@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 import os
+from collections.abc import Iterable
 
 from .messages import HEAD
 
-__all__ = ["HAS_LANES", "LANE_SIZE", "lane", "lane_offset", "spin_time"]
+__all__ = ["HAS_LANES", "LANE_SIZE", "lane", "layout", "spin_time"]
 
 try:
     from . import lane
@@ -22,9 +23,12 @@ _LINE = 64
 """Bytes of a line of the cache, where a lane begins."""
 
 
-def lane_offset(cells: int) -> int:
-    """Where the lane stands in a memory with room for so many values, in bytes."""
-    return -(-(HEAD + 8 * cells) // _LINE) * _LINE
+def layout(rooms: Iterable[int]) -> list[int]:
+    """Where in their memory, in bytes, instances with room for so many values begin; and then the lane."""
+    begins = [0]
+    for cells in rooms:
+        begins.append(begins[-1] + -(-(HEAD + 8 * cells) // _LINE) * _LINE)
+    return begins
 
 
 def spin_time(processes: int) -> float:

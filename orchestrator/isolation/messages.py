@@ -1,4 +1,4 @@
-"""What the master and the process of an isolated instance say to each other.
+"""What the master and a process of isolated instances say to each other.
 
 Numbers stand in a file that both map into their memory; calls and answers go as frames over a socket. The one who has
 rung leaves the memory alone until the other has answered.
@@ -24,8 +24,9 @@ if TYPE_CHECKING:
 
 A = TypeVar("A")
 T = TypeVar("T")
-STEP, CALL, CHANNEL, WATCH, VALUES, RESTORE, FORGET = range(7)
-"""Frames to the host. The first two are answered; what went wrong with one of the others comes with the next answer."""
+STEP, CALL, CHANNEL, WATCH, VALUES, RESTORE, FORGET, SEAT, RIDE = range(9)
+"""Frames to the host. The first two are answered; what went wrong with one of those up to `FORGET` comes with the next
+answer. `SEAT` says which instance the following are for, by its number; `RIDE`, to take calls from the lane."""
 READY, DONE, REPORT = range(16, 19)
 """Frames from the host: it has started; all went as asked; what there is to tell."""
 
@@ -37,11 +38,12 @@ STEP_BODY = struct.Struct("<ddB")
 ANSWER = FRAME.pack(DONE, 0)
 
 HEAD = 64
-"""Bytes before the values: notes of the host as whole numbers of 64 bits, which outlive it."""
+"""Bytes before the values of an instance: notes of the host as whole numbers of 64 bits, which outlive it."""
 NOTE_CALL, NOTE_MEMORY, NOTE_BASE, NOTE_LINE, NOTE_FAILED, NOTE_STATUS, NOTE_TIME = range(7)
 """What it is doing (see `note`); the most memory it has been seen to use beyond what Python has, which is the third, in
-KiB; whether it has lost its line to the master. Of calls through the lane: which one failed, counted from 1, and less
-than 0 unless that was one that reads; its status; and the time in s, a real number, that the master has got to."""
+KiB; whether it has lost its line to the master: these three of the whole process, at its first instance. Of calls
+through the lane: which one failed, counted from 1, and less than 0 unless that was one that reads; its status; and the
+time in s, a real number, that the master has got to."""
 SET_REALS, SET_INTEGERS, LANE_STEP, GET_REALS, GET_INTEGERS = range(5)
 """What is called through the lane: see ``native/lane.h``."""
 CALLS = ("", "instantiate", "setup", "enter_initialization", "exit_initialization", "set", "step", "get", "save",
@@ -49,7 +51,7 @@ CALLS = ("", "instantiate", "setup", "enter_initialization", "exit_initializatio
          "roll_back", "reset", "free", "check", "board")  # fmt: skip
 """What an FMU is asked to do, by number in `NOTE_CALL`."""
 NUMBERS = {name: number for number, name in enumerate(CALLS)}
-_FRAMES = {*range(STEP, FORGET + 1), *range(READY, REPORT + 1)}
+_FRAMES = {*range(STEP, RIDE + 1), *range(READY, REPORT + 1)}
 _CHUNK, _LARGE = 1 << 16, 1 << 20
 _SHOWN = 20
 _SUSPICIOUS = 0.5

@@ -1,63 +1,53 @@
-"""The process of an isolated instance as the master sees it: started, heard, brought to its end whatever it does."""
+"""A process of isolated instances as the master sees it: started, heard, brought to its end whatever they do."""
 
 from __future__ import annotations
 
 import contextlib
+import struct
 import subprocess
 import sys
-from collections.abc import Callable
+from collections import deque
+from collections.abc import Callable, Sequence
 from pathlib import Path
 
 from .. import world
 from ..errors import cut
-from ..fmi import Interface
 from ..fmi.binding import plain_interface
 from . import messages
-from .lanes import LANE_SIZE, lane, lane_offset, spin_time
+from .lanes import LANE_SIZE, lane, layout, spin_time
 from .launch import CRASHES, GRACE, MOMENT, accept, end_process, signal_name, start_process, starting
-from .messages import NOTE_CALL, NOTE_LINE, NOTE_MEMORY, Door
+from .messages import NOTE_CALL, NOTE_LINE, NOTE_MEMORY, NOTE_TIME, Door
+from .seats import Guest, HostLostError, Seated
 
 PATIENCE = 60.0
 """Default wall time in s for one call, and the least for Python to start on a busy machine."""
 LAST_PATIENCE = 10.0
 """The wall time in s that an instance's calls may take, all together, once the run is to stop."""
+_NAMES = 5
+"""How many of those that shared it are named."""
 _LINES, _LINE = 20, 500
 """How much of what it wrote is shown after a crash."""
 
 
-class HostLostError(Exception):
-    """The process of an instance is gone: its message says how.
-
-    Attributes: `log` (the last lines it wrote), `is_stopped` (whether that is because the run was to stop).
-    """
-
-    def __init__(self, message: str, log: list[str], *, is_stopped: bool = False) -> None:
-        super().__init__(message)
-        self.log, self.is_stopped = log, is_stopped
-
-
 class HostProcess:
-    """One instance's process. It starts when this is made, and is not waited for before the first answer.
+    """The process of one instance or more. It starts when this is made, and is not waited for before the first answer.
 
     Args:
-        name: the instance's name.
-        interface: its interface.
-        folder: where the FMU was unpacked; files shared with the process stand beside it.
-        cells: how many values the shared memory has room for.
-        name_call: the name of the FMU's function that `note` speaks of.
+        guests: who lives in it; files shared with it stand beside the folder of the first.
         patience: wall time in s after which a call counts as hanging; None for the default.
-        memory_limit: what the FMU may allocate, in MiB; None for half of what the machine has.
+        memory_limit: what may be allocated there, in MiB; None for half of what the machine has.
         stopped: whether the run is to stop; calls are given `LAST_PATIENCE` from then on.
+
+    Attributes:
+        seated: those who live in it, as the master has them; the number of a seat is that of the guest.
+        begins: where their parts of the memory begin, in bytes.
+        is_riding: whether it takes calls from the lane, and no messages.
     """
 
     def __init__(
         self,
-        name: str,
-        interface: Interface,
-        folder: Path,
+        guests: Sequence[Guest],
         *,
-        cells: int,
-        name_call: Callable[[str, int], str],
         patience: float | None,
         memory_limit: float | None,
         stopped: Callable[[], bool] | None = None,
@@ -69,27 +59,37 @@ class HostProcess:
         self._moment = min(MOMENT, self.patience)
         self._left, self._last_left = max(self.patience, PATIENCE), LAST_PATIENCE
         """Wall time in s that the present call may still take; that all calls may, once the run is to stop."""
-        self._name_call = name_call
+        self.seated: list[Seated] = []
+        self._left_seats = len(guests)
+        self._inboxes: list[deque[tuple[int, bytes]]] = [deque() for _ in guests]
+        self._expecting = deque(range(len(guests)))
+        """Whose answers are under way, in the order in which they come: first, how each was instantiated."""
+        self._unread = 0
+        """Bytes that were sent since no answer was under way."""
+        self._told_seat = self._asked = 0
+        """Whom frames are for; who was asked last."""
         self._limit_given = memory_limit is not None
         self._limit: int | None = None
-        self._folder = Path(world.mkdtemp(prefix="host_", dir=folder.parent))
+        self._folder = Path(world.mkdtemp(prefix="host_", dir=guests[0].folder.parent))
+        *self.begins, self._lane_offset = layout(guest.cells for guest in guests)
         start = {
             "path": sys.path,
             "memory_limit": _default_limit() if memory_limit is None else memory_limit,
-            "name": name,
-            "folder": str(folder),
-            "interface": plain_interface(interface),
+            "guests": [
+                {"name": name, "folder": str(folder), "interface": plain_interface(interface), "begin": begin}
+                for (name, interface, folder, _), begin in zip(guests, self.begins, strict=True)
+            ],
         }
         self._door: Door | None = None
         self.lane: lane.Lane | None = None
-        self._lane_offset = lane_offset(cells)
+        self.is_riding = False
         try:
             world.write_bytes(self._folder / "start", messages.encoded(start))
             # Zeros, not a hole: where the disk is full, whoever fills one is killed, and that may be the master.
-            world.write_bytes(self._folder / "memory", bytes(lane_offset(cells) + LANE_SIZE))
+            world.write_bytes(self._folder / "memory", bytes(self._lane_offset + LANE_SIZE))
             with world.open(self._folder / "memory", "r+b") as stream:
                 self.memory = world.map_memory(stream.fileno(), 0)
-            self._notes: memoryview | None = memoryview(self.memory)[: messages.HEAD].cast("q")
+            self._notes: memoryview | None = memoryview(self.memory)[: self._lane_offset].cast("q")
             with world.open(self._folder / "output", "ab") as output:
                 command = [*starting("isolation.host"), str(self._folder)]
                 self._process, self._end, self._password = start_process(command, output)
@@ -103,11 +103,13 @@ class HostProcess:
     # ---------------------------------------------------------------- talk
 
     def wait_until_ready(self) -> None:
-        """Wait for its sign of life.
+        """Wait for its sign of life, unless it has given one.
 
         Raises:
             HostLostError: it does not start.
         """
+        if self.is_ready:
+            return
         end = (
             accept(self._end, self._process, self._password, self._wait, self._moment) if self._password else self._end
         )
@@ -120,12 +122,23 @@ class HostProcess:
             raise self.garbled(error) from error
         self.is_ready = True
 
-    def send(self, frames: bytes) -> None:
-        """Ring.
+    def send(self, seat: int, frames: bytes) -> None:
+        """Ring for one instance, of which an answer is to come.
 
         Raises:
             HostLostError: it is gone, or does not listen.
         """
+        self._asked = seat
+        if self._expecting and self._unread + len(frames) > _MOST_UNREAD:  # lest both wait for the other to listen
+            self._collect()
+        if seat != self._told_seat:
+            frames = messages.frame(messages.SEAT, seat) + frames
+            self._told_seat = seat
+        self._unread = len(frames) + (self._unread if self._expecting else 0)
+        self._send(frames)
+        self._expecting.append(seat)
+
+    def _send(self, frames: bytes) -> None:
         assert self._door is not None
         self._left = self.patience
         try:
@@ -133,15 +146,25 @@ class HostProcess:
         except OSError as error:
             raise self._is_lost() from error
 
-    def receive(self) -> tuple[int, bytes]:
-        """Its answer.
+    def receive(self, seat: int) -> tuple[int, bytes]:
+        """The answer to one instance; those to others, which come before, are kept for them.
 
         Raises:
             HostLostError: it is gone, or does not answer; it is ended then.
         """
+        self._asked = seat
+        while not self._inboxes[seat]:
+            self._receive()
+        return self._inboxes[seat].popleft()
+
+    def _receive(self) -> None:
         assert self._door is not None
         self._left = self.patience
-        return self._told(self._door.receive)
+        self._inboxes[self._expecting.popleft()].append(self._told(self._door.receive))
+
+    def _collect(self) -> None:
+        while self._expecting:
+            self._receive()
 
     def _told(self, receive: Callable[[], tuple[int, bytes]]) -> tuple[int, bytes]:
         try:
@@ -167,9 +190,9 @@ class HostProcess:
         if min(self._left, self._last_left) <= 0.0:
             raise self._hangs()
 
-    def note(self, which: int) -> int:
-        """One of its notes, by number."""
-        return self._notes[which] if self._notes is not None else 0
+    def note(self, which: int, seat: int = 0) -> int:
+        """One of its notes, by number, of an instance."""
+        return self._notes[self.begins[seat] // 8 + which] if self._notes is not None else 0
 
     # ---------------------------------------------------------------- the lane
 
@@ -181,34 +204,71 @@ class HostProcess:
             self.lane = lane.Lane(self.memory, self._lane_offset, line, self._moment, spin)
         return self.lane
 
-    def await_lane(self) -> None:
-        """Wait for all that is under way there.
+    def enter_lane(self) -> None:
+        """Let it take calls from there.
+
+        Raises:
+            HostLostError: it is gone, or does not listen.
+        """
+        if not self.is_riding:
+            self._collect()  # whoever waits at the lane takes what there is to hear for its end
+            self._send(messages.frame(messages.RIDE, None))
+            self.is_riding = True
+
+    def leave_lane(self) -> None:
+        """Let it take messages again; what it is asked then is asked at the times that its instances have."""
+        if self.is_riding:
+            assert self.lane is not None
+            self.is_riding = False
+            for begin, seated in zip(self.begins, self.seated, strict=True):
+                struct.pack_into("=d", self.memory, begin + 8 * NOTE_TIME, seated.time)
+            self.lane.leave()
+
+    def await_lane(self, seat: int) -> None:
+        """Wait for all that is under way there, for one instance; each call may take its time.
 
         Raises:
             HostLostError: it is gone, or does not come to an end; it is ended then.
         """
         assert self.lane is not None
-        self._left = self.patience - self._moment  # which has passed before
+        self._asked, self._left = seat, self.patience - self._moment  # which has passed before
+        done = self.lane.done()
         while (how := self.lane.wait(self._moment)) != lane.CAME:
             if how == lane.CLOSED:
                 self.lane.leave()  # so that it sees that, where it only has lost its line
                 raise self._is_lost()
+            if done != (done := self.lane.done()):
+                self._left = self.patience
             self._wait()
+
+    def culprit(self) -> int:
+        """The seat of whom it calls, or called when it was lost; if that is nobody, of whom it was asked for last."""
+        seats = range(len(self.begins))
+        return next((seat for seat in seats if self.note(NOTE_CALL, seat)), self._asked)
 
     def last_call(self) -> tuple[str, int]:
         """What it is doing, or was when it was lost: a name of `messages.CALLS`, and the channel where that matters.
 
         An FMU may have overwritten it.
         """
-        found = self._notes[NOTE_CALL] if self._notes is not None else 0
+        found = self.note(NOTE_CALL, self.culprit())
         number = found & 0xFF
         return messages.CALLS[number] if number < len(messages.CALLS) else "", found >> 8
 
     def _where(self) -> str:
+        call = self._called()
+        return f"in {call}" if call else "between two calls"
+
+    def _called(self) -> str:
         call, channel = self.last_call()
-        return f"in {self._name_call(call, channel)}" if call else "between two calls"
+        return self.seated[self.culprit()].name_call(call, channel) if call else ""
 
     # ---------------------------------------------------------------- how it ends
+
+    def leave(self) -> bool:
+        """Give a seat back: whether it was the last, with which the process is to end."""
+        self._left_seats -= 1
+        return not self._left_seats
 
     def kill(self) -> None:
         """End it, and what it has started, at once."""
@@ -234,21 +294,26 @@ class HostProcess:
             self.memory.close()
             world.rmtree(self._folder, ignore_errors=True)
 
-    def _lost(self, message: str) -> HostLostError:
-        return HostLostError(message, self._last_lines())
+    def _lost(self, message: str, *, is_stopped: bool = False) -> HostLostError:
+        seat = self.culprit()
+        others = [one.name for k, one in enumerate(self.seated) if k != seat]
+        if others and self.is_ready:
+            names = others if len(others) <= _NAMES else [*others[: _NAMES - 1], f"{len(others) - _NAMES + 1} more"]
+            message += f"; it was the process of {', '.join(names)} as well"
+        return HostLostError(message, seat, self._last_lines(), is_stopped=is_stopped)
 
     def _hangs(self) -> HostLostError:
         end_process(self._process)
         is_stopped = self._last_left <= 0.0
         if not self.is_ready and not is_stopped:
             return self._lost(f"its process did not start within {max(self.patience, PATIENCE):g} s")
-        call = self._name_call(*self.last_call()) or "what it was asked for"
+        call = self._called() or "what it was asked for"
         told = f"did not return from {call} within"
         if is_stopped:
             told = f"{told} {LAST_PATIENCE:g} s after the run was to stop; its process was ended"
         else:
             told = f"{told} {self.patience:g} s; its process was ended; set step_timeout to allow more wall time"
-        return HostLostError(told, self._last_lines(), is_stopped=is_stopped)
+        return self._lost(told, is_stopped=is_stopped)
 
     def _is_lost(self) -> HostLostError:
         """How it went: a signal, or an exit code."""
@@ -259,7 +324,7 @@ class HostProcess:
         if not self.is_ready:
             return self._lost(f"its process could not be started (exit code {code})")
         where = self._where()
-        if self._notes is not None and self._notes[NOTE_LINE]:
+        if self.note(NOTE_LINE):
             how = f"lost its line to the master {where} or before: the FMU closes descriptors that are not its own"
         elif forced:
             how = f"left {where} and was ended"
@@ -277,8 +342,7 @@ class HostProcess:
 
     def _hint(self) -> str:
         """Whether memory may be the reason."""
-        seen = self._notes[NOTE_MEMORY] if self._notes is not None else 0
-        hint = messages.memory_hint(seen, self._limit)
+        hint = messages.memory_hint(self.note(NOTE_MEMORY), self._limit)
         if hint or not self._limit_given or self._limit is None:
             return hint
         return f"; its memory_limit was {self._limit / 1024:g} MiB"
@@ -299,6 +363,8 @@ class HostProcess:
         return [cut(line, _LINE) for line in lines[-_LINES:]]
 
 
+_MOST_UNREAD = 1 << 15
+"""Bytes that may be sent before an answer is read: less than a socket holds."""
 _KILL = 9
 """SIGKILL, which Windows has no name for."""
 

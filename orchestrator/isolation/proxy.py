@@ -1,4 +1,4 @@
-"""An instance in a process of its own behind the same face: its crash, hang or leak is an `FmuError`, not our end.
+"""An instance in another process behind the same face: its crash, hang or leak is an `FmuError`, not our end.
 
 What is set is written into shared memory and waits there; a step takes it along, and brings back what was read after
 the step before: one round trip per communication step. A step whose outputs will be read is not waited for until they
@@ -9,9 +9,8 @@ from __future__ import annotations
 
 import logging
 import struct
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from contextlib import contextmanager
-from pathlib import Path
 from typing import Any
 
 from ..errors import FmuError, LostError
@@ -20,65 +19,36 @@ from ..fmi.binding import call_name
 from . import messages
 from .channel import IsolatedChannel
 from .messages import Cells, Report, Saved, frame
-from .process import HostLostError, HostProcess
+from .process import HostProcess
 from .riding import Ride
+from .seats import Guest, HostLostError
 
-_SPARE_CELLS = 4096
-_CELLS_PER_VARIABLE = 4
-"""Room in the shared memory; channels that find none send their values in messages."""
 _LOG = logging.getLogger(__name__)
 
 
 class IsolatedSlave:
-    """An FMU in a process of its own.
+    """An FMU in a process of its own, or one that it shares.
 
-    The process is started at once and awaited when it is first needed, so that many start at the same time: an FMU that
-    cannot be instantiated is an error of the first call.
+    The process is awaited when it is first needed, so that many start at the same time: an FMU that cannot be
+    instantiated is an error of the first call.
 
     Args:
-        name: the instance's name in the system.
-        interface: its interface.
-        folder: where the FMU was unpacked.
-        step_timeout: wall time in s after which a call counts as hanging; None for a minute.
-        memory_limit: what it may allocate, in MiB; None for half of the machine's memory.
-        stopped: whether the run is to stop: its calls do not take long any more then.
-
-    Raises:
-        FmuError: no process can be started.
+        guest: the instance.
+        process: where it lives; whoever lives there takes a seat in the order in which it was told of them.
     """
 
-    def __init__(
-        self,
-        name: str,
-        interface: Interface,
-        folder: Path,
-        *,
-        step_timeout: float | None = None,
-        memory_limit: float | None = None,
-        stopped: Callable[[], bool] | None = None,
-    ) -> None:
-        self.name = name
-        self.interface = interface
+    def __init__(self, guest: Guest, process: HostProcess) -> None:
+        self.name = guest.name
+        self.interface: Interface = guest.interface
         self.time = 0.0
         self.log: list[str] = []
         self.disturbed: dict[str, None] = {}
         self.rolls_back = False
         self._ride: Ride | None = None
-        self._room = _SPARE_CELLS + _CELLS_PER_VARIABLE * len(interface.variables)
-        self._used = 0
-        try:
-            self._process = HostProcess(
-                name,
-                interface,
-                folder,
-                cells=self._room,
-                name_call=self.name_call,
-                patience=step_timeout,
-                memory_limit=memory_limit,
-                stopped=stopped,
-            )
-        except OSError as error:
-            raise FmuError(f"its process cannot be started: {error}", instance=name) from error
+        self._process, self._seat = process, len(process.seated)
+        process.seated.append(self)
+        self._begin = process.begins[self._seat] + messages.HEAD
+        self._room, self._used = guest.cells, 0
         self._is_made = self._is_gone = False
         self._lost: FmuError | None = None
         self._channels: list[IsolatedChannel] = []
@@ -127,7 +97,7 @@ class IsolatedSlave:
                 self.interface.variables[name]  # a KeyError here, as without isolation
             offset = None
             if kind != "String" and self._used + len(names) <= self._room:
-                offset = messages.HEAD + 8 * self._used
+                offset = self._begin + 8 * self._used
                 self._used += len(names)
             self._queue += frame(messages.CHANNEL, (kind, key[1], offset))
             cells = None if offset is None else Cells(self._process.memory, offset, kind, len(names))
@@ -206,23 +176,26 @@ class IsolatedSlave:
         self.log, self.rolls_back = [], False
 
     def free(self) -> None:
-        """Give everything back, the process included. Never raises: what goes wrong now is no more than logged."""
+        """Give everything back, with the last its process. Never raises: what goes wrong now is no more than logged."""
         if self._is_gone:
             return
-        self._is_gone = True
+        self._is_gone, is_last = True, self._process.leave()
         try:
             if self._lost is None and self._is_made:
                 if self.end is not None:
                     self.end = None
-                    self._process.receive()
+                    self._process.receive(self._seat)
                 self._leave_lane()
-                self._process.send(frame(messages.CALL, (self._dirty, "free", ())))
-                self._process.receive()
-                self._process.wait()
+                self._process.send(self._seat, frame(messages.CALL, (self._dirty, "free", (is_last,))))
+                self._process.receive(self._seat)
+                if is_last:
+                    self._process.wait()
         except HostLostError as lost:
-            _LOG.warning("%s: %s", self.name, lost)
+            _LOG.warning("%s: %s", self._process.seated[lost.seat].name, lost)
+            self._bury(lost)
         finally:
-            self._process.kill()
+            if is_last:
+                self._process.kill()
 
     # ---------------------------------------------------------------- for the compiled step loop
 
@@ -231,7 +204,7 @@ class IsolatedSlave:
         if not self._is_made:
             self._await()
         self._leave_lane()
-        self._ride = Ride(self, self._process)
+        self._ride = Ride(self, self._process, self._seat)
         return self._ride
 
     @property
@@ -241,7 +214,16 @@ class IsolatedSlave:
 
     def _leave_lane(self) -> None:
         if self._ride is not None:
-            self._ride.end(self.time)
+            self._ride.end()
+
+    def enter_lane(self) -> None:
+        """Let its process take calls from the lane.
+
+        Raises:
+            FmuError: it is lost.
+        """
+        with self._mourning():
+            self._process.enter_lane()
 
     def await_lane(self, end: float) -> None:
         """Wait for a call that is under way in the lane, in or after a step to a time in s.
@@ -251,7 +233,7 @@ class IsolatedSlave:
         """
         self.end = end
         with self._mourning():
-            self._process.await_lane()
+            self._process.await_lane(self._seat)
         self.end = None
 
     # ---------------------------------------------------------------- for the channels
@@ -325,7 +307,7 @@ class IsolatedSlave:
         ring, self._queue, self._dirty = self._queue + ring, b"", []
         self._leave_lane()
         with self._mourning():
-            self._process.send(ring)
+            self._process.send(self._seat, ring)
 
     def _await(self) -> None:
         """Wait for the process and for the instance in it."""
@@ -343,7 +325,7 @@ class IsolatedSlave:
         if self._lost is not None:
             raise self._lost
         with self._mourning():
-            kind, body = self._process.receive()
+            kind, body = self._process.receive(self._seat)
             try:
                 return Report.read(body, self.name) if kind == messages.REPORT else None
             except ValueError as error:
@@ -355,24 +337,36 @@ class IsolatedSlave:
         try:
             yield
         except HostLostError as lost:
-            error = self._mourn(lost)
+            error = self._bury(lost)
             if lost.is_stopped:
                 _LOG.warning("%s", error)
                 raise KeyboardInterrupt from lost
             raise error from lost
         except BaseException:  # a second Ctrl-C: it is not waited for
             self._process.kill()
-            self._lost = FmuError("was interrupted", instance=self.name, time=self.time)
+            for one in self._process.seated:
+                one.lose(FmuError("was interrupted", instance=one.name, time=one.time))
             raise
 
-    def _mourn(self, lost: HostLostError) -> FmuError:
-        if self.end is not None and self._process.last_call()[0] == "get":
-            self.time = self.end
+    def _bury(self, lost: HostLostError) -> FmuError:
+        """Let everybody in the process know who has ended it."""
+        error = self._process.seated[lost.seat].mourn(lost)
+        for one in self._process.seated:
+            one.lose(error)
+        return error
+
+    def mourn(self, lost: HostLostError) -> FmuError:
+        """The error that tells that it was lost, with its process."""
+        end = self.end if self._ride is None or self.end is not None else self._ride.last_end
+        if end is not None and self._process.last_call()[0] == "get":
+            self.time = end
         self.log = lost.log
+        return LostError(str(lost), instance=self.name, time=self.time if self._is_made else None, log=lost.log)
+
+    def lose(self, error: FmuError) -> None:
+        """Let everything that is asked of it from now on be this error."""
         self.moment += 1
-        time = self.time if self._is_made else None
-        self._lost = LostError(str(lost), instance=self.name, time=time, log=lost.log)
-        return self._lost
+        self._lost = error
 
     def _checked(self, report: Report | None) -> Report:
         """A report of something that went well; anything else is raised."""

@@ -6,14 +6,13 @@ of them: see ``native/lane.h``. Where there is no such lane, or for what it does
 
 from __future__ import annotations
 
-import struct
 from collections.abc import Iterable
 from typing import Any, Protocol
 
 from ..fmi import Interface
 from .channel import IsolatedChannel
 from .lanes import HAS_LANES, lane
-from .messages import GET_INTEGERS, GET_REALS, LANE_STEP, NOTE_FAILED, NOTE_TIME, SET_INTEGERS, SET_REALS
+from .messages import GET_INTEGERS, GET_REALS, LANE_STEP, NOTE_FAILED, SET_INTEGERS, SET_REALS
 from .process import HostProcess
 
 _DISCARD = 2
@@ -37,6 +36,9 @@ class Rider(Protocol):
     def ask(self, operation: str, *arguments: Any) -> Any:
         """Let its process do something."""
 
+    def enter_lane(self) -> None:
+        """Let its process take calls from the lane."""
+
     def await_lane(self, end: float) -> None:
         """Wait for a call that is under way in the lane, in or after a step to a time in s."""
 
@@ -54,13 +56,14 @@ class Ride:
     """The calls of one isolated instance by the compiled step loop, in the order in which they are added.
 
     Args:
-        slave: the instance. process: its process.
+        slave: the instance. process: its process. seat: its number there.
     """
 
-    def __init__(self, slave: Rider, process: HostProcess) -> None:
+    def __init__(self, slave: Rider, process: HostProcess, seat: int) -> None:
         self._slave, self.name = slave, slave.name
         self._process, self._lane = process, process.open_lane()
-        self._rider = lane.Rider(self._lane, 0, 0)
+        self._seat = seat
+        self._rider = lane.Rider(self._lane, process.begins[seat], seat)
         self._table: list[tuple[int, int]] = []
         self._is_on = False
 
@@ -77,8 +80,8 @@ class Ride:
         self._table.append((kind, channel.index))
         return lane.FUNCTIONS[kind], self._rider.add(kind, channel.cells.offset, channel.cells.count)
 
-    def begin(self) -> None:
-        """Let the process take calls from the lane.
+    def board(self) -> None:
+        """Tell the process what its calls are, unless it knows that.
 
         Raises:
             FmuError: it is lost, or what was set before is refused.
@@ -88,12 +91,24 @@ class Ride:
             self._slave.ask("board", self._table)
             self._is_on = True
 
-    def end(self, time: float) -> None:
-        """Let it take messages again; what it is asked then is asked at a time in s."""
-        if self._is_on:
-            self._is_on = False
-            struct.pack_into("=d", self._process.memory, 8 * NOTE_TIME, time)
-            self._lane.leave()
+    def begin(self) -> None:
+        """Let the process take calls from the lane, once all who live there have boarded.
+
+        Raises:
+            FmuError: it is lost.
+        """
+        self._slave.enter_lane()
+
+    def end(self) -> None:
+        """Let the process take messages again, of which one is for this instance: it boards anew then."""
+        self._is_on = False
+        self._process.leave_lane()
+
+    @property
+    def last_end(self) -> float | None:
+        """The end in s of the last step, if there was one."""
+        begin, length = self._rider.last_step()
+        return begin + length if length else None
 
     def recover(self, call: str, status: int, time: float) -> bool:
         """See to a call that failed: whether it is to be made again, because nothing is wrong in the end.
@@ -112,7 +127,7 @@ class Ride:
             slave.time = begin
             slave.await_lane(begin + length)
             return True
-        kind, channel = self._table[abs(self._process.note(NOTE_FAILED)) - 1]
+        kind, channel = self._table[abs(self._process.note(NOTE_FAILED, self._seat)) - 1]
         if kind == LANE_STEP and status == _DISCARD:
             slave.ask("resume", begin, length, status, True)
             return not call.endswith("DoStep")

@@ -1,11 +1,11 @@
-"""The process of an isolated instance on its side of the lane: what is called, and where its values stand."""
+"""An isolated instance on its process's side of the lane: what is called, and where its values stand."""
 
 from __future__ import annotations
 
 import mmap
 import struct
 from array import array
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from typing import TYPE_CHECKING, Any
 
 from .lanes import LANE_SIZE, lane, spin_time
@@ -23,12 +23,12 @@ class Service:
 
     Args:
         memory: shared with the master; the lane stands at its end.
-        notes: the head of that memory.
+        begin: where the instance's part of it begins.
     """
 
-    def __init__(self, memory: mmap.mmap, notes: memoryview) -> None:
-        self._memory, self._notes = memory, notes
-        self._operations = b""
+    def __init__(self, memory: mmap.mmap, begin: int) -> None:
+        self._memory, self.begin = memory, begin
+        self.operations = b""
         self._kept: list[array[int]] = []
         """Value references, of which C has the addresses."""
 
@@ -37,7 +37,8 @@ class Service:
         from ..fmi.binding import FmuChannel, FmuSlave  # noqa: PLC0415 (it is there by now, with the FMU)
 
         assert isinstance(slave, FmuSlave)
-        self._operations, self._kept = b"", []
+        struct.pack_into("=q", self._memory, self.begin + 8 * NOTE_FAILED, 0)
+        self.leave()
         for kind, number, channel, cells in table:
             if kind == LANE_STEP:
                 self._add(kind, slave.addresses(slave.DO_STEP), [], 0, note("step"))
@@ -51,11 +52,20 @@ class Service:
     def _add(self, kind: int, call: tuple[int, int], references: Any, offset: int, told: int) -> None:
         kept = array("I", references)
         self._kept.append(kept)
-        self._operations += _OPERATION.pack(kind, *call, kept.buffer_info()[0], len(kept), offset, told)
+        self.operations += _OPERATION.pack(kind, *call, kept.buffer_info()[0], len(kept), offset, told)
 
-    def serve(self) -> float:
-        """Take calls from the lane until told to leave; the time in s that the master has got to then."""
-        self._notes[NOTE_FAILED] = 0
-        lane.serve(self._memory, len(self._memory) - LANE_SIZE, [(0, self._operations)], spin_time(2))
-        time: float = struct.unpack_from("=d", self._memory, 8 * NOTE_TIME)[0]
+    def leave(self) -> None:
+        """Nothing is called any more."""
+        self.operations, self._kept = b"", []
+
+    @property
+    def time(self) -> float:
+        """The time in s that the master has got to when it lets the instance take messages again."""
+        time: float = struct.unpack_from("=d", self._memory, self.begin + 8 * NOTE_TIME)[0]
         return time
+
+
+def serve(memory: mmap.mmap, services: Sequence[Service]) -> None:
+    """Take calls of all instances of a process from its lane until told to leave."""
+    guests = [(service.begin, service.operations) for service in services]
+    lane.serve(memory, len(memory) - LANE_SIZE, guests, spin_time(2))

@@ -119,6 +119,8 @@ class CompiledLoop:
             cells = into.room(due)
             self._under_way = into, observe, start_time, step
             for ride in self.plan.rides:
+                ride.board()
+            for ride in self.plan.rides:
                 ride.begin()
             begin = world.perf_counter()
             taken, written, newest = kernel.run(

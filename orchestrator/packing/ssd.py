@@ -18,6 +18,7 @@ from ..fmi import Unit, Variable
 from ..run import Checked
 from ..scenario import dump_beside
 from ..ssp import OWN
+from ..system import TOGETHER
 from ..wiring import Link
 from .parts import Part
 
@@ -105,6 +106,7 @@ def _component(elements: Any, part: Part, units: Mapping[str, Unit], ends: set[s
     annotations, instance = _below(component, "ssd:Annotations"), part.instance
     own = {"name": instance.name}
     own |= {key: "true" for key in ("isolate", "swapped") if getattr(instance, key)}
+    own |= {"isolate": TOGETHER} if instance.isolate == TOGETHER else {}
     for key in ("step_timeout", "memory_limit"):
         if (value := getattr(instance, key)) is not None:
             own[key] = repr(float(value))

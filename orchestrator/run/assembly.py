@@ -34,13 +34,15 @@ def assembled(
     system, wiring = checked.system, checked.wiring
     slaves: dict[str, Slave] = {}
     with ExitStack() as given_back:  # each of them, also when another interruption comes meanwhile
-        for name, model in checked.models.items():
-            slaves[name] = slave = instantiate(model, system.instances[name], stopped)
+        for name, slave in instantiate(checked.models, system.instances, stopped):
+            slaves[name] = slave
             given_back.callback(slave.free)
-            if name in restoring and isinstance(slave, LoadedSlave | IsolatedSlave):
-                slave.roll_back()
+        for name in restoring:
+            slave = slaves[name]
+            assert isinstance(slave, LoadedSlave | IsolatedSlave)  # no other discards a step
+            slave.roll_back()
         yield Master(
-            slaves,
+            {name: slaves[name] for name in checked.models},
             checked.order.sequence,
             wiring.links,
             wiring.starts,

@@ -73,14 +73,13 @@ class Crew:
         if not self._is_fit:
             self.dismiss()
         self._is_fit = False
-        given = _given(checked)
-        for name, model in checked.models.items():
-            if name not in self._slaves or not self._reset(name, given[name]):
-                self._slaves[name] = instantiate(
-                    model, checked.system.instances[name], lambda: self.interruption.is_asked_for
-                )
-                self._given[name] = set()
-            self._given[name] |= given[name]
+        given, models = _given(checked), checked.models
+        kept = {name for name in models if name in self._slaves and self._reset(name, given[name])}
+        fresh = {name: model for name, model in models.items() if name not in kept}
+        for name, slave in instantiate(fresh, checked.system.instances, lambda: self.interruption.is_asked_for):
+            self._slaves[name] = slave
+        for name in models:
+            self._given[name] = given[name] | (self._given[name] if name in kept else set())
         for name in restoring:
             slave = self._slaves[name]
             assert isinstance(slave, LoadedSlave | IsolatedSlave)  # no other discards a step

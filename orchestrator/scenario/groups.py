@@ -19,7 +19,7 @@ from .. import world
 from ..errors import ScenarioError
 from ..fmi import is_fmu_name
 from ..problems import Problem, suggestion
-from ..system import Instance
+from ..system import TOGETHER, Instance
 from .patterns import NAME, Rule, member
 
 MAX_COUNT = 10_000
@@ -257,7 +257,7 @@ def _options(entries: dict[str, Entry], problems: list[Problem]) -> dict[str, An
     values: dict[str, Any] = {}
     for key, entry in entries.items():
         if key == "isolate":
-            values[key] = truth(entry, problems)
+            values[key] = TOGETHER if entry.value == TOGETHER else truth(entry, problems, f", or {TOGETHER!r},")
         else:
             values[key] = positive(entry, problems, "MiB" if key == "memory_limit" else "s")
     return values
@@ -302,10 +302,10 @@ def whole(entry: Entry, problems: list[Problem], fits: Callable[[int], bool], wh
     return default
 
 
-def truth(entry: Entry, problems: list[Problem]) -> bool:
-    """True or false."""
+def truth(entry: Entry, problems: list[Problem], more: str = ",") -> bool:
+    """True or false; what else is taken instead is said by the message."""
     if not isinstance(entry.value, bool):
-        problems.append(entry.problem(f"takes true or false, not {shown(entry.value)}"))
+        problems.append(entry.problem(f"takes true or false{more} not {shown(entry.value)}"))
     return entry.value is True
 
 

@@ -11,7 +11,7 @@ from ..errors import ScenarioError
 from ..fmi import Interface
 from ..names import SignalName
 from ..problems import Problem
-from ..system import Instance, Stepping
+from ..system import TOGETHER, Instance, Stepping
 from ..times import digits
 from .documents import OWN, Document, annotated, first, local
 from .network import Path
@@ -144,7 +144,9 @@ def set_options(instance: Instance, element: Element) -> None:
         ScenarioError: a number is none.
     """
     for own in annotated(element.node, OWN, "Instance"):
-        instance.isolate, instance.swapped = own.get("isolate") == "true", own.get("swapped") == "true"
+        isolate = own.get("isolate")
+        instance.isolate = TOGETHER if isolate == TOGETHER else isolate == "true"
+        instance.swapped = own.get("swapped") == "true"
         for key in ("step_timeout", "memory_limit"):
             if own.get(key) is not None:
                 setattr(instance, key, element.document.number(own, key))

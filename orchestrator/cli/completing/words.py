@@ -98,7 +98,7 @@ def requirements() -> list[str]:
 
 def instances(incomplete: str) -> list[str]:
     """Groups of instances of the scenario on the command line; one by one once a bracket is open."""
-    return ["all", "auto", *(name for _, name in _instances(incomplete))]
+    return ["all", "together", "auto", *(name for _, name in _instances(incomplete))]
 
 
 def swaps(incomplete: str) -> list[str]:

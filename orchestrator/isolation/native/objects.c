@@ -53,6 +53,13 @@ static PyObject *make_lane(PyTypeObject *type, PyObject *arguments, PyObject *na
     return (PyObject *)road;
 }
 
+static PyObject *done(PyObject *self, PyObject *nothing)
+{
+    LaneObject *road = (LaneObject *)self;
+    (void)nothing;
+    return PyLong_FromUnsignedLong(road->lane == NULL ? 0 : atomic_load(&road->lane->host.count));
+}
+
 static PyObject *close_lane(PyObject *self, PyObject *nothing)
 {
     LaneObject *road = (LaneObject *)self;
@@ -178,6 +185,7 @@ static PyObject *last_step(PyObject *self, PyObject *nothing)
 
 static PyMethodDef lane_methods[] = {
     {"wait", wait_for_all, METH_VARARGS, "wait(most) -> CAME, CAME_NOT or CLOSED, for all that is posted; at most so many s."},
+    {"done", done, METH_NOARGS, "done() -> how many entries the host has come to the end of; 0 once it is closed."},
     {"leave", leave, METH_NOARGS, "leave() -> whether the host could be told to leave the lane."},
     {"close", close_lane, METH_NOARGS, "close(): nothing comes this way any more."},
     {NULL, NULL, 0, NULL},

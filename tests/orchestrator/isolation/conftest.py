@@ -6,7 +6,7 @@ from pathlib import Path
 import pytest
 from railcosim.orchestrator.errors import FmuError
 from railcosim.orchestrator.fmi.models import load_fmu
-from railcosim.orchestrator.isolation.proxy import IsolatedSlave
+from railcosim.orchestrator.isolation.choice import house
 
 
 @pytest.fixture
@@ -16,7 +16,7 @@ def apart(hostile, workspace):
 
     def make(deed="", name="it", *, path=None, begun=False, **how):
         model = load_fmu(Path(path or hostile()), workspace)
-        made.append(IsolatedSlave(name, model.interface, model.folder, **how))
+        made.extend(house([(name, model.interface, model.folder)], **how))
         if deed:
             made[-1].channel("String", ["deed"]).set([deed])
         return _begin(made[-1]) if begun else made[-1]

@@ -103,7 +103,7 @@ def test_a_whole_scenario(kind):
 def test_the_compiled_loop_is_left_to_others(hostile, workspace):
     system = loop(hostile(), (1,))
     checked = check(system, workspace)
-    slaves = [instantiate(checked.models[name], system.instances[name]) for name in system.instances]
+    slaves = [slave for _, slave in instantiate(checked.models, system.instances)]
     try:
         assert [type(slave) for slave in slaves] == [FmuSlave, IsolatedSlave, FmuSlave]
     finally:

@@ -165,12 +165,12 @@ MASTER = """
 import sys, threading, time
 from pathlib import Path
 from railcosim.orchestrator.fmi.archive import Workspace
-from railcosim.orchestrator.isolation.proxy import IsolatedSlave
+from railcosim.orchestrator.isolation.choice import house
 from railcosim.orchestrator.fmi.models import load_fmu
 
 def work():
     model = load_fmu(Path(sys.argv[1]), Workspace())
-    it = IsolatedSlave("it", model.interface, model.folder)
+    [it] = house([("it", model.interface, model.folder)])
     it.channel("String", ["deed"]).set([sys.argv[2]])
     it.setup(0.0, 10.0)
     it.enter_initialization()

@@ -98,7 +98,7 @@ def test_whoever_waits_is_told_of_each_moment_of_silence_and_may_give_up(doors):
         patient.send(bytes(1 << 26))  # whom nobody reads
 
 
-@pytest.mark.parametrize("begun", [b"hello", b"\x07\x00\x00\x00\x00", struct.pack("<BI", 200, 1 << 31)])
+@pytest.mark.parametrize("begun", [b"hello", b"\x09\x00\x00\x00\x00", struct.pack("<BI", 200, 1 << 31)])
 def test_what_begins_no_frame_is_not_waited_for(doors, begun):
     one, other = doors
     one.send(begun)

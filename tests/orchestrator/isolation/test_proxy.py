@@ -6,8 +6,8 @@ import sys
 
 import pytest
 from railcosim.orchestrator.errors import FmuError
+from railcosim.orchestrator.isolation import choice as isolated
 from railcosim.orchestrator.isolation import launch
-from railcosim.orchestrator.isolation import proxy as isolated
 
 pytestmark = [
     pytest.mark.skipif(not sys.platform.startswith("linux"), reason="FMUs by hand are compiled for Linux here"),

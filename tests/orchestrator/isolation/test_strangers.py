@@ -36,7 +36,7 @@ def system_of(path, **start):
 def test_who_has_come_through_a_run_is_known_until_the_file_changes(hostile):
     path = Path(hostile())
     first = isolate(system_of(path), [AUTO])
-    assert first.instances["it"].isolate
+    assert first.instances["it"].isolate == "together"
     told = "in processes of their own, because this machine does not know their FMUs: it"
     assert told in execute(first).checked.notes
     again = isolate(system_of(path), [AUTO])
@@ -104,7 +104,10 @@ def test_in_a_study_and_after_a_validation_on_the_command_line(hostile, tmp_path
         '[metrics]\nend = "final(it.x)"\n'
     )
     system = load("own.toml")
-    assert _isolating(system, ["auto"]) == ["it.isolate=true"]
+    assert _isolating(system, ["auto"]) == ["it.isolate='together'"]
+    assert _isolating(system, ["it", "auto"]) == ["it.isolate='together'", "it.isolate=true"]
+    assert _isolating(system, ["together"]) == ["it.isolate='together'"]
+    assert _isolating(system, ["all"]) == ["it.isolate=true"]
     note = next((tmp_path / "cache").glob("known/*"), None)
     assert note is None
     assert call(["validate", path, "--quiet"]) == 1

@@ -90,7 +90,7 @@ def instantiated(workspace):
 
     def make(system):
         checked = check(system, workspace)
-        slaves = {name: instantiate(model, system.instances[name]) for name, model in checked.models.items()}
+        slaves = dict(instantiate(checked.models, system.instances))
         made.extend(slaves.values())
         master = Master(
             slaves, checked.order.sequence, checked.wiring.links, checked.wiring.starts, system.stepping.algorithm

@@ -9,7 +9,7 @@ from types import SimpleNamespace
 import fmpy
 import pytest
 from railcosim.orchestrator.errors import FmuError
-from railcosim.orchestrator.isolation import HAS_LANES, isolate, lanes, process, proxy
+from railcosim.orchestrator.isolation import HAS_LANES, choice, isolate, lanes, process
 from railcosim.orchestrator.isolation.lanes import lane
 from railcosim.orchestrator.master import compiled
 from railcosim.orchestrator.run.execution import run
@@ -115,8 +115,8 @@ def test_a_state_is_saved_between_two_blocks(hostile, instantiated):
 
 
 def test_without_room_for_its_values_it_is_called_by_messages(used, odd, ring, monkeypatch):
-    monkeypatch.setattr(proxy, "_CELLS_PER_VARIABLE", 0)
-    monkeypatch.setattr(proxy, "_SPARE_CELLS", 1)
+    monkeypatch.setattr(choice, "_CELLS_PER_VARIABLE", 0)
+    monkeypatch.setattr(choice, "_SPARE_CELLS", 1)
     assert run(isolate(ring(odd, 2, 1.0), ["all"])).status == "completed"
     assert not used
 
@@ -204,7 +204,9 @@ def test_what_does_not_fit_the_memory_is_refused():
     for operations in (b"1", bytes(56)):
         with pytest.raises(ValueError, match="do not fit its memory"):
             lane.serve(memory, 128, [(0, operations)], 0.0)
+    assert road.done() == 0
     road.close()
+    assert road.done() == 0
     assert road.wait(0.0) == lane.CLOSED
     assert not road.leave()
 

@@ -119,6 +119,7 @@ def full(cart):
     system = plain(cart)
     system.instances["cart[1]"].start["mode"] = "drive"
     system.instances["cart[1]"].step, system.instances["cart[2]"].isolate = 0.2, True
+    system.instances["cart_1"].isolate = "together"
     system.instances["cart[2]"].step_timeout, system.instances["cart[2]"].memory_limit = 5.0, 0.5
     swapped = system.instances["cart_1"]
     swapped.swapped, swapped.start["limit"], swapped.start["fast"] = True, 3.0, True

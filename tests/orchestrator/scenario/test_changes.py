@@ -227,7 +227,7 @@ def test_how_an_instance_steps_and_runs():
     gentle = loads(text, "two.toml", preset="gentle").instances["cruise[1]"]
     assert (gentle.step, gentle.isolate, gentle.start.keys()) == (1.0, True, {"alpha", "has_ahead", "sample_time"})
     assert problems(EXAMPLE, settings=["cruise.step=[1, 2]", "train[2].isolate=1"]) == [
-        "--set train[2].isolate=1: takes true or false, not 1",
+        "--set train[2].isolate=1: takes true or false, or 'together', not 1",
         "--set cruise.step=[1, 2]: takes a number greater than 0, in s, not [1, 2]",
     ]
 

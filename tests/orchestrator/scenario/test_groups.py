@@ -170,9 +170,9 @@ def test_options_of_a_group_are_meant_for_all_that_have_none_of_their_own():
         "instances.a[2].isolate": "x.toml:5",
         "instances.a[2].memory_limit": "x.toml:6",
     }
-    group.set_option("isolate", Entry(True, "--set"))
+    group.set_option("isolate", Entry("together", "--set"))
     group.set_option("step", Entry(3, "--set"), 1)
-    assert [(i.step, i.isolate) for i, _ in expand_group(group, [])] == [(3.0, True), (1.0, True)]
+    assert [(i.step, i.isolate) for i, _ in expand_group(group, [])] == [(3.0, "together"), (1.0, "together")]
 
 
 def test_a_group_without_a_count_keeps_lists_whole():

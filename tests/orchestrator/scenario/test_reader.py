@@ -107,7 +107,7 @@ MISTAKES = [
         for key, value, message in (
             ("step", "0", "takes a number greater than 0, in s, not 0"),
             ("step", "[0.5, 1.0]", "takes a number greater than 0, in s, not [0.5, 1.0]"),
-            ("isolate", '"yes"', "takes true or false, not 'yes'"),
+            ("isolate", '"yes"', "takes true or false, or 'together', not 'yes'"),
             ("step_timeout", "-1.0", "takes a number greater than 0, in s, not -1.0"),
             ("memory_limit", '"1 GB"', "takes a number greater than 0, in MiB, not '1 GB'"),
             ("swapped", "1", "takes true or false, not 1"),

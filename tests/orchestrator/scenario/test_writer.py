@@ -34,7 +34,7 @@ NUMERICS = {
 }
 OPTIONS = {
     "step": POSITIVE,
-    "isolate": st.booleans(),
+    "isolate": st.sampled_from([False, True, "together"]),
     "step_timeout": POSITIVE,
     "memory_limit": POSITIVE,
     "swapped": st.booleans(),

@@ -77,6 +77,14 @@ def test_an_fmu_of_this_house_in_a_process_of_its_own(mine):
     assert not [x for x in notes if "anew" in x]
 
 
+def test_of_those_that_share_a_process_one_is_made_anew(lag):
+    """It cannot be reset with a start value less; the others stay where they are."""
+    system = System(step=0.25, stop_time=1.0, metrics={"end": "final(a.y)"})
+    for name in "ab":
+        system.add(name, str(lag())).isolate = "together"
+    check(system, [{"a.k": 2.0, "b.k": 3.0}, {"b.k": 1.0}, {"a.k": 3.0, "b.k": 2.0}, {}], "a.y")
+
+
 def test_a_crash_in_a_process_of_its_own_is_a_row(lag):
     system = of(lag(on_step="if (M->k == 2.0 && t > 0.9) abort();"), "y")
     system.instances["it"].isolate = True

@@ -116,7 +116,7 @@ def test_scenarios_presets_components_and_what_else_has_a_name(offered, folder):
     assert offered("orchestrate study own.toml --design la") == ["latin-hypercube"]
     assert offered("orchestrate falsify own.toml --requirement ") == ["safe"]
     assert offered("orchestrate optimize own.toml --minimize ") == ["gap_min"]
-    assert offered("orchestrate run own.toml --isolate ")[:4] == ["all", "auto", "train", "cruise"]
+    assert offered("orchestrate run own.toml --isolate ")[:5] == ["all", "together", "auto", "train", "cruise"]
     assert offered("orchestrate run own.toml --quie") == ["--quiet"]
     assert offered("orchestrate run 'own.toml --preset ") == []
     assert offered("orchestrate run nothing.toml --preset ") == []

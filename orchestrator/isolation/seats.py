@@ -1,0 +1,50 @@
+"""Instances in a process of their own, as that process needs them on the master's side."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import NamedTuple, Protocol
+
+from ..errors import FmuError
+from ..fmi import Interface
+
+
+class HostLostError(Exception):
+    """The process of an instance is gone: its message says how.
+
+    Attributes: `seat` (the number of the instance that was called), `log` (the last lines that were written),
+    `is_stopped` (whether that is because the run was to stop).
+    """
+
+    def __init__(self, message: str, seat: int, log: list[str], *, is_stopped: bool = False) -> None:
+        super().__init__(message)
+        self.seat, self.log, self.is_stopped = seat, log, is_stopped
+
+
+class Guest(NamedTuple):
+    """An instance that is to live in a process.
+
+    Attributes: `name`, `interface`, `folder` (where its FMU was unpacked), `cells` (for how many values the shared
+    memory is to have room).
+    """
+
+    name: str
+    interface: Interface
+    folder: Path
+    cells: int
+
+
+class Seated(Protocol):
+    """What a process needs of an instance that lives in it."""
+
+    name: str
+    time: float
+
+    def name_call(self, call: str, channel: int) -> str:
+        """The function of the standard behind a name of `messages.CALLS`, called for a channel."""
+
+    def mourn(self, lost: HostLostError) -> FmuError:
+        """The error that tells that it was lost, with its process."""
+
+    def lose(self, error: FmuError) -> None:
+        """Let everything that is asked of it from now on be this error."""
