@@ -1,4 +1,4 @@
-"""What a process of its own costs an instance: N light FMUs in a ring, isolated and not, through the same loop.
+"""What isolation costs: N light FMUs in a ring, in N processes or together in one, and here, through the same loop.
 
     python benchmarks/isolation.py             # the compiled loop: a step is a hand-over through shared memory
     python benchmarks/isolation.py --python    # the loop in Python: a step is a message
@@ -27,16 +27,20 @@ from railcosim.orchestrator.isolation.proxy import IsolatedSlave
 from railcosim.orchestrator.master import compiled
 from railcosim.orchestrator.master.loop import Master
 from railcosim.orchestrator.run.checking import check
-from railcosim.orchestrator.system import System
+from railcosim.orchestrator.system import TOGETHER, System, Together
 from ring import HERE, light
 
 STEP, STOP = 1e-3, 1e6
+Isolated = bool | Together
+"""Whether instances are in processes of their own, or together in one."""
 
 
 class Candidate:
-    """A ring with all of its instances isolated, or none."""
+    """A ring with all of its instances isolated, or none; or all of them in one process."""
 
-    def __init__(self, path: Path, count: int, algorithm: str, workspace: Workspace, isolated: bool, **start: float):
+    def __init__(
+        self, path: Path, count: int, algorithm: str, workspace: Workspace, isolated: Isolated, **start: float
+    ):
         system = System(stop_time=STOP, step=STEP, algorithm=algorithm)
         for k in range(count):
             system.add(f"lag{k}", str(path), x=(k + 1) / count, **start)
@@ -44,7 +48,7 @@ class Candidate:
         begin = time.perf_counter()
         checked = check(system, workspace)
         instances = {name: replace(x, isolate=isolated) for name, x in system.instances.items()}
-        self.slaves = {name: instantiate(model, instances[name]) for name, model in checked.models.items()}
+        self.slaves = dict(instantiate(checked.models, instances))
         wiring = checked.wiring
         self.master = Master(self.slaves, checked.order.sequence, wiring.links, wiring.starts, algorithm)
         self.master.initialize(0.0, STOP)
@@ -59,7 +63,7 @@ class Candidate:
         return time.perf_counter() - wall, self._cpu() - cpu
 
     def _cpu(self) -> float:
-        processes = [slave.pid for slave in self.slaves.values() if isinstance(slave, IsolatedSlave)]
+        processes = {slave.pid for slave in self.slaves.values() if isinstance(slave, IsolatedSlave)}
         return time.process_time() + sum(map(cpu_of, processes))
 
     def close(self) -> None:
@@ -73,10 +77,12 @@ def cpu_of(process: int) -> float:
     return int(file.read_text().split()[0]) * 1e-9 if file.exists() else 0.0
 
 
-def compare(path: Path, count: int, algorithm: str, steps: int, repetitions: int, **start: float) -> str:
+def compare(
+    path: Path, count: int, algorithm: str, steps: int, repetitions: int, *, isolated: Isolated = True, **start: float
+) -> str:
     """One row of the table."""
     with Workspace() as workspace:
-        both = [Candidate(path, count, algorithm, workspace, isolated, **start) for isolated in (False, True)]
+        both = [Candidate(path, count, algorithm, workspace, how, **start) for how in (False, isolated)]
         costs: list[list[Sequence[float]]] = [[], []]
         try:
             for _ in range(repetitions):
@@ -86,7 +92,7 @@ def compare(path: Path, count: int, algorithm: str, steps: int, repetitions: int
         finally:
             for candidate in both:
                 candidate.close()
-    cells = [f"{count}", algorithm]
+    cells = [f"{count}", "1" if isolated == TOGETHER else f"{count}", algorithm]
     for which in (0, 1):
         here, apart = ([seconds[which] / steps / count * 1e6 for seconds in found] for found in costs)
         ratio = statistics.median(b / a for a, b in zip(here, apart, strict=True))
@@ -103,13 +109,16 @@ def main() -> None:
     if options.python:
         compiled.kernel = None
     own = build(f"{HERE / 'lag.py'}:Lag", {}, kind="native")
-    print("| N | algorithm | wall, here | isolated | ratio | CPU, here | isolated | ratio | set-up s |")
-    print("| --- | --- | --- | --- | --- | --- | --- | --- | --- |")
+    print("| N | processes | algorithm | wall, here | isolated | ratio | CPU, here | isolated | ratio | set-up s |")
+    print("| --- | --- | --- | --- | --- | --- | --- | --- | --- | --- |", flush=True)
     with tempfile.TemporaryDirectory() as folder:
         least = light(own, Path(folder))
-        for count in (1, 2, 8):
+        rows: tuple[tuple[int, Isolated], ...] = (1, True), (2, True), (2, TOGETHER), (8, True), (8, TOGETHER)
+        for count, isolated in rows:
             for algorithm in ("gauss-seidel", "jacobi"):
-                print(compare(least, count, algorithm, options.steps, options.repetitions), flush=True)
+                print(
+                    compare(least, count, algorithm, options.steps, options.repetitions, isolated=isolated), flush=True
+                )
     print("\nHeavy FMUs:\n")
     for count in (2, 8):
         steps = max(1, options.steps // 50)
