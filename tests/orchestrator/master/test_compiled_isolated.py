@@ -144,6 +144,18 @@ def test_whatever_it_does_is_told_as_without_isolation(apart, odd_fmu, ring, tmp
     assert len(apart(system, "odd[1]").time) == (41 if mode in (1, 40, 41, 44) else 20 if mode in (10, 23, 63) else 21)
 
 
+@ALGORITHMS
+@pytest.mark.parametrize("modes", [(41, 41), (40, 3), (41, 23), (10, 41)])
+def test_in_a_process_that_they_share_each_fails_for_itself(apart, odd_fmu, ring, tmp_path, *, modes, algorithm):
+    """Two in the same step: what one is asked because of that leaves it to be told that the other failed."""
+    system = ring(odd_fmu(tmp_path, "canHandleVariableCommunicationStepSize"), 3, algorithm=algorithm)
+    for name, mode in zip(("odd[0]", "odd[2]"), modes, strict=True):
+        system.instances[name].start["mode"] = mode
+    result = apart(system, "together")
+    assert (result.status == "completed") == (modes == (41, 41))
+    assert len(result.time) >= 20
+
+
 @pytest.mark.parametrize("scale", [1e9, -1e9])
 def test_a_number_that_no_whole_one_holds(apart, odd, mine, scale):
     system = System(stop_time=4.0, step=0.25)
