@@ -124,7 +124,8 @@ class Stepping:
         step: communication step in s.
         start_time: begin in s.
         record: distance of recorded points in s; None records every step.
-        record_only: patterns of the signals that are recorded, such as ``train*.speed``; empty for all.
+        record_only: patterns of the signals that are recorded, such as ``train*.speed``; empty for all. As a table
+            with the distance of values in s, a multiple of ``record``: the first that means a signal counts.
         algorithm: the master's, by name.
         order: instance names in the order they step; empty derives it from direct feed-through.
         extrapolation: order of the polynomial by which inputs are continued over a step (0: held), for FMUs that can
@@ -141,7 +142,7 @@ class Stepping:
     step: float = 0.1
     start_time: float = 0.0
     record: float | None = None
-    record_only: list[str] = field(default_factory=list)
+    record_only: list[str] | dict[str, float] = field(default_factory=list)
     algorithm: str = "gauss-seidel"
     order: list[str] = field(default_factory=list)
     extrapolation: int = 0

@@ -13,13 +13,14 @@ import numpy as np
 
 from .. import world
 from ..errors import ScenarioError
+from ..evaluation import without_blanks
 from ..figures import remove_drawn
 from ..names import matching
 from ..problems import suggestion
 from ..run import RESULT_ENDINGS, Results
 from .deviations import Deviation, RecordedComparison, Tested
 from .tube_figures import draw_tubes
-from .tubes import Tube, departure
+from .tubes import Array, Tube, departure
 
 TOLERANCE, NOMINAL = 0.002, 1e-3
 
@@ -97,6 +98,11 @@ def _range(reference: Results, name: str, nominal: float) -> float:
     return max(float(np.ptp(finite)) if len(finite) else 0.0, nominal)
 
 
+def _within(begin: float, end: float, time: Array, values: Array) -> tuple[Array, Array]:
+    within = (time >= begin) & (time <= end)
+    return time[within], values[within]
+
+
 def _tested(name: str, reference: Results, other: Results, limits: Mapping[str, Tube]) -> Tested:
     begin, end = float(reference.time[0]), float(reference.time[-1])
     width = next((tube.width for tube in limits.values()), 0.0)
@@ -114,10 +120,8 @@ def _tested(name: str, reference: Results, other: Results, limits: Mapping[str, 
             reference.units.get(signal, ""),
             limits[signal],
             departure(
-                reference.time,
-                reference[signal].astype(float),
-                other.time[within],
-                other[signal][within].astype(float),
+                *without_blanks(reference.time, reference[signal].astype(float)),
+                *_within(begin, end, *without_blanks(other.time, other[signal].astype(float))),
                 limits[signal],
             ),
         )

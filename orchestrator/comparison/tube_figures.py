@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from ..evaluation import without_blanks
 from ..figures import COLOURS, DASHES, bracketed, file_name, legend, page
 from .deviations import Deviation, RecordedComparison, Tested
 from .tubes import envelope
@@ -66,12 +67,12 @@ def _panels(whole: Axes, near: Axes, row: Deviation, one: Tested, comparison: Re
 def _draw(ax: Axes, row: Deviation, one: Tested, comparison: RecordedComparison, within: tuple[float, float]) -> None:
     reference, height = comparison.results, row.tube.height
     at = np.linspace(*within, _POINTS)
-    least, greatest = envelope(reference.time, reference[row.signal].astype(float), at, row.tube.width)
+    known = without_blanks(reference.time, reference[row.signal].astype(float))
+    least, greatest = envelope(*known, at, row.tube.width)
     ax.fill_between(at, least - height, greatest + height, color="#cfe3f1", linewidth=0, label="tube")
     for k, (name, results) in enumerate(((comparison.reference, reference), (one.name, one.results))):
-        first, last = np.add(np.searchsorted(results.time, within), (-1, 1))  # a line to the next point outside
+        time, values = without_blanks(results.time, results[row.signal])
+        first, last = np.add(np.searchsorted(time, within), (-1, 1))  # a line to the next point outside
         part = slice(max(0, first), last)
-        ax.plot(
-            results.time[part], results[row.signal][part], color=COLOURS[k], linestyle=DASHES[k], label=Path(name).name
-        )
+        ax.plot(time[part], values[part], color=COLOURS[k], linestyle=DASHES[k], label=Path(name).name)
     ax.set_xlim(*within)

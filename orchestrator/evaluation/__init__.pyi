@@ -26,7 +26,7 @@ from .published import (
 )
 from .requirements import Verdict, parse_requirement
 from .robustness import robustness
-from .signals import Part, Signals, parts_of
+from .signals import Part, Signals, filled, parts_of, valued, without_blanks
 from .syntax import Call, Name, Node, Number, Operation, Reference
 from .vocabulary import Names
 
@@ -62,6 +62,7 @@ __all__ = [
     "count_values",
     "evaluate",
     "evaluate_constant",
+    "filled",
     "judge_values",
     "parse",
     "parse_requirement",
@@ -70,4 +71,6 @@ __all__ = [
     "split_metric",
     "unit_of",
     "value_name",
+    "valued",
+    "without_blanks",
 ]

@@ -169,3 +169,33 @@ class _Ones(dict[str, NDArray[Any]]):
 
     def __missing__(self, name: str) -> NDArray[Any]:
         return np.ones(len(self["time"]))
+
+
+def valued(values: NDArray[Any]) -> NDArray[np.bool_] | None:
+    """At which points a signal has a value that is recorded less often than others; None where at every one.
+
+    Values are then at the first point, at every so many from there on, and at the last, and NaN at all between. Any
+    other NaN is what somebody has calculated.
+    """
+    there = ~np.isnan(values) if values.dtype.kind == "f" else np.ones(len(values), dtype=bool)
+    places = np.flatnonzero(there)
+    if len(places) in (len(values), 1) or not there[:1].any():
+        return None
+    due = np.arange(len(values)) % places[1] == 0
+    return there if (due[:-1] == there[:-1]).all() else None
+
+
+def without_blanks(time: NDArray[np.float64], values: NDArray[Any]) -> tuple[NDArray[np.float64], NDArray[Any]]:
+    """The points at which a signal has a value, and its values; the very same arrays where that is all of them."""
+    there = valued(values)
+    return (time, values) if there is None else (time[there], values[there])
+
+
+def filled(time: NDArray[np.float64], values: NDArray[Any], *, held: bool) -> NDArray[Any]:
+    """What is between the values of such a signal: the line that a figure draws, or the last value where it is held."""
+    there = valued(values)
+    if there is None:
+        return values
+    if held:
+        return np.asarray(values[np.maximum.accumulate(np.where(there, np.arange(len(values)), 0))])
+    return np.asarray(np.interp(time, time[there], values[there]))

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import ExpressionError
-from ..evaluation import FUNCTIONS, Expression, Reference, Signals, parse, unit_of
+from ..evaluation import FUNCTIONS, Expression, Reference, Signals, parse, unit_of, valued
 from ..problems import Problem
 from .outline import MOST_POINTS, outlined
 from .panels import texts_of
@@ -78,9 +78,16 @@ def _entry(x: Any, text: str, label: str, entry: int, signals: Signals) -> list[
             y = np.broadcast_to(y, (y.shape[0], across.shape[-1]))
             across = np.broadcast_to(across, y.shape)
         resolved = expression.resolve(names, index)
+        recorded = [name for each in resolved for name in each if name in signals.names()]
+        blank = bool(np.isnan(y).any()) and any(valued(signals[name]) is not None for name in recorded)
         unit = unit_of(expression, signals, index)
         drawn += [
-            (across[row], y[row], _label(expression, resolved, index, row, len(y)), unit, _own(resolved, row, len(y)))
+            (
+                *_filled(across[row], y[row], blank=blank),
+                _label(expression, resolved, index, row, len(y)),
+                unit,
+                _own(resolved, row, len(y)),
+            )
             for row in range(len(y))
         ]
     alone, family = len(drawn) == 1, re.sub(r"\W*\{i\}", "", label) or _short(text)
@@ -92,6 +99,12 @@ def _entry(x: Any, text: str, label: str, entry: int, signals: Signals) -> list[
         thing = named if alone else things[member]
         curves.append(Curve(abscissa, y, named, entry, member, alone, unit, family, thing, of, plain))
     return curves
+
+
+def _filled(x: Array, y: Array, *, blank: bool) -> tuple[Array, Array]:
+    """A line through the points that there are, where some are blank because a signal is recorded less often."""
+    there = ~np.isnan(y) | (not blank)
+    return x[there], y[there]
 
 
 def _own(resolved: list[list[str]], row: int, rows: int) -> frozenset[str]:

@@ -42,7 +42,7 @@ def _extremes(part: Part, value: NDArray[np.float64], points: int) -> tuple[Arra
     rows = np.broadcast_to(rows, (len(rows), part.points))[:, own]
     pieces = np.array_split(np.arange(len(time)), max(1, round(_PIECES * len(time) / points)))
     places = [
-        np.concatenate([np.sort([piece[row[piece].argmin()], piece[row[piece].argmax()]]) for piece in pieces])
-        for row in rows
+        np.concatenate([np.sort([piece[low[piece].argmin()], piece[high[piece].argmax()]]) for piece in pieces])
+        for low, high in zip(*(np.where(np.isnan(rows), beyond, rows) for beyond in (np.inf, -np.inf)), strict=True)
     ]
     return time[places], np.take_along_axis(rows, np.array(places), axis=1)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import hashlib
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import RailcosimError
-from ..evaluation import Judge
+from ..evaluation import Judge, filled
 from ..run import Results, read_metrics, read_record
 from .happenings import bands_of
 from .payload import Packed, is_even, pack
@@ -89,8 +89,10 @@ def read_content(directory: Path, columns: Columns) -> Content:
         ScenarioError: there is no run that can be read.
     """
     record, results = read_record(directory), Results.load(directory)
-    places = {name: columns.add(results[name]) for name in results}
-    return Content(directory, record, read_metrics(directory), results, places)
+    content = Content(directory, record, read_metrics(directory), results, {})
+    held = content.stepwise
+    places = {name: columns.add(filled(results.time, results[name], held=name in held)) for name in results}
+    return replace(content, places=places)
 
 
 def told_of(content: Content, name: str, columns: Columns) -> dict[str, Any]:

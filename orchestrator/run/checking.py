@@ -91,6 +91,7 @@ def check(system: System, workspace: Workspace, kind: Kind = "auto", *, trusted:
         system.stepping.record is None
         or abs(system.stepping.record - system.stepping.step) < 1e-9 * system.stepping.step
     )
+    every_step = every_step and not isinstance(system.stepping.record_only, dict)
     system, left_out = _without_the_missing(system, interfaces, names, steady, every_step)
     problems += check_events(system, interfaces, wiring)
     problems += check_coupling(system, interfaces, wiring)

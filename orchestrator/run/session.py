@@ -17,7 +17,6 @@ from ..fmi import Interface, Kind, Slave
 from ..fmi.guard import run_guarded
 from ..isolation import become_known
 from ..master import ALGORITHMS, Master, Rows
-from ..names import matching
 from ..times import slack
 from . import record as record_file
 from .assembly import assembled
@@ -28,7 +27,7 @@ from .directory import RunDirectory
 from .ending import Interruption
 from .outcome import Status
 from .pacing import Pacer, RealTime
-from .recording import Due, Recording, Results, Telling, check_stored
+from .recording import Due, Recording, Results, Telling, check_stored, kept_signals
 from .watching import Finding, Watching
 
 Progress = Callable[[float, float], None]
@@ -221,7 +220,7 @@ class Session:
             identity=identity,
             before=self._before,
             expected=0 if ALGORITHMS[system.stepping.algorithm].varies_step else self._count + 1,
-            only=self._only(master.signals),
+            **kept_signals(master.signals, system.stepping) if crew is None else {"only": crew.only},
         )
         if begin is None or directory is None:
             first = [[system.stepping.start_time, *master.values]]
@@ -289,12 +288,6 @@ class Session:
         finally:
             self.seconds.update(stepping=world.perf_counter() - begin, steps=master.steps - before)
 
-    def _only(self, signals: Sequence[str]) -> Collection[str] | None:
-        """The signals that are kept; None for all."""
-        if self._crew is not None:
-            return self._crew.only
-        return {*matching(signals, self.system.stepping.record_only)} if self.system.stepping.record_only else None
-
     def _observer(self, master: Master, due: Due, count: int) -> Callable[[int, Rows], bool]:
         assert self._recording is not None
         system, interruption, progress = self.system, self.interruption, self.job.progress
@@ -313,7 +306,7 @@ class Session:
             kept = due.of(steps, rows)
             if watching is not None:
                 watching.see(points)
-            recording.see(points, kept)
+            recording.see(points, kept, whole=time >= system.stepping.stop_time)
             reached = int((time - system.stepping.start_time) / percent + 1e-9)
             if progress is not None and (reached > told or world.monotonic() - shown > 0.1 or time >= last):
                 shown, told = world.monotonic(), reached
@@ -321,7 +314,7 @@ class Session:
             if not interruption.is_asked_for:
                 return True
             if time < last and not (len(kept) and kept[-1][0] == time):
-                recording.see((), [[time, *master.values]])  # the point at which the run was stopped
+                recording.see((), [[time, *master.values]], whole=True)  # the point at which the run was stopped
             return False
 
         return observe

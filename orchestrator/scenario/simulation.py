@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from typing import Any
 
 from ..errors import ScenarioError
@@ -61,6 +61,8 @@ def read_simulation(entries: Mapping[str, Entry], origin: str, problems: list[Pr
             values[key] = choice(entries[key], problems, valid, what)
     if "record_only" in entries:
         values["record_only"] = _patterns(entries["record_only"], problems)
+        if isinstance(values["record_only"], dict):
+            values.setdefault("record", min(values["record_only"].values()))
     if "seed" in entries:
         values["seed"] = read_seed(entries["seed"], problems)
     if len(problems) == before:
@@ -68,12 +70,16 @@ def read_simulation(entries: Mapping[str, Entry], origin: str, problems: list[Pr
     return values | _numerics(entries, problems)
 
 
-def _patterns(entry: Entry, problems: list[Problem]) -> list[str]:
-    """Which signals are recorded."""
+def _patterns(entry: Entry, problems: list[Problem]) -> list[str] | dict[str, float]:
+    """Which signals are recorded, and how often where that is said for each."""
     value = entry.value
+    if value and isinstance(value, dict):
+        apart = [Entry(one, entry.origin, f"{entry.place}.{pattern}") for pattern, one in value.items()]
+        return dict(zip(value, [positive(one, problems) for one in apart], strict=True))
     if isinstance(value, list) and value and all(isinstance(each, str) and each for each in value):
         return list(value)
-    problems.append(entry.problem("is not a list of names", 'write record_only = ["train*.speed", "cruise[1].force"]'))
+    remedy = 'write record_only = ["train*.speed", "cruise[1].force"], or { "train*.speed" = 0.1, "cruise*" = 1.0 }'
+    problems.append(entry.problem("is not a list of names, nor a table of names and times in s", remedy))
     return []
 
 
@@ -146,13 +152,13 @@ def _grid(entries: Mapping[str, Entry], values: Mapping[str, Any]) -> list[Probl
             )
         ]
     record = values.get("record")
+    problems = list(_apart(entries, values))
     if (
         "algorithm" in values and ALGORITHMS[values["algorithm"]].varies_step
     ):  # a step ends wherever a row or the end is due
         if record is not None and record <= 0:
             return [entries["record"].problem(f"the distance of rows must be greater than 0 s, not {digits(record)} s")]
-        return []
-    problems = []
+        return problems
     if is_lost(step, start, stop):
         message = f"points that are {digits(step)} s apart cannot be told apart at such times"
         problems.append(entries["stop_time"].problem(message, "begin nearer to 0 s (simulation.start_time)"))
@@ -164,8 +170,22 @@ def _grid(entries: Mapping[str, Entry], values: Mapping[str, Any]) -> list[Probl
     if record is not None and not whole_multiple(record, step):
         fitting = max(1, round(record / step)) * step if 0 < record / step < 1e15 else step
         message = f"{digits(record)} s is not a whole number of {steps_of}"
-        problems.append(entries["record"].problem(message, f"take {digits(fitting)} s (simulation.record)"))
+        said, key = (entries["record"], "record") if "record" in entries else (entries["record_only"], "record_only")
+        problems.append(said.problem(message, f"take {digits(fitting)} s (simulation.{key})"))
     return problems
+
+
+def _apart(entries: Mapping[str, Entry], values: Mapping[str, Any]) -> Iterator[Problem]:
+    """What is wrong with how often signals are recorded."""
+    patterns = values.get("record_only")
+    if not isinstance(patterns, dict) or values["record"] <= 0.0:
+        return
+    for pattern, apart in patterns.items():
+        if not whole_multiple(apart, values["record"]):
+            rows, fitting = digits(values["record"]), digits(max(1, round(apart / values["record"])) * values["record"])
+            message = f"{digits(apart)} s of {pattern!r} is no whole number of rows, which are {rows} s apart"
+            remedy = f"take {fitting} s, or a simulation.record that divides all"
+            yield entries["record_only"].problem(message, remedy)
 
 
 def spread_tolerances(entries: Mapping[str, Entry], counts: Counts, problems: list[Problem]) -> dict[str, str]:

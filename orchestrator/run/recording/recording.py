@@ -15,6 +15,7 @@ from .columns import Columns
 from .recorder import ROWS_FILE, SEEN_FILE, Recorder, checksum_of
 from .results import Results
 from .seen import Seen
+from .spacing import Spacing
 from .stored import open_stored
 
 _FILES = (ROWS_FILE, SEEN_FILE)
@@ -32,6 +33,7 @@ class Recording:
         identity: of the run.
         before: how many rows the run's files have, if it goes on, in the order of the files.
         expected: how many points there will be, as far as that is known.
+        apart: by signal, in each of how many results it has a value; those that are not named, in every one.
     """
 
     def __init__(
@@ -45,6 +47,7 @@ class Recording:
         before: Sequence[int] = (0, 0),
         expected: int = 0,
         only: Collection[str] | None = None,
+        apart: Mapping[str, int] | None = None,
     ) -> None:
         paths = (None, None) if directory is None else tuple(directory / name for name in _FILES)
         self._picks: list[list[int] | None] = []
@@ -65,6 +68,8 @@ class Recording:
             self._recorders.append(recorder)
             self._picks.append(None if chosen is None else [0, *(n + 1 for n in picked)])
         self._is_lent, self._names = False, names
+        kept = [n for n, name in enumerate(names) if only is None or name in only]
+        self._spacing = Spacing([names[n] for n in kept], [kinds[n] for n in kept], apart) if apart else None
 
     def lend(self) -> Table | None:
         """Where every point can be written at once, if one place does: then arrays that are seen are of there."""
@@ -73,8 +78,8 @@ class Recording:
         self._is_lent = table is not None
         return table
 
-    def see(self, points: Rows, results: Rows) -> None:
-        """Take in points, and those of them that are results."""
+    def see(self, points: Rows, results: Rows, *, whole: bool = False) -> None:
+        """Take in points, and those of them that are results; of the last of these all values, where it is `whole`."""
         for recorder, places, rows in zip(self._recorders, self._picks, (results, points), strict=False):
             if self._is_lent and isinstance(rows, np.ndarray):
                 if recorder is self._recorders[-1]:
@@ -83,10 +88,15 @@ class Recording:
                     recorder.extend(rows)
             elif places is None:
                 recorder.extend(rows)
-            elif isinstance(rows, np.ndarray):
-                recorder.extend(rows.take(places, axis=1))
             else:
-                recorder.extend([[row[k] for k in places] for row in rows])
+                taken: Any
+                if isinstance(rows, np.ndarray):
+                    taken = rows.take(places, axis=1)
+                else:
+                    taken = [[row[k] for k in places] for row in rows]
+                if self._spacing is not None and recorder is self._recorders[0]:
+                    taken = self._spacing.blank(recorder.count, taken, whole=whole)
+                recorder.extend(taken)
 
     def go_on(self, directory: Path, record: Mapping[str, Any], marks: Sequence[Sequence[int]]) -> None:
         """Begin with the rows up to a checkpoint.
