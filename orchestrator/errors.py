@@ -125,7 +125,7 @@ class RollbackError(FmuError):
 
 
 class LostError(FmuError):
-    """The process of an isolated FMU is gone: it crashed, hung or used too much memory."""
+    """An FMU must not be called any more: its process is gone (a crash, a hang, too much memory), or it left a call."""
 
 
 class StoppedError(FmuError):

@@ -16,7 +16,7 @@ from contextlib import contextmanager, nullcontext
 from pathlib import Path
 from typing import Any, ClassVar
 
-from ...errors import FmuError
+from ...errors import FmuError, LostError
 from ..guard import dismiss, introduce, noted
 from ..interface import Interface, Type
 from ..slave import STATUS, Channel
@@ -198,7 +198,7 @@ class LoadedSlave(Stepping):
     def lose(self, what: str) -> FmuError:
         """It has left a call instead of returning from it, and must not be called any more: the error of that."""
         self._dead = True
-        return FmuError(what, instance=self.name, time=self.time, log=self.log)
+        return LostError(what, instance=self.name, time=self.time, log=self.log)
 
     def refuse(self, what: str) -> FmuError:
         """An error about something that this FMU does not do."""
