@@ -33,7 +33,17 @@ GRANTED = ROOT / "tests" / "uncovered.txt"
 KERNEL = [
     ROOT / "orchestrator" / "master" / "native" / name
     for name in (
-        *("acceleration.c", "courses.c", "fmi3.c", "growth.c", "kernel.c", "loops.c", "plan.c", "resolving.c"),
+        *(
+            "acceleration.c",
+            "adaptive.c",
+            "courses.c",
+            "fmi3.c",
+            "growth.c",
+            "kernel.c",
+            "loops.c",
+            "plan.c",
+            "resolving.c",
+        ),
         *("stepping.c", "team.c"),
     )
 ]
@@ -41,6 +51,7 @@ RUNTIME = sorted((ROOT / "fmus" / "runtime").rglob("*.c"))
 LOOP_TESTS = [
     *(f"tests/orchestrator/master/test_compiled{name}.py" for name in ("", "_blocks", "_coupling", "_fmi3")),
     *("tests/orchestrator/master/test_kernel.py", "tests/orchestrator/master/test_threads.py"),
+    "tests/orchestrator/master/test_varying.py",
     *("tests/orchestrator/master/test_event_loops.py", "tests/orchestrator/fmi/test_foreign.py"),
 ]
 RUNTIME_TESTS = ["tests/fmus/runtime"]

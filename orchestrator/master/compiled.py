@@ -17,10 +17,10 @@ from ..errors import FmuError, RunError
 from ..fmi.binding import FmuSlave
 from ..fmi.guard import GUARD, NOTE_SIZE, NOTES, own_note, said
 from ..isolation import Ride
-from .algorithms import Programmed
+from .algorithms import Programmed, Repeated
 from .coupling import Coupling
 from .observer import Observer, Table
-from .plans import CHANGES, PLACE, SIZES, SWING, Kind, Plan
+from .plans import CHANGES, CONTROL, PLACE, SIZES, SWING, Kind, Plan, is_able
 
 try:
     from . import kernel
@@ -35,8 +35,12 @@ _BLOCK_SECONDS = 0.05
 """Wall time a block is meant to take: short enough for Ctrl-C and a progress bar, long enough to cost nothing."""
 _GROWTH = 256
 """How many times longer than the last a block may be: the first is a single step, of which nothing is known."""
-_MOST_VALUES = 4_000_000
+MOST_VALUES = 4_000_000
 """Numbers a block may record, so that its buffer stays small."""
+
+
+_FIXED = np.zeros(0, CONTROL)
+"""Steps do not vary."""
 
 
 def _check_layout(found: int) -> None:
@@ -54,19 +58,31 @@ if HAS_KERNEL:
         kernel.watch(GUARD)
 
 
+def changes_of(plan: Plan) -> NDArray[np.void]:
+    """What events make of values now."""
+    rows = [
+        (slot.active, place, is_real, slot.scale, slot.offset, slot.slope, slot.since)
+        for slot, place, is_real in plan.changes
+    ]
+    return np.array(rows, dtype=CHANGES)
+
+
 class CompiledLoop:
     """An algorithm's plan for the kernel."""
 
     @classmethod
     def of(cls, coupling: Coupling, algorithm: Programmed) -> CompiledLoop | None:
         """One that takes these steps, where the kernel is there and can do all that is asked for."""
-        able = kernel is not None and Plan.is_able(coupling, algorithm)
+        repeated = [name for part in algorithm.program() if isinstance(part, Repeated) for name in part.batch.names]
+        able = kernel is not None and is_able(coupling, repeated)
         return cls(coupling, algorithm) if able else None
 
     def __init__(self, coupling: Coupling, algorithm: Programmed) -> None:
         self._coupling, self._algorithm = coupling, algorithm
         self._exchange = coupling.exchange
-        self.plan = Plan(coupling, algorithm, can_share=bool(kernel.HAS_THREADS))
+        is_shared = kernel.HAS_THREADS and algorithm.takes_threads and coupling.refresher is None
+        threads = max(1, min(coupling.settings.threads, len(coupling.slaves))) if is_shared else 1
+        self.plan = Plan(coupling, [algorithm.program()], threads=threads)
         self._under_way: tuple[Table, Observer, float, float] | None = None
         self._note = 0
 
@@ -102,16 +118,10 @@ class CompiledLoop:
         disturbed = np.zeros(len(self.plan.operations), np.int64)
         values = self.plan.wide.packed(exchange.values)
         history, newest = self._unrolled(len(values))
-        changes = np.array(
-            [
-                (slot.active, place, is_real, slot.scale, slot.offset, slot.slope, slot.since)
-                for slot, place, is_real in self.plan.changes
-            ],
-            dtype=CHANGES,
-        )
+        changes = changes_of(self.plan)
         self.plan.courses.load()
         goes_on, block = True, 1
-        most = max(1, _MOST_VALUES // (len(values if table is None else table.kept) + 1)) * every
+        most = max(1, MOST_VALUES // (len(values if table is None else table.kept) + 1)) * every
         while done < stop and goes_on:
             block = min(block, stop - done, most)
             due = _rows_due(done, block, every, count)
@@ -124,7 +134,19 @@ class CompiledLoop:
                 ride.begin()
             begin = world.perf_counter()
             taken, written, newest = kernel.run(
-                *(*self.plan.arrays, changes, into.kept, values, history, newest, cells, into.count, places, disturbed),
+                *(
+                    *self.plan.arrays,
+                    changes,
+                    into.kept,
+                    values,
+                    history,
+                    newest,
+                    cells,
+                    into.count,
+                    places,
+                    disturbed,
+                    _FIXED,
+                ),
                 *(every, start_time, step, done, block, count),
             )
             seconds = world.perf_counter() - begin
@@ -142,7 +164,7 @@ class CompiledLoop:
                 goes_on = observe(done, into.filled(written))
             if goes_on:
                 self._go_on(places, start_time + done * step, step)
-            block = max(1, int(taken * min(_BLOCK_SECONDS / max(seconds, 1e-9), _GROWTH)))
+            block = longer(taken, seconds)
         for array in self.plan.channels:
             array.forget()
         return goes_on
@@ -248,6 +270,22 @@ def _rows_due(done: int, block: int, every: int, count: int) -> int:
     """How many of the next steps are recorded: every so many, and the last."""
     end = done + block
     return end // every - done // every + int(end == count and count % every != 0)
+
+
+def is_there() -> bool:
+    """Whether there is a kernel."""
+    return kernel is not None
+
+
+def run_kernel(*arguments: Any) -> tuple[int, int, int]:
+    """What kernel.pyi says of ``run``."""
+    found: tuple[int, int, int] = kernel.run(*arguments)
+    return found
+
+
+def longer(taken: int, seconds: float) -> int:
+    """How many steps the next block may have, after one of so many that took a wall time in s."""
+    return max(1, int(taken * min(_BLOCK_SECONDS / max(seconds, 1e-9), _GROWTH)))
 
 
 def note_swings(swings: NDArray[np.void], number: int, values: NDArray[np.float64]) -> None:

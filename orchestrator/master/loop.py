@@ -25,6 +25,7 @@ from .exchange import types_of
 from .initialization import settle
 from .observer import Observer, Rows, Table
 from .settings import DEFAULT, Settings
+from .varying import Span, VaryingLoop
 
 
 class Master:
@@ -68,6 +69,7 @@ class Master:
         self._stop_time = 0.0
         self._schedule: Schedule | None = None
         self._compiled: CompiledLoop | None = None
+        self._varying: VaryingLoop | None = None
         self._watch = Watch(slaves.values())
 
     def begin_again(
@@ -307,8 +309,9 @@ class Master:
 
     def rescue(self) -> None:
         """Tell the observer what is known of steps that do not return any more; called in another thread."""
-        if self._compiled is not None:
-            self._compiled.rescue()
+        loop = self._compiled or self._varying
+        if loop is not None:
+            loop.rescue()
 
     def terminate(self) -> None:
         """End the run properly: every model may write what it keeps, also where another fails to.
@@ -328,25 +331,13 @@ class Master:
     def _run_variably(
         self, start_time: float, step: float, points: tuple[int, int], every: float, observe: Observer
     ) -> bool:
-        algorithm = self.algorithm
-        assert isinstance(algorithm, VariableStep)
-        coupling, last = self.coupling, self._stop_time
-        late = slack(step, start_time, last)
+        assert isinstance(self.algorithm, VariableStep)
+        last, schedule = self._stop_time, self._schedule
         end = last if points[0] == points[1] else min(last, start_time + points[0] * step)
-        while coupling.time < end:
-            row = last
-            if every:  # the next point at which a row is due
-                done = math.floor((coupling.time - start_time) / (every * step) + late / (every * step))
-                row = start_time + (done + 1) * every * step
-                row = row if row < last - late else last
-            due = math.inf if self._schedule is None else self._schedule.next_time()
-            coupling.time = algorithm.advance(coupling.time, due if due < row - late else row, step)
-            coupling.steps += 1
-            is_due = not every or coupling.time == row
-            self._let_happen(late, partial(self._tell, observe, is_due))
-            if not self._tell(observe, is_due):
-                return False
-        return True
+        if self._varying is None:
+            next_time = (lambda: math.inf) if schedule is None else schedule.next_time
+            self._varying = VaryingLoop(self.coupling, self.algorithm, self._let_happen, next_time)
+        return self._varying.run(Span(start_time, step, last, every), end, observe)
 
     # ---------------------------------------------------------------- the record, and checkpoints
 

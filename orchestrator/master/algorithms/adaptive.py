@@ -28,7 +28,7 @@ from ...system import System
 from ...times import digits
 from ...wiring import Wiring
 from ..coupling import Coupling
-from .algorithm import Fit, VariableStep
+from .algorithm import Batch, Fit, Operation, VariableStep
 from .refusals import cannot, listed
 from .repetition import Repetition
 
@@ -205,15 +205,15 @@ class Adaptive(VariableStep):
             if again.places:
                 self._go_to(kept[0], values=False)
                 again.repeat(time, length)
-                found = max(found, self._error(again.places, values, again.reached, _SAME_INPUTS[self.order]))
+                found = _worse(found, self._error(again.places, values, again.reached, _SAME_INPUTS[self.order]))
                 self._go_to(kept[0], values=False)
                 values[:] = halves
                 again.repeat(time, length, ended=True)
-                found = max(found, self._error(again.places, values, again.reached, _AT_END[self.order]))
+                found = _worse(found, self._error(again.places, values, again.reached, _AT_END[self.order]))
                 values[:] = halves
             self._go_to(kept[0], values=False)
             self._sweep(time, length, ended=True)
-            found = max(found, self._error(self.plain, values, halves, _AT_END[self.order]))
+            found = _worse(found, self._error(self.plain, values, halves, _AT_END[self.order]))
             if not again.is_proven:
                 self._go_to(kept[0], values=False)
                 again.prove(time, length)
@@ -287,6 +287,56 @@ class Adaptive(VariableStep):
             f"simulation.min_step{lists}"
         )
 
+    # ---------------------------------------------------------------- for the compiled loop
+
+    @property
+    def is_decided(self) -> bool:
+        """Whether nothing is left to be found out, so that all steps are alike."""
+        return self.repetition.is_proven
+
+    @property
+    def watched(self) -> list[int]:
+        """Places of the values whose error counts, those that the repetition is for behind the others."""
+        return [*self.plain, *self.repetition.places]
+
+    def sections(self) -> Sequence[Sequence[Batch]]:
+        """What is done at once, in the order of ``native/adaptive.h``; the second is what the coupling settles."""
+        of, names, again = Operation, [slave.name for slave in self.coupling.sequence], self.repetition.names
+        states = (of.SAVE, of.RESTORE, of.FORGET, of.SAVE_END, of.RESTORE_END, of.FORGET_END)
+        return [
+            [Batch((of.SET, *[of.NOTE] * (name in again), of.STEP, of.GET), (name,)) for name in names],
+            [],
+            [Batch((of.SET_OF_END, of.STEP, of.GET), (name,)) for name in names],
+            [Batch((of.SHOW, of.STEP), (name,)) for name in again],
+            [Batch((of.GET,), again)],
+            [Batch((of.SET_OF_END,), again)],
+            [Batch((of.STEP,), again)],
+            *([Batch((state,), tuple(self.exchange.slaves))] for state in states),
+        ]
+
+    def give(self, control: Any, longest: float) -> None:
+        """Say how steps are chosen, and how they went: in the fields of ``native/adaptive.h``.
+
+        Args:
+            control: a record of them.
+            longest: how long a step may be, in s.
+        """
+        tally, order = self.tally, self.order
+        control["shortest"] = longest * _SHORTEST if self.shortest is None else self.shortest
+        control["exponent"], control["of_halves"] = -1.0 / (order + 1), 2.0**order - 1.0
+        control["of_same"], control["of_end"] = _SAME_INPUTS[order], _AT_END[order]
+        control["plain_count"], control["shown_count"] = len(self.plain), len(self.repetition.places)
+        control["length"], control["least"], control["most"] = self.length, tally.shortest, tally.longest
+        control["accepted"], control["rejected"], control["in_a_row"] = tally.accepted, tally.rejected, self._in_a_row
+
+    def take(self, control: Any) -> None:
+        """Go on with how steps went."""
+        tally = self.tally
+        self.length, tally.shortest, tally.longest = (float(control[name]) for name in ("length", "least", "most"))
+        tally.accepted, tally.rejected, self._in_a_row = (int(control[x]) for x in ("accepted", "rejected", "in_a_row"))
+        if control["jump"] >= 0:
+            tally.jumps.append((float(control["time"]), self.exchange.signals[int(control["jump"])]))
+
     def report(self) -> dict[str, Any]:
         """Steps taken and their lengths."""
         tally = self.tally
@@ -315,6 +365,11 @@ def _unwatched(system: System, interfaces: Mapping[str, Interface]) -> Iterable[
             continue
         if not any(is_watched(interface.variables[scalar]) for scalar in scalars):
             yield f"the tolerance of {signal} has no effect: adaptive watches continuous outputs"
+
+
+def _worse(one: tuple[float, int], other: tuple[float, int]) -> tuple[float, int]:
+    """The larger of two errors; the first where they are the same."""
+    return other if other[0] > one[0] else one
 
 
 def _is_fatal(failure: RunError) -> bool:

@@ -164,13 +164,26 @@ class VariableStep(Algorithm):
 
 
 class Operation(IntEnum):
-    """What is done to an instance; of outputs all are read, or those that depend directly on inputs, or the rest."""
+    """What is done to an instance; of outputs all are read, or those that depend directly on inputs, or the rest.
+
+    Of steps that may be taken back: inputs are set to the present values as those of the step's end; those that have
+    just been set are noted, and shown again. A state is saved, come back to and given back, and so is another one.
+    """
 
     SET = 0
     STEP = 1
     GET = 2
     GET_DIRECT = 3
     GET_REST = 4
+    SET_OF_END = 5
+    NOTE = 6
+    SHOW = 7
+    SAVE = 8
+    RESTORE = 9
+    FORGET = 10
+    SAVE_END = 11
+    RESTORE_END = 12
+    FORGET_END = 13
 
 
 @dataclass(frozen=True)

@@ -32,7 +32,7 @@ class Repetition:
         watched: (instance, variable) of the outputs whose error counts.
 
     Attributes:
-        places: of the watched values that may show inputs.
+        places: of the watched values that may show inputs. names: of the instances that they are of.
         is_proven: whether some watched value is known to show more than that, or what it passes on is brought up to
             date at each point anyway.
         reached: all values at the end of the step whose inputs were noted last, before anything is brought up to date.
@@ -54,6 +54,7 @@ class Repetition:
         self.is_proven = bool(plain) or not self.places or stepping.refresh
         self.is_proven |= stepping.algebraic_loops == "solve"
         self.reached: list[Any] = []
+        self.names = tuple(self._slaves)
         self._shown: dict[str, list[tuple[Feed, list[Any], list[Points] | None]]] = {}
         self._has_moved = False
 

@@ -88,8 +88,10 @@ const Call *extend(const Hand *hand, const Group *group, const Advance *it, int 
         for (int64_t n = course->begin; n < course->begin + course->count; n++) {
             Points *points = &plan->points[n];
             const Entry *entry = &call->entries[points->place];
-            double when = course->is_of_end ? it->time + length : plan->stamps[entry->place];
-            keep(points, when, hand->reals[points->place], length, course->depth);
+            if (course->at != AS_NOTED) {
+                double when = course->at == AT_END ? it->time + length : plan->stamps[entry->place];
+                keep(points, when, hand->reals[points->place], length, course->depth);
+            }
             if (course->order > 0) {
                 hand->reals[points->place] = polynomial(points, it->time, course->order);
             }
@@ -101,6 +103,25 @@ const Call *extend(const Hand *hand, const Group *group, const Advance *it, int 
         }
     }
     return group->end;
+}
+
+void note_inputs(const Plan *plan, const Group *group, double time)
+{
+    for (const Call *call = group->begin; call < group->end; call++) {
+        const Noting *noting = call->noting;
+        const Entry *to = plan->entries + plan->channels[noting->to].begin;
+        for (size_t k = 0; k < group->count; k++) {
+            const Entry *entry = &call->entries[k];
+            plan->values[to[k].place] = is_plain(entry) ? *value_of(plan, entry) : read_entry(plan, entry, time);
+        }
+        if (noting->course >= 0) {
+            const Course *course = &plan->courses[noting->course], *shown = &plan->courses[noting->shown];
+            for (int64_t n = 0; n < course->count; n++) {
+                Points *points = &plan->points[shown->begin + n];
+                *points = plan->points[course->begin + n];
+            }
+        }
+    }
 }
 
 const Call *set_slopes(const Hand *hand, const Group *group, int *status)

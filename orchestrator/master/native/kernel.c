@@ -6,8 +6,8 @@
    and takes over between blocks for progress, flushing and interruption.
 
    This file is what Python sees of it; plan.c makes a plan of Python's arrays, stepping.c takes the steps, team.c with
-   several threads; loops.c repeats them, with acceleration.c, and courses.c continues inputs. growth.c looks at what came of
-   them. */
+   several threads, adaptive.c chooses how long they are; loops.c repeats them, with acceleration.c, and courses.c continues
+   inputs. growth.c looks at what came of them. */
 
 #include "growth.h"
 #include "plan.h"
@@ -42,8 +42,9 @@ static void free_hands(Hand *hands)
     free(hands);
 }
 
-/* A block without the interpreter; 0 with an exception if its threads cannot be had. */
-static int take(Plan *plan, const Block *block, Outcome *outcome)
+/* A block without the interpreter, of steps that vary if there is a control; 0 with an exception if its threads cannot be
+   had. */
+static int take(Plan *plan, const Block *block, Control *control, Outcome *outcome)
 {
     plan->note = guard.note(0);
     plan->note->rows = 0;
@@ -55,6 +56,9 @@ static int take(Plan *plan, const Block *block, Outcome *outcome)
     plan->control = float_control();
     fegetenv(&plan->floats);
     Py_BEGIN_ALLOW_THREADS
+    if (control != NULL) {
+        *outcome = take_adaptive(plan, hands, block, control);
+    } else
 #if HAS_THREADS
     if (plan->thread_count > 1) {
         is_fine = take_block_together(plan, hands, block, outcome);
@@ -70,15 +74,16 @@ static int take(Plan *plan, const Block *block, Outcome *outcome)
 }
 
 PyDoc_STRVAR(run_doc,
-    "run(operations, parts, channels, instances, entries, references, forms, courses, loops, passed, points, states, work,\n"
-    "    stamps, changes, kept, values, history, newest, table, row, places, disturbed, every, start, step, first, count,\n"
-    "    last) -> (done, written, newest)\n\n"
+    "run(operations, parts, channels, instances, entries, references, forms, courses, notes, loops, passed, points, states,\n"
+    "    work, stamps, changes, kept, values, history, newest, table, row, places, disturbed, control, every, start, step,\n"
+    "    first, count, last) -> (done, written, newest)\n\n"
     "Take up to `count` communication steps from number `first`. Of every `every`-th step and of step number `last` the\n"
     "time and the values that are `kept`, by place, become the next elements of the columns of `table`, one after the\n"
     "other, from element `row` on; the block ends before one for which there is no room, and where an operation\n"
     "fails. `places` say for each thread with which operation its part of the first step begins, and whether it waits\n"
     "because one has failed; then how far the step that was left has got. In `disturbed` an operation after which\n"
-    "numbers were rounded in another way, which was put back, has the number of the first step that ended so.");
+    "numbers were rounded in another way, which was put back, has the number of the first step that ended so. With a\n"
+    "`control` steps vary: that says how long they may be, and each leads to a row.");
 
 static PyObject *run(PyObject *module, PyObject *arguments)
 {
@@ -87,10 +92,10 @@ static PyObject *run(PyObject *module, PyObject *arguments)
     Py_ssize_t newest, row;
     PyObject *result = NULL;
     (void)module;
-    if (!PyArg_ParseTuple(arguments, "y*y*y*y*y*y*y*y*y*y*w*w*w*w*y*y*w*w*nw*nw*w*LddLLL:run", &b[OPERATIONS], &b[PARTS], &b[CHANNELS],
-                          &b[INSTANCES], &b[ENTRIES], &b[REFERENCES], &b[FORMS], &b[COURSES], &b[LOOPS], &b[PASSED], &b[POINTS], &b[STATES],
-                          &b[WORK], &b[STAMPS], &b[CHANGES], &b[KEPT], &b[VALUES], &b[HISTORY],
-                          &newest, &b[TABLE], &row, &b[PLACES], &b[DISTURBED], &block.every, &block.start, &block.step,
+    if (!PyArg_ParseTuple(arguments, "y*y*y*y*y*y*y*y*y*y*y*w*w*w*w*y*y*w*w*nw*nw*w*w*LddLLL:run", &b[OPERATIONS], &b[PARTS], &b[CHANNELS],
+                          &b[INSTANCES], &b[ENTRIES], &b[REFERENCES], &b[FORMS], &b[COURSES], &b[NOTES], &b[LOOPS], &b[PASSED],
+                          &b[POINTS], &b[STATES], &b[WORK], &b[STAMPS], &b[CHANGES], &b[KEPT], &b[VALUES], &b[HISTORY],
+                          &newest, &b[TABLE], &row, &b[PLACES], &b[DISTURBED], &b[CONTROL], &block.every, &block.start, &block.step,
                           &block.first, &block.count, &block.last)) {
         return NULL;
     }
@@ -102,7 +107,7 @@ static PyObject *run(PyObject *module, PyObject *arguments)
         } else {
             Outcome outcome;
             block.places = b[PLACES].buf;
-            if (take(&plan, &block, &outcome)) {
+            if (take(&plan, &block, length(b, CONTROL) > 0 ? b[CONTROL].buf : NULL, &outcome)) {
                 result = Py_BuildValue("(Lnn)", outcome.done, (Py_ssize_t)outcome.written, (Py_ssize_t)plan.newest);
             }
         }

@@ -24,6 +24,7 @@ enum {
     OPERATION_SLOPES = 8, /* and their derivatives */
     OPERATION_BEGIN = 9, OPERATION_MARK = 10, OPERATION_END = 11, /* what is repeated: see `Loop` */
     OPERATION_SAVE = 12, OPERATION_RESTORE = 13, OPERATION_FORGET = 14, /* states */
+    OPERATION_NOTE = 15, /* inputs that have been set */
 };
 
 enum { AS_IT_IS = 0, TRUE_ABOVE = 1, ROUNDED_UP = 2 };
@@ -116,8 +117,16 @@ typedef struct {
     int64_t count; /* number of its inputs that go on */
     int64_t depth; /* former values that are kept */
     int64_t order; /* of the polynomials, at most `depth`; 0: the FMU takes no derivatives */
-    int64_t is_of_end; /* whether values are those of the step's end, and not of the time that is noted of them */
+    int64_t at;    /* the time that values belong to, and are kept of */
 } Course;
+
+enum { AT_STAMP = 0, AT_END = 1, /* of the step; */ AS_NOTED = 2 /* points are there, and none is kept */ };
+
+/* Inputs that are set go to the places of another channel's entries, and the points of a course to those of another. */
+typedef struct {
+    int64_t from, to;      /* channels */
+    int64_t course, shown; /* courses, or -1 */
+} Noting;
 
 /* The saved state of an instance. */
 typedef struct {
@@ -164,7 +173,7 @@ typedef struct {
 
 typedef enum {
     STEP, SET_REALS_IN_PLACE, SET_REALS, SET_INTEGERS, GET_REALS, GET_INTEGERS, CHANGE, STEP_3, SET_3, GET_3, LOOK, STAMP, EXTEND,
-    SLOPES, SAVE, RESTORE, FORGET, BEGIN, MARK, END,
+    SLOPES, SAVE, RESTORE, FORGET, NOTE, BEGIN, MARK, END,
 } Kind;
 
 /* One operation. */
@@ -178,6 +187,7 @@ typedef struct {
         const Course *course;
         State *state;
         Loop *loop;
+        const Noting *noting;
     };
 } Call;
 
@@ -212,6 +222,9 @@ typedef struct {
     size_t depth;
     size_t newest; /* the ring's newest row */
     const Change *changes;
+    const Entry *entries;
+    const Channel *channels;
+    const Course *courses;
     Points *points;
     double *stamps; /* what time each of the values belongs to; NULL where nobody asks */
     Loop *loops;
@@ -323,6 +336,7 @@ const Call *look_at(const Plan *plan, const Group *group, int *status);
 void stamp(const Plan *plan, const Group *group, const Advance *it);
 const Call *extend(const Hand *hand, const Group *group, const Advance *it, int *status);
 const Call *set_slopes(const Hand *hand, const Group *group, int *status);
+void note_inputs(const Plan *plan, const Group *group, double time);
 const Call *treat_states(const Hand *hand, const Group *group, int *status);
 
 typedef enum { ON, AGAIN, LOST } Way_on;
@@ -353,6 +367,9 @@ void note_failure(Hand *hand, Place *place, int way, int code);
 
 /* The block's next step; 0 if it is at its end, or has no room for the row that would be due. */
 int has_next(const Block *block, const Outcome *outcome, Advance *it);
+
+/* The next row: a time, and the values that are kept. */
+void write_row(const Plan *plan, const Block *block, double time, Outcome *outcome);
 
 /* A step has been taken: remember its values, write its row if it is due, and let the next one begin at its begin. */
 void finish_step(Plan *plan, const Block *block, const Advance *it, Outcome *outcome);

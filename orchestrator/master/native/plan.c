@@ -11,15 +11,15 @@
 #include <string.h>
 
 static const char *const buffer_names[N_BUFFERS] = {
-    "operations", "parts", "channels", "instances", "entries", "references", "forms", "courses", "loops", "passed",
-    "points", "states", "work", "stamps", "changes", "kept", "values", "history", "table", "places", "disturbed",
+    "operations", "parts", "channels", "instances", "entries", "references", "forms", "courses", "notes", "loops", "passed",
+    "points", "states", "work", "stamps", "changes", "kept", "values", "history", "table", "places", "disturbed", "control",
 };
 static const size_t buffer_sizes[N_BUFFERS] = {
     sizeof(Operation), sizeof(int64_t), sizeof(Channel), sizeof(Instance), sizeof(Entry),
-    sizeof(unsigned),  sizeof(int64_t), sizeof(Course),  sizeof(Loop),     sizeof(int64_t),
-    sizeof(Points),    sizeof(State),   sizeof(double),  sizeof(double),   sizeof(Change),
-    sizeof(int64_t),   sizeof(double),  sizeof(double),  sizeof(double),   sizeof(Place),
-    sizeof(int64_t),
+    sizeof(unsigned),  sizeof(int64_t), sizeof(Course),  sizeof(Noting),   sizeof(Loop),
+    sizeof(int64_t),   sizeof(Points),  sizeof(State),   sizeof(double),   sizeof(double),
+    sizeof(Change),    sizeof(int64_t), sizeof(double),  sizeof(double),   sizeof(double),
+    sizeof(Place),     sizeof(int64_t), sizeof(Control),
 };
 
 size_t length(const Py_buffer *buffers, int which)
@@ -103,6 +103,8 @@ static int resolve(Plan *plan, const Py_buffer *buffers, const Operation *operat
         return resolve_channel(plan, buffers, operation, operation->index, group, call);
     case OPERATION_EXTEND: case OPERATION_SLOPES:
         return resolve_course(plan, buffers, operation, group, call);
+    case OPERATION_NOTE:
+        return resolve_note(plan, buffers, operation, group, call);
     case OPERATION_BEGIN: case OPERATION_MARK: case OPERATION_END:
         return resolve_loop(plan, buffers, operation, group, call);
     default:
@@ -128,12 +130,13 @@ void free_plan(Plan *plan)
 }
 
 /* Where the operations of each part end: one part, or for each of n threads one that sets and steps, and then for each
-   one that reads. 0 with an exception if they are not that. */
+   one that reads, or what is done at once where steps vary. 0 with an exception if they are not that. */
 static int check_parts(Plan *plan, const Py_buffer *buffers, size_t count)
 {
     const int64_t *ends = buffers[PARTS].buf;
     size_t n = length(buffers, PARTS);
-    int is_sound = n == 1 || (HAS_THREADS && n >= 4 && n <= 2048 && n % 2 == 0);
+    int is_varied = length(buffers, CONTROL) > 0;
+    int is_sound = is_varied ? n == PROGRAMS : n == 1 || (HAS_THREADS && n >= 4 && n <= 2048 && n % 2 == 0);
     for (size_t k = 0; is_sound && k < n; k++) {
         is_sound = ends[k] >= (k > 0 ? ends[k - 1] : 0) && (uint64_t)ends[k] <= count;
     }
@@ -142,7 +145,7 @@ static int check_parts(Plan *plan, const Py_buffer *buffers, size_t count)
         return 0;
     }
     plan->ends = ends;
-    plan->thread_count = n == 1 ? 1 : (int)(n / 2);
+    plan->thread_count = n == 1 || is_varied ? 1 : (int)(n / 2);
     plan->bounds = calloc(n + 1, sizeof *plan->bounds);
     if (plan->bounds == NULL) {
         PyErr_NoMemory();
@@ -164,6 +167,26 @@ static int check_places(const Plan *plan, const Py_buffer *buffers, size_t count
     return is_sound;
 }
 
+/* 0 with an exception unless what is said of steps that vary fits the plan. */
+static int check_control(const Plan *plan, const Py_buffer *buffers)
+{
+    const Control *control = buffers[CONTROL].buf;
+    if (length(buffers, CONTROL) == 0) {
+        return 1;
+    }
+    int is_sound = is_within(0, control->value_count, plan->value_count) && is_within(0, control->point_count, length(buffers, POINTS)) &&
+                   is_within(0, control->plain_count, length(buffers, PASSED)) &&
+                   is_within(control->plain_count, control->shown_count, length(buffers, PASSED)) &&
+                   is_within(control->work, (int64_t)work_of_control(plan, control), length(buffers, WORK));
+    for (int64_t k = 0; is_sound && k < control->plain_count + control->shown_count; k++) {
+        is_sound = is_within(plan->passed[k], 1, (size_t)control->value_count);
+    }
+    if (!is_sound) {
+        PyErr_SetString(PyExc_ValueError, "kernel: the control of steps must fit the plan");
+    }
+    return is_sound;
+}
+
 int make_plan(Plan *plan, const Py_buffer *buffers, Py_ssize_t newest)
 {
     if (!check_buffers(buffers)) {
@@ -179,6 +202,9 @@ int make_plan(Plan *plan, const Py_buffer *buffers, Py_ssize_t newest)
     plan->newest = (size_t)newest;
     plan->changes = buffers[CHANGES].buf;
     plan->forms = length(buffers, FORMS) == 0 ? NULL : buffers[FORMS].buf;
+    plan->entries = buffers[ENTRIES].buf;
+    plan->channels = buffers[CHANNELS].buf;
+    plan->courses = buffers[COURSES].buf;
     plan->points = buffers[POINTS].buf;
     plan->stamps = length(buffers, STAMPS) == 0 ? NULL : buffers[STAMPS].buf;
     plan->loops = buffers[LOOPS].buf;
@@ -186,7 +212,7 @@ int make_plan(Plan *plan, const Py_buffer *buffers, Py_ssize_t newest)
     plan->work = buffers[WORK].buf;
     plan->disturbed = buffers[DISTURBED].buf;
     plan->largest = 1;
-    if (!check_parts(plan, buffers, count) || !check_places(plan, buffers, count)) {
+    if (!check_parts(plan, buffers, count) || !check_places(plan, buffers, count) || !check_control(plan, buffers)) {
         return 0;
     }
     plan->calls = calloc(count + 1, sizeof *plan->calls);

@@ -7,12 +7,13 @@
 #define Py_LIMITED_API 0x030B0000
 #include <Python.h>
 
+#include "adaptive.h"
 #include "kernel.h"
 
 /* Buffers in the sequence of the arguments; `points` and what follows is written. */
 enum {
-    OPERATIONS, PARTS, CHANNELS, INSTANCES, ENTRIES, REFERENCES, FORMS, COURSES, LOOPS, PASSED, POINTS, STATES, WORK, STAMPS,
-    CHANGES, KEPT, VALUES, HISTORY, TABLE, PLACES, DISTURBED,
+    OPERATIONS, PARTS, CHANNELS, INSTANCES, ENTRIES, REFERENCES, FORMS, COURSES, NOTES, LOOPS, PASSED, POINTS, STATES, WORK, STAMPS,
+    CHANGES, KEPT, VALUES, HISTORY, TABLE, PLACES, DISTURBED, CONTROL,
     N_BUFFERS
 };
 
@@ -41,6 +42,7 @@ static inline int is_within(int64_t begin, int64_t count, size_t length)
 int resolve_channel(const Plan *plan, const Py_buffer *buffers, const Operation *operation, int64_t index, Group *group,
                     Call *call);
 int resolve_course(Plan *plan, const Py_buffer *buffers, const Operation *operation, Group *group, Call *call);
+int resolve_note(const Plan *plan, const Py_buffer *buffers, const Operation *operation, Group *group, Call *call);
 int resolve_state(const Py_buffer *buffers, const Operation *operation, Group *group, Call *call);
 int resolve_loop(Plan *plan, const Py_buffer *buffers, const Operation *operation, Group *group, Call *call);
 

@@ -33,7 +33,7 @@ static int are_in_place(const Entry *entries, int64_t count)
 int resolve_channel(const Plan *plan, const Py_buffer *buffers, const Operation *operation, int64_t index, Group *group,
                     Call *call)
 {
-    int is_get = operation->kind != OPERATION_SET && operation->kind < OPERATION_EXTEND;
+    int is_get = operation->kind != OPERATION_SET && operation->kind < OPERATION_EXTEND; /* or looked at */
     if (!is_within(index, 1, length(buffers, CHANNELS))) {
         return 0;
     }
@@ -75,7 +75,8 @@ int resolve_course(Plan *plan, const Py_buffer *buffers, const Operation *operat
     const Course *course = (const Course *)buffers[COURSES].buf + operation->index;
     if (!resolve_channel(plan, buffers, operation, course->channel, group, call) || group->type != 0 || course->function == 0 ||
         course->count < 1 || !is_within(course->begin, course->count, length(buffers, POINTS)) || course->depth < 0 ||
-        course->depth > 2 || course->order < 0 || course->order > course->depth || (!course->is_of_end && plan->stamps == NULL)) {
+        course->depth > 2 || course->order < 0 || course->order > course->depth ||
+        course->at < AT_STAMP || course->at > AS_NOTED || (course->at == AT_STAMP && plan->stamps == NULL)) {
         return 0;
     }
     for (int64_t n = course->begin; n < course->begin + course->count; n++) {
@@ -92,6 +93,35 @@ int resolve_course(Plan *plan, const Py_buffer *buffers, const Operation *operat
         group->kind = SLOPES;
         group->function = (uintptr_t)course->function;
     }
+    return 1;
+}
+
+/* Whether a course's points can take those of another. */
+static int courses_fit(const Plan *plan, const Py_buffer *buffers, const Noting *noting)
+{
+    size_t count = length(buffers, COURSES), room = length(buffers, POINTS);
+    if (!is_within(noting->course, 1, count) || !is_within(noting->shown, 1, count)) {
+        return 0;
+    }
+    const Course *from = &plan->courses[noting->course], *to = &plan->courses[noting->shown];
+    return from->count >= 0 && from->count == to->count && is_within(from->begin, from->count, room) &&
+           is_within(to->begin, to->count, room);
+}
+
+int resolve_note(const Plan *plan, const Py_buffer *buffers, const Operation *operation, Group *group, Call *call)
+{
+    if (!is_within(operation->index, 1, length(buffers, NOTES))) {
+        return 0;
+    }
+    const Noting *noting = (const Noting *)buffers[NOTES].buf + operation->index;
+    if (!resolve_channel(plan, buffers, operation, noting->to, group, call) ||
+        !resolve_channel(plan, buffers, operation, noting->from, group, call) ||
+        plan->channels[noting->to].count != plan->channels[noting->from].count ||
+        (noting->course >= 0 && !courses_fit(plan, buffers, noting))) {
+        return 0;
+    }
+    group->kind = NOTE;
+    call->noting = noting;
     return 1;
 }
 

@@ -192,6 +192,7 @@ static const Call *take_group(const Hand *hand, const Group *group, const Advanc
     case EXTEND: return extend(hand, group, it, status);
     case SLOPES: return set_slopes(hand, group, status);
     case SAVE: case RESTORE: case FORGET: return treat_states(hand, group, status);
+    case NOTE: note_inputs(hand->plan, group, time); return group->end;
     default: return change_values(group, time + step);
     }
 }
@@ -291,6 +292,18 @@ int has_next(const Block *block, const Outcome *outcome, Advance *it)
     return 1;
 }
 
+void write_row(const Plan *plan, const Block *block, double time, Outcome *outcome)
+{
+    double *to = block->rows + outcome->written;
+    *to = time;
+    for (size_t k = 0; k < block->kept_count; k++) {
+        to += block->stride;
+        double value = plan->values[block->kept[k]];
+        *to = plan->forms == NULL ? value : number_of(value, plan->forms[block->kept[k]]);
+    }
+    plan->note->rows = ++outcome->written;
+}
+
 void finish_step(Plan *plan, const Block *block, const Advance *it, Outcome *outcome)
 {
     outcome->done++;
@@ -300,14 +313,7 @@ void finish_step(Plan *plan, const Block *block, const Advance *it, Outcome *out
     }
     remember(plan);
     if (it->is_due) {
-        double *to = block->rows + outcome->written;
-        *to = block->start + (double)(it->number + 1) * block->step;
-        for (size_t k = 0; k < block->kept_count; k++) {
-            to += block->stride;
-            double value = plan->values[block->kept[k]];
-            *to = plan->forms == NULL ? value : number_of(value, plan->forms[block->kept[k]]);
-        }
-        plan->note->rows = ++outcome->written;
+        write_row(plan, block, block->start + (double)(it->number + 1) * block->step, outcome);
     }
 }
 

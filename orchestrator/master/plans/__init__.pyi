@@ -1,4 +1,5 @@
-from .layout import CHANGES, PLACE, SIZES, SWING, Kind
+from .ability import is_able
+from .layout import CHANGES, CONTROL, PLACE, SIZES, SWING, Kind
 from .plan import Plan
 
-__all__ = ["CHANGES", "PLACE", "SIZES", "SWING", "Kind", "Plan"]
+__all__ = ["CHANGES", "CONTROL", "PLACE", "SIZES", "SWING", "Kind", "Plan", "is_able"]

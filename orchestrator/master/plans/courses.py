@@ -7,7 +7,7 @@ import numpy as np
 from ...fmi.binding import FmuSlave
 from ..exchange import Exchange
 from ..extrapolation import Extrapolator
-from .layout import COURSE, POINTS
+from .layout import AS_NOTED, AT_END, AT_STAMP, COURSE, POINTS
 
 
 class Courses:
@@ -16,28 +16,37 @@ class Courses:
     Args:
         extrapolator: what continues them; None where all are held.
         exchange: what values there are.
+        in_every_way: whether there is a course for values of a step's begin, of its end, and for those that were noted;
+            otherwise there is one alone.
 
     Attributes:
         courses, points, stamps: for the kernel.
+        count: how many points there are beside those that are noted.
     """
 
-    def __init__(self, extrapolator: Extrapolator | None, exchange: Exchange) -> None:
+    def __init__(self, extrapolator: Extrapolator | None, exchange: Exchange, *, in_every_way: bool = False) -> None:
         self._extrapolator, self._exchange = extrapolator, exchange
         of = {} if extrapolator is None else extrapolator.courses
         self._names = list(of)
-        self.courses = np.zeros(len(of), COURSE)
-        self.points = np.zeros(sum(len(course.members) for course in of.values()), POINTS)
+        one = AT_END if extrapolator is not None and extrapolator.is_of_end else AT_STAMP
+        ways = [AT_STAMP, AT_END, AS_NOTED] if in_every_way else [one]
+        self._first = ways[0]
+        self.count = sum(len(course.members) for course in of.values())
+        self.courses = np.zeros(len(ways) * len(of), COURSE)
+        self.points = np.zeros((1 + in_every_way) * self.count, POINTS)
         self.stamps = np.zeros(len(exchange.stamps))
         begin = 0
-        for n, (name, course) in enumerate(of.items()):
+        for name, course in of.items():
             slave, end = exchange.slaves[name], begin + len(course.members)
             assert extrapolator is not None
             assert isinstance(slave, FmuSlave)
             function = slave.addresses(slave.INTERPOLATE)[0]
-            fixed = extrapolator.order, 0, extrapolator.is_of_end
-            self.courses[n] = function, -1, begin, len(course.members), *fixed
-            self.points["place"][begin:end] = course.members
-            self.points["reference"][begin:end] = list(slave.references(course.names))
+            for way in ways:
+                own = begin + self.count * (way == AS_NOTED)
+                row = function, -1, own, len(course.members), extrapolator.order, 0, way
+                self.courses[self.number(name, way)] = row
+                self.points["place"][own : own + end - begin] = course.members
+                self.points["reference"][own : own + end - begin] = list(slave.references(course.names))
             begin = end
 
     @staticmethod
@@ -46,17 +55,22 @@ class Courses:
         slaves = [exchange.slaves[name] for name in (extrapolator.courses if extrapolator else ())]
         return all(isinstance(slave, FmuSlave) and slave.INTERPOLATE in slave.functions for slave in slaves)
 
-    def number(self, name: str) -> int:
-        """That of an instance whose inputs are continued."""
-        return self._names.index(name)
+    def widen(self, cells: int) -> None:
+        """There are so many numbers more behind the values."""
+        if len(self.stamps):
+            self.stamps = np.zeros(len(self.stamps) + cells)
+
+    def number(self, name: str, way: int | None = None) -> int:
+        """That of an instance whose inputs are continued, in one of several ways."""
+        return self._names.index(name) + len(self._names) * ((self._first if way is None else way) - self._first)
 
     def load(self) -> None:
         """Take over what is remembered, and whether anybody has refused an order."""
         if self._extrapolator is None:
             return
-        self.stamps[:] = self._exchange.stamps
+        self.stamps[: len(self._exchange.stamps)] = self._exchange.stamps
         for n, name in enumerate(self._names):
-            self.courses["order"][n] = self._extrapolator.orders.get(name, self._extrapolator.order)
+            self.courses["order"][n :: len(self._names)] = self._extrapolator.orders.get(name, self._extrapolator.order)
             for own, points in zip(self._own(n), self._extrapolator.past[name], strict=True):
                 own["count"] = len(points)
                 for k, (time, value) in enumerate(points):
@@ -66,7 +80,7 @@ class Courses:
         """Give back what is remembered by now."""
         if self._extrapolator is None:
             return
-        self._exchange.stamps[:] = self.stamps.tolist()
+        self._exchange.stamps[:] = self.stamps[: len(self._exchange.stamps)].tolist()
         for n, name in enumerate(self._names):
             self._extrapolator.past[name] = [
                 list(zip(own["times"].tolist(), own["values"].tolist(), strict=True))[: own["count"]]

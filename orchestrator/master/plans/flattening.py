@@ -49,6 +49,13 @@ class Wide:
         self.forms = np.array(forms if any(forms) else [], dtype=np.int64)
         self._whole = [place for place, kind in enumerate(exchange.kinds) if kind != "Real"]
         self._wide = [(place, _BITS[form]) for place, form in enumerate(forms) if form]
+        self._more = 0
+
+    def widen(self, cells: int) -> None:
+        """There are so many numbers more behind the values."""
+        self._more = cells
+        if len(self.forms):
+            self.forms = np.concatenate([self.forms, np.zeros(cells, np.int64)])
 
     def form(self, place: int) -> int:
         """What the value at a place is."""
@@ -72,19 +79,26 @@ class Wide:
 
     def packed(self, values: Sequence[Any]) -> NDArray[np.float64]:
         """Values as the kernel takes them."""
-        cells = np.array(values, dtype=np.float64)
+        cells = np.array([*values, *[0.0] * self._more], dtype=np.float64)
         for place, bits in self._wide:
             cells.view(bits)[place] = int(values[place])
         return cells
 
     def unpacked(self, cells: NDArray[np.float64]) -> list[Any]:
         """Values that the kernel has left."""
-        values: list[Any] = cells.tolist()
+        values: list[Any] = cells[: len(cells) - self._more].tolist()
         for place in self._whole:  # the kernel's values are all doubles
             values[place] = 0 if values[place] != values[place] else int(values[place])
         for place, bits in self._wide:
             values[place] = int(cells.view(bits)[place])
         return values
+
+
+def noted(entry: Entry, place: int) -> Entry:
+    """What shows again what an entry has made of a value, once that stands at another place."""
+    *value, form = entry
+    plain = value[2:] == [-1, 1.0, 0.0, AS_IT_IS, 0.0]
+    return place, -1, -1, 1.0, 0.0, AS_IT_IS, 0.0, form if plain else NUMBER
 
 
 def parts_of(channel: Channel) -> Parts | None:

@@ -26,12 +26,15 @@ class Kind(IntEnum):
     SAVE = 12
     RESTORE = 13
     FORGET = 14
+    NOTE = 15
 
 
 AS_IT_IS, TRUE_ABOVE, ROUNDED_UP = 0, 1, 2
 """What a threshold does."""
 CIRCLE, ITERATION = 0, 1
 """Kinds of loops."""
+AT_STAMP, AT_END, AS_NOTED = 0, 1, 2
+"""What time the values of inputs that go on belong to."""
 METHODS = {"none": 0, "aitken": 1, "anderson": 2}
 """Ways to the next guess of an iteration."""
 NONE = 2**32 - 1
@@ -58,9 +61,8 @@ CHANGES = np.dtype(
     [("active", "i8"), ("place", "i8"), ("is_real", "i8"), *((n, "f8") for n in ("scale", "offset", "slope", "since"))]
 )
 OPERATION = np.dtype([(name, "i4") for name in ("kind", "index", "period", "phase", "is_watched", "is_late")])
-COURSE = np.dtype(
-    [("function", "u8"), *((n, "i8") for n in ("channel", "begin", "count", "depth", "order", "is_of_end"))]
-)
+COURSE = np.dtype([("function", "u8"), *((n, "i8") for n in ("channel", "begin", "count", "depth", "order", "at"))])
+NOTING = np.dtype([(name, "i8") for name in ("from", "to", "course", "shown")])
 POINTS = np.dtype(
     [
         ("times", "f8", 3),
@@ -75,6 +77,15 @@ LOOP = np.dtype(
     + [("relaxation", "f8")]
 )
 PLACE = np.dtype([(name, "i8") for name in ("begin", "failed", "status")])
+CONTROL = np.dtype(
+    [(name, "f8") for name in ("start", "step", "last", "late", "end", "due", "every", "shortest")]
+    + [(name, "f8") for name in ("exponent", "of_halves", "of_same", "of_end")]
+    + [(name, "i8") for name in ("value_count", "point_count", "plain_count", "shown_count", "work")]
+    + [(name, "f8") for name in ("time", "length", "least", "most")]
+    + [(name, "i8") for name in ("accepted", "rejected", "in_a_row", "jump")]
+    + [(name, "f8") for name in ("called_at", "called_for")]
+)
+"""Which steps are wanted where they vary, and how they went, as adaptive.h has it."""
 
 SWING = np.dtype(
     [(name, "f8") for name in ("peak", "last", "from", "size")] + [(x, "i8") for x in ("way", "rises", "is_begun")]
@@ -83,9 +94,9 @@ SWING = np.dtype(
 
 _SIZES: dict[str, Any] = {
     "operations": OPERATION, "parts": "i8", "channels": CHANNEL, "instances": INSTANCE, "entries": ENTRY,
-    "references": "u4", "forms": "i8", "courses": COURSE, "loops": LOOP, "passed": "i8", "points": POINTS,
-    "states": STATE, "work": "f8", "stamps": "f8", "changes": CHANGES, "kept": "i8", "values": "f8", "history": "f8",
-    "table": "f8", "places": PLACE, "disturbed": "i8",
+    "references": "u4", "forms": "i8", "courses": COURSE, "notes": NOTING, "loops": LOOP, "passed": "i8",
+    "points": POINTS, "states": STATE, "work": "f8", "stamps": "f8", "changes": CHANGES, "kept": "i8", "values": "f8",
+    "history": "f8", "table": "f8", "places": PLACE, "disturbed": "i8", "control": CONTROL,
 }  # fmt: skip
 SIZES = tuple(np.dtype(each).itemsize for each in _SIZES.values())
 """Of what the kernel's buffers hold, in bytes, in the order in which it takes them."""

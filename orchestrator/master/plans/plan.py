@@ -8,17 +8,20 @@ from ctypes import addressof, c_void_p
 import numpy as np
 from numpy.typing import NDArray
 
-from ...fmi import Channel, Slave
+from ...fmi import Channel
 from ...fmi.binding import ElementsChannel, Fmi3Slave, FmuSlave, LoadedSlave, is_watched
-from ...isolation import IsolatedChannel, IsolatedSlave, Ride, may_ride
-from ..algorithms import HEAD, Iteration, Operation, Programmed, Repeated
+from ...isolation import IsolatedChannel, Ride
+from ..algorithms import HEAD, Batch, Iteration, Operation, Repeated
 from ..coupling import Coupling
-from ..exchange import Change, Exchange, Yield
+from ..exchange import Change, Yield
 from ..refresh import Refresher
+from .ability import Called, called
 from .courses import Courses
-from .flattening import TYPES, Entry, Wide, can_exchange, parts_of
+from .flattening import TYPES, Entry, Wide, noted, parts_of
 from .layout import (
     AS_IT_IS,
+    AS_NOTED,
+    AT_END,
     CHANNEL,
     CIRCLE,
     ENTRY,
@@ -27,15 +30,22 @@ from .layout import (
     LOOP,
     METHODS,
     NONE,
+    NOTING,
     OPERATION,
+    POINTS,
     STATE,
     TRUE_ABOVE,
     Kind,
 )
 
-Called = FmuSlave | Fmi3Slave | Ride
-"""What the kernel calls."""
 _NOBODY = None, ""
+_STATES = {
+    operation: (kind, int(operation > Operation.FORGET))
+    for operation, kind in zip(
+        range(Operation.SAVE, Operation.FORGET_END + 1), 2 * (Kind.SAVE, Kind.RESTORE, Kind.FORGET), strict=True
+    )
+}
+"""What is done to a state, and to which of an instance's."""
 
 
 class Plan:
@@ -43,8 +53,9 @@ class Plan:
 
     Args:
         coupling: the instances and what they exchange.
-        algorithm: what is done in a step.
-        can_share: whether threads are there to share the work.
+        sections: what is done at once. Behind that of the number ``refreshing`` feed-through is brought up to date.
+        threads: how many there are to share the work.
+        watched: places of values that are compared, and how many numbers that takes beside all the values.
 
     Attributes:
         wide: what each of the values is.
@@ -56,15 +67,25 @@ class Plan:
         channels: arrays that are set as a whole.
         courses: the inputs that go on during a step.
         rounds: by operation, what it is repeated for. iterations: by the operation that ends a round.
-        states: by instance, the number of its saved state.
+        states: by instance, and by which of its states, its number.
         threads: how many threads there is work for.
+        width: how many numbers there are, the values first.
+        work: room for numbers. spare: where that begins which is left of it.
     """
 
-    def __init__(self, coupling: Coupling, algorithm: Programmed, *, can_share: bool) -> None:
+    def __init__(
+        self,
+        coupling: Coupling,
+        sections: Sequence[Sequence[Batch | Repeated]],
+        *,
+        threads: int = 1,
+        refreshing: int = 0,
+        watched: Sequence[int] = (),
+    ) -> None:
         self._coupling = coupling
         self._exchange = coupling.exchange
         self.wide = Wide(coupling.exchange)
-        self.courses = Courses(coupling.extrapolator, coupling.exchange)
+        self.courses = Courses(coupling.extrapolator, coupling.exchange, in_every_way=len(sections) > 1)
         self._channels: list[tuple[int, ...]] = []
         self.channels: list[ElementsChannel] = []
         self._entries: list[Entry] = []
@@ -76,28 +97,39 @@ class Plan:
         self.culprits: list[tuple[Called | None, str]] = []
         self._instances: list[tuple[int, int, int]] = []
         self.changes: list[tuple[Change, int, bool]] = []
-        self._slaves = {name: _called(slave) for name, slave in coupling.slaves.items()}
+        self._slaves = {name: called(slave) for name, slave in coupling.slaves.items()}
         self.rides = [slave for slave in self._slaves.values() if isinstance(slave, Ride)]
         self.rounds: dict[int, Iteration] = {}
         self.iterations: dict[int, Iteration] = {}
         self._loops: list[tuple[float, ...]] = []
-        self._passed: list[int] = []
+        self._passed: list[int] = [*watched]
         self._work: list[tuple[int, Iteration]] = []
         self._room = 0
-        self.states: dict[str, int] = {}
-        is_shared = can_share and algorithm.takes_threads and coupling.refresher is None
-        self.threads = max(1, min(coupling.settings.threads, len(self._slaves))) if is_shared else 1
+        self.states: dict[tuple[str, int], int] = {}
+        self._notes: list[tuple[int, int, int, int]] = []
+        self._sets: dict[str, list[tuple[int, str]]] = {}
+        self._shown: dict[str, list[tuple[int, int, str]]] = {}
+        self.width = len(self._exchange.values)
+        self.threads = threads
         ends: list[int] = []
-        for part in algorithm.program():
-            if isinstance(part, Repeated):
-                self._repeat(part)
-                continue
-            names = list(part.names)
-            for share in np.array_split(names, self.threads) if self.threads > 1 else [names]:
-                self._add(list(share), part.operations)
-                ends.append(len(self.operations))
-        if coupling.refresher is not None:
-            self._refresh(coupling.refresher)
+        for n, section in enumerate(sections):
+            for part in section:
+                if isinstance(part, Repeated):
+                    self._repeat(part)
+                    continue
+                names = list(part.names)
+                for share in np.array_split(names, threads) if threads > 1 else [names]:
+                    self._add(list(share), part.operations, final=len(sections) == 1)
+                    ends += [len(self.operations)] * (threads > 1)
+            if n == refreshing and coupling.refresher is not None:
+                self._refresh(coupling.refresher)
+            ends += [len(self.operations)] * (threads == 1)
+        self.spare = self._room
+        if len(sections) > 1:
+            self._room += 2 * len(watched) + 7 * self.width + 2 * self.courses.count * POINTS.itemsize // 8
+        self.work = self._made_work()
+        self.wide.widen(self.width - len(self._exchange.values))
+        self.courses.widen(self.width - len(self._exchange.values))
         self.arrays = (
             np.array(
                 [
@@ -106,42 +138,44 @@ class Plan:
                 ],
                 OPERATION,
             ),
-            np.array(ends if self.threads > 1 else [len(self.operations)], dtype=np.int64),
+            np.array(ends, dtype=np.int64),
             np.array(self._channels, dtype=CHANNEL),
             np.array(self._instances, dtype=INSTANCE),
             np.array(self._entries, dtype=ENTRY),
             np.array(self._references, dtype=np.uint32),
             self.wide.forms,
             self.courses.courses,
+            np.array(self._notes, dtype=NOTING),
             np.array(self._loops, dtype=LOOP),
             np.array(self._passed, dtype=np.int64),
             self.courses.points,
             self._made_states(),
-            self._made_work(),
+            self.work,
             self.courses.stamps,
         )
 
-    @staticmethod
-    def is_able(coupling: Coupling, algorithm: Programmed) -> bool:
-        """Whether the kernel can do all that is asked for."""
-        exchange, slaves, refresher = coupling.exchange, coupling.slaves, coupling.refresher
-        repeated = [n for part in algorithm.program() if isinstance(part, Repeated) for n in part.batch.names]
-        able = all(_can_be_called(x, exchange) for x in slaves.values())
-        able = able and not any(link.mapping is not None for link in exchange.every_link)
-        able = able and all(can_be_restored(slaves[name]) for name in repeated)
-        able = able and Courses.are_able(coupling.extrapolator, exchange)
-        here = not any(isinstance(slave, IsolatedSlave) for slave in slaves.values())
-        able = able and (refresher is None or (here and refresher.is_decided))
-        return able and coupling.loops is None and can_exchange(exchange)
-
     def forget(self, time: float) -> None:
         """Give back the states that have been saved at a time in s and not been given back."""
-        for name, n in self.states.items():
+        for (name, _), n in self.states.items():
             handle, slave = int(self._handles[n]), self._slaves[name]
             self._handles[n] = 0
             if handle:
                 assert isinstance(slave, LoadedSlave)
                 slave.forget((time, c_void_p(handle)))
+
+    @property
+    def holds_states(self) -> bool:
+        """Whether states that have been saved were not given back."""
+        return bool(self._handles.any())
+
+    def come_back(self, time: float) -> None:
+        """Restore the first states of those that have one saved, which was at a time in s, and give all back."""
+        for (name, which), n in self.states.items():
+            handle, slave = int(self._handles[n]), self._slaves[name]
+            if handle and not which:
+                assert isinstance(slave, LoadedSlave)
+                slave.restore((time, c_void_p(handle)))
+        self.forget(time)
 
     def rank(self, operation: int) -> tuple[bool, int]:
         """Where an operation of several that failed would stand without threads: all are set before any steps."""
@@ -162,10 +196,16 @@ class Plan:
         for operation in operations:
             for name in names:
                 slave, rate = self._slaves[name], self._coupling.settings.rates.get(name, 1)
-                if operation == Operation.SET:
-                    self._add_sets(slave, rate)
+                if operation in (Operation.SET, Operation.SET_OF_END):
+                    self._add_sets(slave, rate, way=AT_END if operation == Operation.SET_OF_END else None)
                 elif operation == Operation.STEP:
                     self._add_step(slave, rate, final=final)
+                elif operation == Operation.NOTE:
+                    self._add_notes(slave)
+                elif operation == Operation.SHOW:
+                    self._add_shown(slave)
+                elif operation in _STATES:
+                    self._add_state([name], *_STATES[operation])
                 else:
                     self._add_gets(slave, rate, {Operation.GET_DIRECT: True, Operation.GET_REST: False}.get(operation))
 
@@ -195,16 +235,16 @@ class Plan:
         self._add_operation(Kind.END, number, _NOBODY, (1, 0))
         self._add_state(names, Kind.FORGET)
 
-    def _add_state(self, names: Sequence[str], kind: Kind) -> None:
+    def _add_state(self, names: Sequence[str], kind: Kind, which: int = 0) -> None:
         for name in names:
             slave = self._slaves[name]
             assert isinstance(slave, LoadedSlave)
-            index = self.states.setdefault(name, len(self.states))
+            index = self.states.setdefault((name, which), len(self.states))
             self._add_operation(kind, index, (slave, slave.STATE[kind - Kind.SAVE]), (1, 0))
 
     def _made_states(self) -> NDArray[np.void]:
         made = np.zeros(len(self.states), STATE)
-        for name, n in self.states.items():
+        for (name, _), n in self.states.items():
             slave = self._slaves[name]
             assert isinstance(slave, LoadedSlave)
             functions = [slave.addresses(call)[0] for call in slave.STATE[:3]]
@@ -228,7 +268,7 @@ class Plan:
             number = len(self._loops)
             if is_circle:
                 self._loops.append((CIRCLE, len(stage) + 1, self._room, *[0] * 5, 0.0))
-                self._room += HEAD + 2 * len(self._exchange.values)
+                self._room += HEAD + 2 * self.width
                 self._add_operation(Kind.BEGIN, number, _NOBODY, (1, 0))
                 self._add_operation(Kind.MARK, number, _NOBODY, (1, 0))
             for name in names:
@@ -248,22 +288,54 @@ class Plan:
         self.late.append(late)
         self.culprits.append(culprit)
 
-    def _add_sets(self, slave: Called, rate: int, *, late: bool = False) -> None:
-        """Set inputs: as of a step's begin, continued if they are to be, or ``late``, at a communication point."""
+    def _add_sets(self, slave: Called, rate: int, *, late: bool = False, way: int | None = None) -> None:
+        """Set inputs: for a step, continued if they are to be, in one of several ways, or ``late``, as it has ended."""
         extrapolator = self._coupling.extrapolator
         course = None if extrapolator is None or late else extrapolator.courses.get(slave.name)
+        made = self._sets[slave.name] = []
         for n, feed in enumerate(self._exchange.feeds[slave.name]):
             slots = feed.changes or [None] * len(feed.targets)
             changes = [-1 if slot is None else self._add_change(slot, -1, feed.is_real) for slot in slots]
             self._feeds.append((slave.name, n, changes, late, len(self._entries)))
             entries = self.wide.entries(feed, changes, late=late)
             if course is None or n != course.feed:
-                self._add_channels(Kind.SET, slave, feed.channel, entries, feed.is_real, due=(rate, 0), late=late)
+                made += self._add_channels(
+                    Kind.SET, slave, feed.channel, entries, feed.is_real, due=(rate, 0), late=late
+                )
                 continue
-            number = self.courses.number(slave.name)
+            number = self.courses.number(slave.name, way)
             self.courses.courses["channel"][number] = len(self._channels)
-            self._add_channels(Kind.EXTEND, slave, feed.channel, entries, feed.is_real, due=(rate, 0))
+            made += self._add_channels(
+                Kind.EXTEND, slave, feed.channel, entries, feed.is_real, due=(rate, 0), index=number
+            )
             self._add_operation(Kind.SLOPES, number, (slave, FmuSlave.INTERPOLATE), (rate, 0))
+
+    def _add_notes(self, slave: Called) -> None:
+        """Note the inputs that have just been set, behind the values."""
+        shown = self._shown[slave.name] = []
+        for source, call in self._sets[slave.name]:
+            function, component, begin, count, *what = self._channels[source]
+            continued = np.flatnonzero(self.courses.courses["channel"] == source)
+            courses = (-1, -1)
+            if len(continued):
+                courses = int(continued[0]), self.courses.number(slave.name, AS_NOTED)
+                self.courses.courses["channel"][courses[1]] = len(self._channels)
+            shown.append((len(self._channels), courses[1], call))
+            self._add_operation(Kind.NOTE, len(self._notes), _NOBODY, (1, 0))
+            self._notes.append((source, len(self._channels), *courses))
+            self._channels.append((function, component, len(self._entries), count, *what))
+            self._references += self._references[begin : begin + count]
+            self._entries += [noted(entry, self.width + k) for k, entry in enumerate(self._entries[begin:][:count])]
+            self.width += count
+
+    def _add_shown(self, slave: Called) -> None:
+        """Set inputs as they were noted."""
+        for channel, course, call in self._shown[slave.name]:
+            if course < 0:
+                self._add_operation(Kind.SET, channel, (slave, call), (1, 0))
+                continue
+            self._add_operation(Kind.EXTEND, course, (slave, call), (1, 0))
+            self._add_operation(Kind.SLOPES, course, (slave, FmuSlave.INTERPOLATE), (1, 0))
 
     def _add_gets(self, slave: Called, rate: int, direct: bool | None, kind: Kind = Kind.GET) -> None:
         """Read outputs, all or those that are ``direct`` or not; with what events make of them."""
@@ -299,13 +371,16 @@ class Plan:
         *,
         due: tuple[int, int],
         late: bool = False,
-    ) -> None:
+        index: int | None = None,
+    ) -> list[tuple[int, str]]:
+        """Add operations on a channel, each on one of its parts, or the one of this index; the channels and calls."""
+        made = []
         if isinstance(channel, ElementsChannel):
             self.channels.append(channel)
         for own, places in parts_of(channel) or ():
             call = own.calls[kind not in (Kind.SET, Kind.EXTEND)]
-            index = self.courses.number(slave.name) if kind == Kind.EXTEND else len(self._channels)
-            self._add_operation(kind, index, (slave, call), due, late=late)
+            made.append((len(self._channels), call))
+            self._add_operation(kind, len(self._channels) if index is None else index, (slave, call), due, late=late)
             if isinstance(slave, Ride):
                 assert isinstance(own, IsolatedChannel)
                 addresses = slave.add(own, is_get=kind == Kind.GET)
@@ -315,32 +390,10 @@ class Plan:
             self._channels.append((*addresses, *what, len(own.references)))
             self._entries += [entries[k] for k in places]
             self._references += [*own.references, *[NONE] * (len(places) - len(own.references))]
+        return made
 
     def _add_step(self, slave: Called, rate: int, *, final: bool) -> None:
         call = FmuSlave.DO_STEP if isinstance(slave, Ride) else slave.DO_STEP
         self._add_operation(Kind.STEP, len(self._instances), (slave, call), (rate, 0), late=not final)
         addresses = slave.add_step() if isinstance(slave, Ride) else slave.addresses(call)
         self._instances.append((*addresses, addressof(slave.told) if isinstance(slave, Fmi3Slave) else 0))
-
-
-def _can_be_called(slave: Slave, exchange: Exchange) -> bool:
-    """Whether the kernel can call an instance, and set and read what is exchanged."""
-    if isinstance(slave, IsolatedSlave):
-        given = [part.channel for part in exchange.yields[slave.name]]
-        return may_ride(slave, [*(feed.channel for feed in exchange.feeds[slave.name]), *given])
-    return isinstance(slave, FmuSlave | Fmi3Slave) and not slave.rolls_back
-
-
-def _called(slave: Slave) -> Called:
-    """What the kernel calls."""
-    if isinstance(slave, IsolatedSlave):
-        return slave.ride()
-    assert isinstance(slave, FmuSlave | Fmi3Slave)
-    return slave
-
-
-def can_be_restored(slave: Slave) -> bool:
-    """Whether the kernel can save an instance's state and come back to it."""
-    if not isinstance(slave, FmuSlave | Fmi3Slave) or not slave.interface.can_save_state:
-        return False
-    return all(call in slave.functions for call in slave.STATE[:3])

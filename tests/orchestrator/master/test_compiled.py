@@ -133,7 +133,7 @@ def test_units(both, components, algorithm):
 @pytest.mark.parametrize("stop", [10.0, 0.25])
 def test_recorded_points(both, odd, ring, monkeypatch, *, record, stop):
     """Every so many, and the last; also where a block may hold one row only."""
-    monkeypatch.setattr(compiled, "_MOST_VALUES", 1)
+    monkeypatch.setattr(compiled, "MOST_VALUES", 1)
     result = both(ring(odd, 2, stop, record=record if record <= stop else stop))
     every = round(min(record, stop) / 0.25)
     assert list(result.time) == [

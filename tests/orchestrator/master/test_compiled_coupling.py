@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from railcosim.orchestrator.errors import CouplingError
 from railcosim.orchestrator.master import compiled
-from railcosim.orchestrator.master.plans.plan import can_be_restored
+from railcosim.orchestrator.master.plans.ability import can_be_restored
 from railcosim.orchestrator.run.execution import execute
 from railcosim.orchestrator.system import System
 

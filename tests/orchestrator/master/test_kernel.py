@@ -14,8 +14,8 @@ import numpy as np
 import pytest
 from railcosim.orchestrator.master import compiled
 from railcosim.orchestrator.master.compiled import CompiledLoop
-from railcosim.orchestrator.master.plans import CHANGES, PLACE, SWING
-from railcosim.orchestrator.master.plans.layout import COURSE, LOOP, POINTS
+from railcosim.orchestrator.master.plans import CHANGES, CONTROL, PLACE, SWING
+from railcosim.orchestrator.master.plans.layout import COURSE, LOOP, NOTING, POINTS
 from railcosim.orchestrator.master.settings import Settings
 
 MASTER = Path(__file__).parents[3] / "orchestrator" / "master"
@@ -37,10 +37,12 @@ def test_a_guard_is_an_address():
         compiled.kernel.watch("there")
 
 
+FIXED = np.zeros(0, CONTROL)
+"""Steps do not vary."""
 NAMES = (
-    "operations parts channels instances entries references forms courses loops passed points states work stamps "
+    "operations parts channels instances entries references forms courses notes loops passed points states work stamps "
     "changes kept values history newest table row places "
-    "disturbed every start step first count last"
+    "disturbed control every start step first count last"
 )
 
 
@@ -55,7 +57,7 @@ def arguments(workspace, odd, ring, instantiated):
     places = np.array([(0, -1, 0)], PLACE)
     disturbed = np.zeros(len(plan[0]), np.int64)
     state = values, np.tile(values, (2, 1)), 1, table, 0, places, disturbed
-    given = [*plan, changes, kept, *state, 1, 0.0, 0.25, 0, 4, 4]
+    given = [*plan, changes, kept, *state, FIXED, 1, 0.0, 0.25, 0, 4, 4]
     yield dict(zip(NAMES.split(), given, strict=True))
     for slave in master.slaves.values():
         slave.free()
@@ -117,6 +119,27 @@ def going_round(arguments, *, place=0, compared=0.0, **of):
     return {"loops": loops, "work": work, "passed": np.array([place]), "operations": operations}
 
 
+def noting(arguments, *, points=(0, 1), **of):
+    """A first operation that notes inputs, but for one thing."""
+    notes, courses = np.zeros(1, NOTING), np.zeros(2, COURSE)
+    courses["begin"][1], courses["count"][1] = points
+    courses["count"][0], notes["shown"] = 1, 1
+    for name, value in of.items():
+        notes[name] = value
+    operations = changed(changed(arguments["operations"], "kind", 15), "index", 0)
+    return {"notes": notes, "courses": courses, "points": np.zeros(1, POINTS), "operations": operations}
+
+
+def varying(arguments, *, place=0, parts=13, **of):
+    """Steps that vary, but for one thing."""
+    control = np.zeros(1, CONTROL)
+    control["value_count"] = len(arguments["values"])
+    for name, value in of.items():
+        control[name] = value
+    made = {"control": control, "work": np.zeros(1000), "passed": np.array([place])}
+    return made | {"parts": np.full(parts, len(arguments["operations"]))}
+
+
 def ending(arguments):
     """A loop that nothing begins."""
     operations = changed(changed(arguments["operations"], "kind", [10, 11], [0, 1]), "index", 0, [0, 1])
@@ -146,7 +169,7 @@ WRONG = {
     "more references than values": lambda a: {"channels": changed(a["channels"], "reference_count", 10**6)},
     "forms of some values": lambda a: {"forms": np.zeros(1, np.int64)},
     "a step without function": lambda a: {"instances": changed(a["instances"], "function", 0)},
-    "an unknown operation": lambda a: {"operations": changed(a["operations"], "kind", 15)},
+    "an unknown operation": lambda a: {"operations": changed(a["operations"], "kind", 16)},
     "an unknown change": lambda a: {"entries": changed(a["entries"], "change", 1)},
     "a negative change": lambda a: {"entries": changed(a["entries"], "change", -2)},
     "a change beyond the changes": lambda a: {
@@ -182,7 +205,7 @@ WRONG = {
         f"a course whose {name} is {value}": partial(going_on, array="courses", name=name, value=value)
         for name, value in [
             *(("function", 0), ("channel", 10**6), ("count", 0), ("begin", -1), ("begin", 10**6)),
-            *(("depth", -1), ("depth", 3), ("order", -1), ("is_of_end", 0)),
+            *(("depth", -1), ("depth", 3), ("order", -1), ("at", 0), ("at", -1), ("at", 3)),
         ]
     },
     "a course of whole numbers": lambda a: (
@@ -215,6 +238,27 @@ WRONG = {
             "places": np.tile(a["places"], 2),
         }
     ),
+    "an unknown note": lambda a: noting(a) | {"notes": np.zeros(0, NOTING)},
+    "a note of points beyond the others": lambda a: noting(a, points=(1, 1)),
+    "a note of other points": lambda a: noting(a, points=(0, 0)),
+    "a note of fewer points than none": lambda a: (
+        noting(a) | {"courses": np.array([(0, 0, 0, -1, 0, 0, 0)] * 2, COURSE)}
+    ),
+    "a note of points that are not there": lambda a: noting(a) | {"points": np.zeros(0, POINTS)},
+    "a note in a longer channel": lambda a: noting(a, to=int(np.argmax(a["channels"]["count"]))),
+    **{
+        f"a note whose {name} is {value}": partial(noting, **{name: value})
+        for name, value in [("from", -1), ("from", 10**6), ("to", -1), ("to", 10**6), ("course", 2), ("shown", -1)]
+    },
+    "steps that vary in one part": partial(varying, parts=1),
+    "a value that is not there is watched": partial(varying, plain_count=1, place=10**6),
+    **{
+        f"steps that vary with a {name} of {value}": partial(varying, **{name: value})
+        for name, value in [
+            *(("value_count", -1), ("value_count", 10**6), ("point_count", -1), ("point_count", 1), ("work", 10**6)),
+            *(("plain_count", -1), ("plain_count", 2), ("shown_count", -1), ("shown_count", 2)),
+        ]
+    },
     "a loop that does not begin": ending,
     "a loop that does not end": going_round,
     "a table with half a column": lambda a: {"table": a["table"].ravel()[:-1]},
@@ -302,7 +346,7 @@ def test_memory_and_threads_that_cannot_be_had(tmp_path, odd, ring, instantiated
         state = np.zeros(0, CHANGES), kept, values, history, 1, table, 0, places
         for left.value in range(20):
             try:
-                found = kernel.run(*plan, *state, np.zeros(len(plan[0]), np.int64), 1, 0.0, 0.25, 0, 4, 4)
+                found = kernel.run(*plan, *state, np.zeros(len(plan[0]), np.int64), FIXED, 1, 0.0, 0.25, 0, 4, 4)
             except (MemoryError, RuntimeError) as error:
                 said.append(f"{type(error).__name__} {error}")
             else:
@@ -338,6 +382,7 @@ def test_the_compiler_has_nothing_to_say(tmp_path, flags):
 
 
 PARTS = (
+    "test_varying.py",
     *("test_compiled.py", "test_compiled_blocks.py", "test_compiled_coupling.py", "test_compiled_fmi3.py"),
     *("test_kernel.py", "test_threads.py"),
 )

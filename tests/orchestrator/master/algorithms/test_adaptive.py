@@ -9,6 +9,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from railcosim.orchestrator.errors import CouplingError, FmuError, ScenarioError
 from railcosim.orchestrator.fmi.binding.loaded import LoadedSlave
+from railcosim.orchestrator.master import compiled
 from railcosim.orchestrator.master.algorithms.adaptive import _fit
 from railcosim.orchestrator.run.checking import check
 from railcosim.orchestrator.run.execution import execute, run
@@ -247,6 +248,7 @@ def test_saved_states_are_given_back(mine, monkeypatch, fails):
 
     monkeypatch.setattr(LoadedSlave, "save", note)
     monkeypatch.setattr(LoadedSlave, "forget", lambda s, state: kept.remove(s.name) or forget(s, state))
+    monkeypatch.setattr(compiled, "kernel", None)
     how = {"tolerance": 1e-9, "min_step": 0.1} if fails else {}
     outcome = execute(swing(mine, **how), kind="native")
     assert outcome.status == ("failed" if fails else "completed")
