@@ -1,4 +1,4 @@
-"""What repeated steps cost: a ring by `iterative`, beside a bare C program that does the same, and Python.
+"""What repeated steps cost: a ring by `iterative` and `adaptive`, beside bare C programs that do the same, and Python.
 
     python benchmarks/iterations.py
 
@@ -31,13 +31,18 @@ from railcosim.orchestrator.system import System
 from ring import HERE, compile_c
 
 STEP, TOLERANCE = 0.2, 1e-8
+ERROR = 1e-5
+"""Tolerance of the error of a step."""
+
+
+VARYING: dict[str, Any] = {"algorithm": "adaptive", "tolerance": ERROR}
 
 
 class Ours:
     """Instances in a ring, and the master of the package."""
 
-    def __init__(self, ring: Ring, acceleration: str) -> None:
-        system = System(stop_time=1e6, step=STEP, algorithm="iterative", tolerance=TOLERANCE, acceleration=acceleration)
+    def __init__(self, ring: Ring, **how: Any) -> None:
+        system = System(**{"stop_time": 1e6, "step": STEP, "algorithm": "iterative", "tolerance": TOLERANCE} | how)
         for k, start in enumerate(ring.starts):
             system.add(f"lag{k}", str(ring.path), x=start)
         for k in range(ring.count):
@@ -46,14 +51,16 @@ class Ours:
         checked = check(system, self.workspace)
         slaves = {name: model.instantiate(name) for name, model in checked.models.items()}
         wiring, settings = checked.wiring, Settings.of(system, checked.wiring)
-        self.master = Master(
-            slaves, checked.order.sequence, wiring.links, wiring.starts, "iterative", settings=settings
-        )
+        self.sequence = checked.order.sequence
+        self.every = 0.0 if system.stepping.algorithm == "adaptive" else 1
+        algorithm = system.stepping.algorithm
+        self.master = Master(slaves, self.sequence, wiring.links, wiring.starts, algorithm, settings=settings)
         self.master.initialize(0.0, 1e6)
         self.done = 0
 
     def run(self, steps: int) -> None:
-        self.master.run(0.0, STEP, self.done + steps, 1, lambda *_: True, first=self.done)
+        until = self.done + steps
+        self.master.run(0.0, STEP, 5_000_000, self.every, lambda *_: True, first=self.done, until=until)
         self.done += steps
 
     @property
@@ -71,9 +78,9 @@ def without_kernel() -> Iterator[None]:
 class InPython(Ours):
     """Without the compiled step loop."""
 
-    def __init__(self, ring: Ring, acceleration: str) -> None:
+    def __init__(self, ring: Ring, **how: Any) -> None:
         with without_kernel():
-            super().__init__(ring, acceleration)
+            super().__init__(ring, **how)
 
     def run(self, steps: int) -> None:
         with without_kernel():
@@ -81,20 +88,23 @@ class InPython(Ours):
 
 
 class Bare(Ours):
-    """The C program of iterations.c over instances of its own."""
+    """The C program of iterations.c or adaptive.c over instances of its own."""
 
-    def __init__(self, ring: Ring, acceleration: str) -> None:
-        super().__init__(ring, acceleration)
+    def __init__(self, ring: Ring, **how: Any) -> None:
+        super().__init__(ring, **how)
         slaves = [slave for slave in self.master.slaves.values() if isinstance(slave, FmuSlave)]
         references = {v.name: v.reference for v in slaves[0].interface.variables.values()}
         calls = "fmi2SetReal", "fmi2DoStep", "fmi2GetReal", *FmuSlave.STATE[:3]
         self.functions = (ctypes.c_void_p * len(calls))(*(slaves[0].addresses(call)[0] for call in calls))
         self.fmus = (ctypes.c_void_p * ring.count)(*(slave.pointer for slave in slaves))
-        self.states = (ctypes.c_void_p * ring.count)()
+        self.states = (ctypes.c_void_p * (2 * ring.count))()
         self.references = ctypes.c_uint(references["u"]), ctypes.c_uint(references["x"])
-        self.iterate = ctypes.CDLL(str(compile_c(HERE / "iterations.c", self.workspace.folder / "i.so", "-lm"))).iterate
+        program = "adaptive" if "algorithm" in how else "iterations"
+        library = ctypes.CDLL(str(compile_c(HERE / f"{program}.c", self.workspace.folder / f"{program}.so", "-lm")))
+        self.iterate = library.adapt if "algorithm" in how else library.iterate
         self.iterate.restype = ctypes.c_size_t
-        self.now, self.guess, self.sweeps = np.array(ring.starts), np.zeros(ring.count), 0
+        self.now, self.guess, self.sweeps = np.array(ring.starts), np.zeros(3 * ring.count), 0
+        self.time, self.wanted, self.taken = ctypes.c_double(), ctypes.c_double(STEP), 0
 
     def run(self, steps: int) -> None:
         rows = np.empty((steps, len(self.now)))
@@ -108,6 +118,32 @@ class Bare(Ours):
     @property
     def values(self) -> list[float]:
         return list(self.now)
+
+
+class BareAdaptive(Bare):
+    """The C program of adaptive.c."""
+
+    def __init__(self, ring: Ring) -> None:
+        super().__init__(ring, **VARYING)
+
+    def run(self, steps: int) -> None:
+        """Take steps up to so many of the longest ones."""
+        self.done += steps
+        count = len(self.now)
+        rows, sweeps = np.empty((100 * steps, count)), ctypes.c_size_t()
+        index = {f"lag{k}": k for k in range(count)}
+        sequence = (ctypes.c_size_t * count)(*(index[name] for name in self.sequence))
+        now, room, into = (ctypes.c_void_p(array.ctypes.data) for array in (self.now, self.guess, rows))
+        self.taken += self.iterate(
+            *(self.fmus, self.functions, *self.references, ctypes.c_size_t(count), sequence),
+            *(
+                ctypes.byref(self.time),
+                ctypes.byref(self.wanted),
+                *map(ctypes.c_double, (self.done * STEP, 1e6, STEP)),
+            ),
+            *(ctypes.c_double(ERROR), now, self.states, room, into, ctypes.byref(sweeps)),
+        )
+        self.sweeps += sweeps.value
 
 
 def timed(one: Any, steps: int) -> float:
@@ -124,12 +160,16 @@ def main() -> None:
     path = Path(build(f"{HERE / 'lag.py'}:DrivenLag", {}, kind="native"))
     print("| N | sweeps per step | bare C program | railcosim | with Anderson's method | in Python |")
     print("| --- | --- | --- | --- | --- | --- |")
-    for count in options.count or [2, 8, 64, 256]:
+    counts = options.count or [2, 8, 64, 256]
+    for count in counts:
         row(Ring(path, count, 200_000 // count), options.repetitions)
+    print("\n| N | steps that were taken | bare C program | railcosim | in Python |\n| --- | --- | --- | --- | --- |")
+    for count in counts:
+        varying(Ring(path, count, 10_000 // count), options.repetitions)
 
 
 def row(ring: Ring, repetitions: int) -> None:
-    all_of = Bare(ring, "aitken"), Ours(ring, "aitken"), Ours(ring, "anderson"), InPython(ring, "aitken")
+    all_of = Bare(ring), Ours(ring), Ours(ring, acceleration="anderson"), InPython(ring)
     costs: list[list[float]] = [[] for _ in all_of]
     for _ in range(repetitions):
         for one, found in zip(all_of, costs, strict=True):
@@ -147,6 +187,27 @@ def row(ring: Ring, repetitions: int) -> None:
         ratio = statistics.median(a / b for a, b in zip(found, costs[0], strict=True)) * sweeps / own
         cells.append(f"{statistics.median(found) / own:.3g} ({ratio:.3g})")
     print(f"| {ring.count} | {sweeps:.3g} | " + " | ".join(cells) + " |", flush=True)
+
+
+def varying(ring: Ring, repetitions: int) -> None:
+    all_of = BareAdaptive(ring), Ours(ring, **VARYING), InPython(ring, **VARYING)
+    costs: list[list[float]] = [[] for _ in all_of]
+    for _ in range(repetitions):
+        for one, found in zip(all_of, costs, strict=True):
+            before = taken(one)
+            cost = timed(one, ring.steps if one is not all_of[2] else max(1, ring.steps // 50))
+            found.append(cost / (taken(one) - before) / ring.count * 1e6)
+    bare, ours = all_of[0], all_of[1]
+    assert bare.taken == taken(ours), (bare.taken, taken(ours))
+    assert np.allclose(bare.values, ours.values, rtol=1e-12)
+    ratios = [statistics.median(a / b for a, b in zip(found, costs[0], strict=True)) for found in costs]
+    cells = [f"{statistics.median(found):.3g} ({ratio:.3g})" for found, ratio in zip(costs, ratios, strict=True)]
+    print(f"| {ring.count} | {bare.taken} | " + " | ".join(cells) + " |", flush=True)
+
+
+def taken(one: Any) -> int:
+    """How many steps of varying length were taken."""
+    return one.taken if isinstance(one, BareAdaptive) else int(one.master.algorithm.report()["accepted"])
 
 
 if __name__ == "__main__":
