@@ -390,14 +390,13 @@ def test_the_command_and_a_run_of_what_it_wrote(tmp_path, capsys):
 
 
 @needs_compiler
-@pytest.mark.long
 @pytest.mark.parametrize(
     ("scenario", "preset", "stop"),
     [
-        ("fribourg_bern", None, 60.0),  # delays, a line as data
-        ("predictive_platoon", "no-plans", 62.0),  # an event, a radio with noise
-        ("cailc", "heavy", 30.0),  # trips and what is learned in them
-        ("fault_tolerant_eight", None, 5.0),  # arrays
+        pytest.param("cailc", "heavy", 30.0, marks=pytest.mark.long),  # trips and what is learned in them
+        pytest.param("fribourg_bern", None, 60.0, marks=pytest.mark.campaign),  # delays, a line as data
+        pytest.param("predictive_platoon", "no-plans", 62.0, marks=pytest.mark.campaign),  # an event, noise
+        pytest.param("fault_tolerant_eight", None, 5.0, marks=pytest.mark.campaign),  # arrays
     ],
 )
 def test_shipped_scenarios_come_back_to_the_bit(scenario, preset, stop, tmp_path):

@@ -122,6 +122,15 @@ def test_signal_dictionaries_are_one_signal_wherever_they_stand(read):
         read(system(component("g") + reference("r", "can", v="inout"), connection("g.y", "r.v")))
 
 
+def test_the_nearest_signal_dictionary_of_a_name_counts(read):
+    """Both systems have a bus: what the outer one carries does not reach the inner one's component."""
+    near = component("g") + component("t") + reference("r", "bus", v="inout")
+    inside = system(near, connection("g.y", "r.v") + connection("t.u", "r.v"), more=DICTIONARY, name="deep")
+    outside = component("g") + component("b") + reference("r", "bus", v="inout")
+    found = read(system(outside + inside, connection("g.y", "r.v") + connection("b.u", "r.v"), more=DICTIONARY))
+    assert wires(found) == {"b.u": ("g.y", None, 0.0), "deep_t.u": ("deep_g.y", None, 0.0)}
+
+
 def test_directions_that_follow_from_others(read):
     """Two dictionaries connected to each other: from the one that is fed to the other; or told where none is."""
     two = DICTIONARY.replace("</ssd:SignalDictionaries>", '<ssd:SignalDictionary name="can"/></ssd:SignalDictionaries>')

@@ -6,7 +6,7 @@ from railcosim.orchestrator.fmi import Unit
 from railcosim.orchestrator.ssp.transport import Way
 from railcosim.orchestrator.ssp.values import Transformation
 
-from .conftest import DESCRIPTION, component, connection, connectors, packed, system, wires
+from .conftest import DESCRIPTION, UNITS, component, connection, connectors, packed, system, wires
 
 LINEAR = '<ssc:LinearTransformation factor="2" offset="10"/>'
 PAIR = component("a") + component("b")
@@ -101,6 +101,16 @@ def test_transformations_that_do_not_go_together(read, first, second, said):
     inner = system(component("t"), connection("i", "t.n", second), connectors(i="input"), name="inner")
     with pytest.raises(ScenarioError, match=said):
         read(system(component("g") + inner, connection("g.m", "inner.i", first)))
+
+
+def test_units_with_an_offset(read):
+    """20 degC are 293.15 K; and doubled after the conversion, with 10 added: 596.3."""
+    kelvin = UNITS.replace("</ssd:Units>", '<ssc:Unit name="K"><ssc:BaseUnit K="1"/></ssc:Unit></ssd:Units>')
+    told = component("a", shown=connectors(y="output degC")) + component("b", shown=connectors(u="input K"))
+    for inside, expected in (("", 293.15), (LINEAR, 596.3)):
+        (made,) = read(system(told, connection("a.y", "b.u", inside)), after=kelvin).connections
+        assert made.convert is False
+        assert (made.scale or 1.0) * 20.0 + made.offset == pytest.approx(expected, rel=1e-15)
 
 
 def test_units_of_different_dimensions(read):

@@ -1,7 +1,10 @@
 """Parameter bindings: every clause of SSP 5.3.1 with the value that it gives by hand."""
 
+from pathlib import Path
+
 import pytest
 from railcosim.orchestrator import ScenarioError
+from railcosim.orchestrator.fmi import Workspace, load_fmu
 
 from .conftest import (
     DESCRIPTION,
@@ -42,6 +45,22 @@ def test_values_of_every_type(read):
     )
     found = starts(read, system(component("a", bindings(binding(given)))))
     assert found["a"] == {"k": 2.5, "top.v": pytest.approx(10.0), "n": 3, "on": True, "label": "3 + 4"}
+
+
+def test_an_item_of_an_enumeration_goes_by_its_name(read):
+    """SSP, Enumeration of SSV: which number that is, the FMU's own type says (here 5)."""
+    items = '<Enumeration><Item name="park" value="1"/><Item name="go" value="5"/></Enumeration>'
+    types = f'<TypeDefinitions><SimpleType name="G">{items}</SimpleType></TypeDefinitions>'
+    text = DESCRIPTION.replace("<DefaultE", f"{types}<DefaultE")
+    gear = '<ScalarVariable name="g" valueReference="7" causality="parameter" variability="fixed">'
+    text = text.replace("</ModelV", f'{gear}<Enumeration declaredType="G" start="1"/></ScalarVariable></ModelV')
+    given = parameters(("g", '<ssv:Enumeration value="go"/>'))
+    files = {"resources/gadget.fmu": packed({"modelDescription.xml": text})}
+    found = read(system(component("a", bindings(binding(given)))), files)
+    assert found.instances["a"].start == {"g": "go"}
+    with Workspace() as workspace:
+        interface = load_fmu(Path(found.instances["a"].model), workspace).interface
+    assert interface.variables["g"].choices == (("park", 1), ("go", 5))
 
 
 def test_arrays_of_values(read):
@@ -107,6 +126,21 @@ def test_units_are_converted_before_a_mapping_transforms(read, suppressed, arriv
     inline = f"<ssd:ParameterMapping>{table}</ssd:ParameterMapping>"
     found = starts(read, system(component("a", bindings(binding(given, inline)))))
     assert found["a"] == {"top.v": pytest.approx(arrives)}
+
+
+def test_a_mapping_of_truths_and_of_whole_numbers(read):
+    """By a table; what it does not name stays (SSP, IntegerMappingTransformation)."""
+    given = parameters(("t", '<ssv:Boolean value="true"/>'), ("w", '<ssv:Integer value="3"/>'))
+    truths = '<ssc:BooleanMappingTransformation><ssc:MapEntry source="true" target="false"/>'
+    numbers = '<ssc:IntegerMappingTransformation><ssc:MapEntry source="{}" target="30"/>'
+    for source, expected in ((3, 30), (4, 3)):
+        table = mapping(
+            ("t", "on", f"{truths}</ssc:BooleanMappingTransformation>", ""),
+            ("w", "n", f"{numbers.format(source)}</ssc:IntegerMappingTransformation>", ""),
+        )
+        inline = f"<ssd:ParameterMapping>{table}</ssd:ParameterMapping>"
+        found = starts(read, system(component("a", bindings(binding(given, inline)))))
+        assert found["a"] == {"on": False, "n": expected}
 
 
 def test_files_of_their_own(read):
