@@ -27,7 +27,7 @@ ORDER = (
     ("figures",),
     ("evaluation",),
     ("fmi",),
-    ("leftovers", "system"),
+    ("digests", "leftovers", "system"),
     ("errors",),
     ("bars", "markup", "problems"),
     ("names", "times"),

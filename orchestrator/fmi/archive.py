@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 import errno
-import hashlib
 import tempfile
 import zipfile
 from pathlib import Path
 from typing import NamedTuple
 
 from .. import world
+from ..digests import digest_of
 from ..errors import FmuFileError
 from ..leftovers import PREFIX, own, sweep
 from .members import extract, list_members
@@ -69,11 +69,7 @@ class Workspace:
             raise FmuFileError(
                 f"{path} is a folder, not an FMU file; zip what is in it, modelDescription.xml at the top"
             )
-        try:
-            with world.open(path, "rb") as stream:
-                digest = hashlib.file_digest(stream, "sha256").hexdigest()
-        except OSError as error:
-            raise FmuFileError(f"{path} cannot be read: {error.strerror or error}") from error
+        digest = digest_of(path, FmuFileError)
         if (digest, to_run) not in self._unpacked:
             target = self.folder / f"fmu{len(self._unpacked)}_{digest[:12]}"
             self._unpacked[digest, to_run] = target, _extract(path, target, to_run=to_run)

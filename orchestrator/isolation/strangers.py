@@ -6,12 +6,12 @@ What is known of a file is kept in the cache, by the digest of its content: whoe
 from __future__ import annotations
 
 import contextlib
-import hashlib
 from collections.abc import Iterable
 from pathlib import Path
 
 from ...fmus.build import cache_folder
 from .. import world
+from ..digests import digest_of
 from ..fmi import Model
 from ..system import System
 
@@ -38,7 +38,7 @@ def become_known(models: Iterable[Model]) -> None:
 def note_validation(path: Path, *, passed: bool) -> None:
     """Note what came out when an FMU file was validated: one that fails is a stranger until it passes."""
     with contextlib.suppress(OSError):
-        note = _note(_digest(path))
+        note = _note(digest_of(path, OSError))
         if not passed:
             _keep(note, _FAILED)
         elif note.is_file() and world.read_bytes(note) == _FAILED:
@@ -50,17 +50,12 @@ def _is_file(model: str) -> bool:
 
 
 def _is_strange(path: Path) -> bool:
-    digest = _digest(path)
+    digest = digest_of(path, OSError)
     note = _note(digest)
     if note.is_file():
         return world.read_bytes(note) != _HAS_RUN
     kept = world.glob(cache_folder(), "*/*.fmu.sha256")
     return not any(world.read_bytes(known).startswith(digest.encode()) for known in kept)
-
-
-def _digest(path: Path) -> str:
-    with world.open(path, "rb") as stream:
-        return hashlib.file_digest(stream, "sha256").hexdigest()
 
 
 def _note(digest: str) -> Path:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import hashlib
 import os
 import posixpath
 import zipfile
@@ -153,16 +152,3 @@ def list_variants(path: Path) -> list[str]:
         return [PurePosixPath(root).stem for root in Package(path, str(path), path.parent).roots]
     except ScenarioError:
         return []
-
-
-def digest_of(path: Path) -> str:
-    """SHA-256 of a file.
-
-    Raises:
-        ScenarioError: it cannot be read.
-    """
-    try:
-        with world.open(path, "rb") as stream:
-            return hashlib.file_digest(stream, "sha256").hexdigest()
-    except OSError as error:
-        raise ScenarioError(Problem(str(path), f"cannot be read: {error.strerror or error}")) from error

@@ -10,6 +10,7 @@ from pathlib import Path as FilePath
 from typing import final
 
 from ...fmus.build import cache_folder
+from ..digests import digest_of
 from ..errors import FmuFileError, ScenarioError
 from ..fmi import Interface, Workspace, load_fmu
 from ..names import SignalName
@@ -20,7 +21,7 @@ from .actions import Actions
 from .annotations import own_names, read_stepping, scenario_of, set_options, step_of
 from .documents import Document
 from .network import Hop, Network, Node, Path, own_unit
-from .package import DEFAULT, Package, digest_of
+from .package import DEFAULT, Package
 from .settings import Settings
 from .structure import Element, StructureReader
 from .transport import Way

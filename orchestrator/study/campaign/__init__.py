@@ -8,7 +8,7 @@ reads that, and `replay` runs a row of it again.
 from .columns import Entry
 from .dataset import Dataset, parts_of, rewrite
 from .flight import Point
-from .parcel import Parcel, digest_of, named_in, packed
+from .parcel import Parcel, named_in, packed
 from .pool import Pool, pool_for
 from .replay import Replayed, replay
 from .running import need_packages, run_study
@@ -22,7 +22,6 @@ __all__ = [
     "Pool",
     "Replayed",
     "Study",
-    "digest_of",
     "named_in",
     "need_packages",
     "packed",

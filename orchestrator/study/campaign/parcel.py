@@ -17,6 +17,7 @@ from railcosim import models
 
 from ....fmus.references import file_and_class, imports_of, names_data
 from ... import world
+from ...digests import digest_of
 from ...errors import ScenarioError, naming
 from ...fmi import is_fmu_name, packaged
 from ...scenario import parse_value
@@ -187,16 +188,3 @@ def named_in(value: Any, folder: str) -> Iterator[str]:
         if (code or is_fmu_name(value) or names_data(value)) and os.path.isfile(file):
             yield file
             yield from map(str, imports_of(Path(file)).files if code else ())
-
-
-def digest_of(path: Path) -> str:
-    """SHA-256 of a file.
-
-    Raises:
-        ScenarioError: it cannot be read.
-    """
-    try:
-        with world.open(path, "rb") as stream:
-            return hashlib.file_digest(stream, "sha256").hexdigest()
-    except OSError as error:
-        raise ScenarioError(f"{path} cannot be read: {error.strerror or error}") from error

@@ -12,12 +12,13 @@ from pathlib import Path
 from typing import Any
 
 from ... import world
+from ...digests import digest_of
 from ...errors import RailcosimError
 from ...fmi import Packaged, provide
 from ...leftovers import PREFIX, own, sweep
 from ..rows import Row
 from ..structure import Runner
-from .parcel import MODELS, Parcel, digest_of, moved, moved_options, this_machine, this_version
+from .parcel import MODELS, Parcel, moved, moved_options, this_machine, this_version
 
 _LOCK = threading.Lock()
 """FMUs of one process are called by one thread, however many a worker has."""

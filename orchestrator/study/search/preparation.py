@@ -13,6 +13,7 @@ from pathlib import Path
 from typing import Any
 
 from ... import world
+from ...digests import digest_of
 from ...errors import ScenarioError
 from ...evaluation import split_metric, value_name
 from ...fmi import Kind, Workspace
@@ -20,7 +21,7 @@ from ...problems import Problem, suggestion
 from ...run import Interruption, RunDirectory, check, execute
 from ...scenario import is_structural
 from ...system import System
-from ..campaign import Dataset, Parcel, Point, Pool, digest_of, named_in, need_packages, packed, pool_for, rewrite
+from ..campaign import Dataset, Parcel, Point, Pool, named_in, need_packages, packed, pool_for, rewrite
 from ..design import Dimension
 from ..rows import Row
 from ..structure import Runner
