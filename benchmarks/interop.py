@@ -11,41 +11,30 @@ printed.
 
 import argparse
 import functools
-import importlib.metadata
 import importlib.util
 import logging
 import shutil
 import subprocess
 import sys
 import tempfile
-from collections.abc import Callable, Iterator, Mapping, Set
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, get_args
 
-import numpy as np
+from others import fit, put, shared, version
 from railcosim.components import CATALOGUE
 from railcosim.fmus.build import build
 from railcosim.fmus.kinds import FmiVersion
 from railcosim.orchestrator import load
 
-TESTS = Path(__file__).parents[1] / "tests" / "interop"
 MARKS = ("<!-- interop: made by benchmarks/interop.py -->", "<!-- interop: end -->")
-SAME = 1e-9
-"""Largest deviation of a signal that fits, relative to its largest value where that is above one unit."""
 SCENARIOS = {
     "comfort": ("comfort_cruise", {}),
     "CAILC": ("cailc", {"stop_time": 420.0, "settings": ["simulation.record=0.01"]}),
     "fault-tolerant": ("fault_tolerant_cruise", {"stop_time": 60.0, "settings": ["simulation.record=0.01"]}),
 }
 """By the name in the table: a shipped scenario, and how much of it is run; of CAILC two trips and the next's begin."""
-
-
-@functools.cache
-def shared(name: str) -> Any:
-    """A file of the tests with other tools."""
-    sys.path.insert(0, str(TESTS))
-    return importlib.import_module(name)
 
 
 @dataclass(frozen=True)
@@ -62,7 +51,7 @@ class Tool:
 
 def _libcosim(scene: Any, _: Path) -> Mapping[str, Any]:
     module = shared("test_libcosim")
-    return module.series(module.executed(scene), scene)
+    return module.series(module.executed(scene))
 
 
 def _container(scene: Any, folder: Path, *, sequential: bool) -> Mapping[str, Any]:
@@ -93,65 +82,6 @@ TOOLS = (
     Tool("PyFMI, initialization by blocks", "pyfmi", "jacobi",
          lambda scene, folder: shared("test_pyfmi").simulate(scene, folder), "hands outputs on after all have stepped"),
 )  # fmt: skip
-
-
-@dataclass(frozen=True)
-class Fit:
-    """How a tool's signals fit ours: how many do as they stand, one point early, and not; the largest deviation.
-
-    ``mixed`` are those that fit neither and depend on states and inputs directly: read after the inputs were set, they
-    are of the states of this point and the inputs of the next, a row that none of ours is.
-    """
-
-    plain: int
-    early: int
-    mixed: int
-    off: Mapping[str, float]
-    largest: float
-
-    def __str__(self) -> str:
-        parts = [f"{self.largest:.0e}", f"{self.plain + self.early} signals"]
-        parts += [f"{self.early} of them early"] if self.early else []
-        parts += [f"{self.mixed} more mixed"] if self.mixed else []
-        if self.off:
-            worst = max(self.off, key=self.off.__getitem__)
-            parts += [f"**{len(self.off)} more depart**, `{worst}` most: {self.off[worst]:.0e}"]
-        return ", ".join(parts)
-
-
-def fit(ours: Mapping[str, Any], found: Mapping[str, Any], direct: Set[str] = frozenset()) -> Fit:
-    """Compare a tool's signals with ours.
-
-    Args:
-        ours: signals by name, shape (points,).
-        found: those of the tool, by the same names.
-        direct: the signals that depend directly on an input and on a state that moves on with the point.
-    """
-    plain, early, mixed, largest = 0, 0, 0, 0.0
-    off = {}
-    for name, values in found.items():
-        own, got = (np.asarray(each, dtype=float) for each in (ours[name], values))
-        if own.shape != got.shape:
-            raise ValueError(f"{name}: {len(got)} points, not {len(own)}")
-        stands, ahead = _deviation(own, got), _deviation(own[1:], got[:-1])
-        if min(stands, ahead) > SAME:
-            mixed += name in direct
-            if name not in direct:
-                off[name] = stands
-        elif stands <= SAME:
-            plain, largest = plain + 1, max(largest, stands)
-        else:
-            early, largest = early + 1, max(largest, ahead)
-    return Fit(plain, early, mixed, off, largest)
-
-
-def _deviation(own: Any, got: Any) -> float:
-    return float(np.max(np.abs(got - own))) / max(1.0, float(np.max(np.abs(own))))
-
-
-def version(package: str) -> str:
-    """Of an installed distribution."""
-    return importlib.metadata.version(package.replace("_", "-"))
 
 
 def matrix(tools: tuple[Tool, ...] = TOOLS, scenarios: Mapping[str, Any] = SCENARIOS) -> Iterator[str]:
@@ -258,28 +188,12 @@ def checked(components: list[str]) -> Iterator[str]:
         yield f"| {len(files)} components, {form} | {' | '.join(cells)} |"
 
 
-def written(page: str, tables: str) -> str:
-    """The page with the tables between its markers.
-
-    Raises:
-        ValueError: it has no markers.
-    """
-    before, begin, rest = page.partition(MARKS[0])
-    _, end, after = rest.partition(MARKS[1])
-    if not (begin and end):
-        raise ValueError(f"the page has no {MARKS[0]} or no {MARKS[1]}")
-    return f"{before}{begin}\n\n{tables}\n\n{end}{after}"
-
-
 def main() -> int:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("page", nargs="?", type=Path, help="a Markdown file with the markers")
     options = parser.parse_args()
     tables = "\n".join([*matrix(), "", *checked(sorted(CATALOGUE))])
-    if options.page is None:
-        print(tables)
-    else:
-        options.page.write_text(written(options.page.read_text(encoding="utf-8"), tables), encoding="utf-8")
+    put(options.page, tables, MARKS)
     return 0
 
 

@@ -6,6 +6,7 @@
 import functools
 import importlib
 import os
+import sys
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -18,6 +19,7 @@ from railcosim.orchestrator.fmi.archive import Workspace
 from railcosim.orchestrator.fmi.interface import Interface, Variable
 from railcosim.orchestrator.run.checking import check
 
+BENCHMARKS = Path(__file__).parents[2] / "benchmarks"
 TOOLS = ("fmpy", "libcosimpy", "ecospy", "fmu_manipulation_toolbox", "OMSimulator", "pyfmi")
 LEAST_IN_CI = 4
 SAME = 1e-9
@@ -159,6 +161,20 @@ def make_scene(system, algorithms):
     )
     results = {algorithm: {name: result[name] for name in result.names()} for algorithm, result in ours.items()}
     return Scene(parts, links, checked.order.sequence, system.stepping.step, system.stepping.stop_time, results)
+
+
+@pytest.fixture(scope="session")
+def benchmark():
+    """Give a program of `benchmarks` by its name, or skip the test."""
+    if not BENCHMARKS.is_dir():
+        pytest.skip("the benchmarks are not here")
+    before = set(sys.modules)
+    with pytest.MonkeyPatch.context() as patch:
+        patch.syspath_prepend(str(BENCHMARKS))
+        yield importlib.import_module
+    for name in set(sys.modules) - before:
+        if str(getattr(sys.modules[name], "__file__", "")).startswith(str(BENCHMARKS)):
+            sys.modules.pop(name)
 
 
 @pytest.fixture(scope="session", name="make_scene")

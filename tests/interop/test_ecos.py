@@ -42,26 +42,24 @@ class Simulation:
         if csv_file:
             self.engine.add_csv_writer(str(csv_file))
         assert self.engine.init(parameter_set="start")
-        names = [f"{n}.{v.name}" for n, part in scene.parts.items() for v in part.outputs if v.type == "Real"]
-        self.signals = {name: [] for name in names}
-        self.record()
 
-    def record(self):
-        for name, values in self.signals.items():
-            values.append(self.engine.get_real(name.replace(".", "::", 1)))
 
-    def run(self, steps):
-        for _ in range(steps):
-            self.engine.step(1)
-            self.record()
-        self.engine.terminate()
+def recorded(engine, names, steps):
+    """Real signals of an initialized simulation by their names: at its first point, and after each step."""
+    signals = {name: [] for name in names}
+    for k in range(steps + 1):
+        if k:
+            engine.step(1)
+        for name, values in signals.items():
+            values.append(engine.get_real(name.replace(".", "::", 1)))
+    engine.terminate()
+    return signals
 
 
 def simulate(scene):
     """Every Real output, by its name."""
-    simulation = Simulation(scene)
-    simulation.run(scene.points - 1)
-    return simulation.signals
+    names = [f"{n}.{v.name}" for n, part in scene.parts.items() for v in part.outputs if v.type == "Real"]
+    return recorded(Simulation(scene).engine, names, scene.points - 1)
 
 
 @pytest.fixture(scope="module")
@@ -92,13 +90,13 @@ def test_a_feed_through_output_is_reported_one_point_earlier(signals, scene):
 def test_known_defect_its_csv_keeps_six_decimals(scene, need, tmp_path):
     """ecos 0.7.2 writes 0.000776 for a coefficient of 0.00077616. Remedy: read values with `get_real`."""
     need("ecospy")
-    simulation = Simulation(scene, tmp_path / "results.csv")
-    simulation.run(1)
+    engine = Simulation(scene, tmp_path / "results.csv").engine
+    recorded(engine, [], 1)
     with (tmp_path / "results.csv").open() as file:
         names, row, *_ = csv.reader(file)
     column = next(k for k, name in enumerate(names) if "train[1]::c1" in name)
     assert float(row[column]) == 0.000776
-    assert simulation.engine.get_real("train[1]::c1") == 0.00077616
+    assert engine.get_real("train[1]::c1") == 0.00077616
 
 
 SCENARIO = """<?xml version="1.0" encoding="UTF-8"?>

@@ -44,9 +44,15 @@ def package(scene, folder, *, sequential, prefix="out."):
     return folder / "platoon.fmu"
 
 
-def simulate(scene, path):
-    result = fmpy.simulate_fmu(str(path), stop_time=scene.stop_time, step_size=scene.step, output_interval=scene.step)
+def played(path, step, stop, start=0.0):
+    """Every output of a container, which is called `out.` and its name there, by its name."""
+    times = {"start_time": start, "stop_time": stop, "step_size": step, "output_interval": step}
+    result = fmpy.simulate_fmu(str(path), **times)
     return {name.removeprefix("out."): result[name] for name in result.dtype.names if name != "time"}
+
+
+def simulate(scene, path):
+    return played(path, scene.step, scene.stop_time)
 
 
 @pytest.mark.parametrize("algorithm", ["jacobi", "gauss-seidel"])

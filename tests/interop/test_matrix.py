@@ -1,27 +1,23 @@
 """The matrix of tools over scenarios, benchmarks/interop.py: what counts as the same, and what a missing tool is."""
 
-import importlib
-import sys
 import zipfile
-from pathlib import Path
 
 import numpy as np
 import pytest
 from railcosim.fmus.build import build
 
-BENCHMARKS = Path(__file__).parents[2] / "benchmarks"
-pytestmark = pytest.mark.skipif(not BENCHMARKS.is_dir(), reason="the benchmarks are not here")
+
+@pytest.fixture(scope="module")
+def interop(benchmark):
+    return benchmark("interop")
 
 
 @pytest.fixture(scope="module")
-def interop():
-    with pytest.MonkeyPatch.context() as patch:
-        patch.syspath_prepend(str(BENCHMARKS))
-        yield importlib.import_module("interop")
-    sys.modules.pop("interop")
+def others(benchmark):
+    return benchmark("others")
 
 
-def test_signals_are_the_same_early_mixed_or_depart(interop):
+def test_signals_are_the_same_early_mixed_or_depart(others):
     ours = np.array([0.0, 100.0, 300.0, 200.0])
     shown = {
         "same": ours + 1e-10,
@@ -29,12 +25,12 @@ def test_signals_are_the_same_early_mixed_or_depart(interop):
         "train.acceleration": ours + 1.0,
         "off": ours + 3.0,
     }
-    found = interop.fit(dict.fromkeys(shown, ours), shown, {"train.acceleration"})
+    found = others.fit(dict.fromkeys(shown, ours), shown, {"train.acceleration"})
     assert (found.plain, found.early, found.mixed) == (1, 1, 1)
     assert found.off == {"off": pytest.approx(0.01)}
     assert str(found) == "3e-13, 2 signals, 1 of them early, 1 more mixed, **1 more depart**, `off` most: 1e-02"
     with pytest.raises(ValueError, match="same: 3 points, not 4"):
-        interop.fit({"same": ours}, {"same": ours[:3]})
+        others.fit({"same": ours}, {"same": ours[:3]})
 
 
 def test_a_tool_that_is_not_installed_has_its_row(interop):
@@ -42,15 +38,14 @@ def test_a_tool_that_is_not_installed_has_its_row(interop):
     assert list(interop.matrix((tool,), {}))[2:] == ["| Elsewhere | not installed here | | |"]
 
 
-def test_the_tables_stand_between_the_marks(interop):
-    page = "\n".join(["before", *interop.MARKS, "after"])
-    assert (
-        interop.written(page, "| new |")
-        == "\n\n".join(["before\n" + interop.MARKS[0], "| new |", interop.MARKS[1]]) + "\nafter"
-    )
-    assert interop.written(interop.written(page, "| old |"), "| new |") == interop.written(page, "| new |")
-    with pytest.raises(ValueError, match="no <!-- interop"):
-        interop.written("a page", "| new |")
+def test_the_tables_stand_between_the_marks(others):
+    marks = "<!-- tables -->", "<!-- end -->"
+    page = "\n".join(["before", *marks, "after"])
+    assert others.written(page, "| new |", marks) == f"before\n{marks[0]}\n\n| new |\n\n{marks[1]}\nafter"
+    old = others.written(page, "| old |", marks)
+    assert others.written(old, "| new |", marks) == others.written(page, "| new |", marks)
+    with pytest.raises(ValueError, match="no <!-- tables"):
+        others.written("a page", "| new |", marks)
 
 
 @pytest.mark.long
