@@ -10,8 +10,9 @@ PackagingKind = Literal["auto", "native", "python"]
 """What a user asks for where an FMU is to be made: ``"auto"`` is native where that is possible."""
 Kind = Literal["auto", "native", "python", "plain"]
 """What a user asks for where a system is to run: ``"plain"`` is Python objects without packaging."""
-Profile = Literal["standard", "real-time"]
-"""What a native FMU's C may do: ``"real-time"`` is no file, no memory taken after instantiation, no printf."""
+Profile = Literal["standard", "real-time", "model-exchange"]
+"""What a native FMU's C may and can do: ``"real-time"`` is no file, no memory taken after instantiation, no printf;
+``"model-exchange"`` can be integrated by others as well."""
 FmiVersion = Literal["2", "3"]
 """The version of FMI that an FMU is written in: 2.0 or 3.0."""
 ModelKind = Literal["fmu", "native", "python", "plain"]

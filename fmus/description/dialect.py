@@ -12,6 +12,13 @@ from ..variables import ScalarVariable
 from .structure import Rate, Unknowns
 
 
+class ModelExchange(NamedTuple):
+    """What is said of model exchange: how many event indicators there are, and the states that samples put back."""
+
+    indicators: int
+    reinitialised: tuple[str, ...]
+
+
 class Described(NamedTuple):
     """What every version says of a component, each in its way.
 
@@ -21,6 +28,7 @@ class Described(NamedTuple):
         rates: those after them.
         unknowns: of the model structure (`structure.unknowns`).
         annotation: our own.
+        exchange: where the FMU is for model exchange as well.
     """
 
     component: Component
@@ -28,6 +36,7 @@ class Described(NamedTuple):
     rates: tuple[Rate, ...]
     unknowns: Mapping[str, Unknowns]
     annotation: Annotation
+    exchange: ModelExchange | None = None
 
 
 class Dialect(ABC):
@@ -49,7 +58,7 @@ class Dialect(ABC):
 
     @abstractmethod
     def complete(self, capabilities: Any, *, native: bool, interpolates: bool) -> None:
-        """Add to the element ``CoSimulation`` what this version alone knows."""
+        """Add to the element ``CoSimulation``, or ``ModelExchange``, what this version alone knows."""
 
     @abstractmethod
     def write_model(self, root: Any, model: Described) -> None:

@@ -9,7 +9,7 @@ from lxml import etree
 from ...components.component import Component
 from ..annotation import write as write_annotation
 from ..variables import ScalarVariable
-from .dialect import Described, Dialect
+from .dialect import Described, Dialect, ModelExchange
 from .structure import Rate, initial_kind
 from .text import attributes, of_type, start_of
 
@@ -38,7 +38,7 @@ class Fmi2(Dialect):
         write_annotation(model.annotation, root, "2")
         block = etree.SubElement(root, "ModelVariables")
         for variable in model.variables:
-            _write_variable(block, variable, model.component)
+            _write_variable(block, variable, model.component, model.exchange)
         for rate in model.rates:
             _write_rate(block, rate)
         index = {variable.name: str(variable.reference + 1) for variable in model.variables}
@@ -52,13 +52,19 @@ class Fmi2(Dialect):
                     entry.set("dependencies", " ".join(sorted((index[n] for n in sources), key=int)))
 
 
-def _write_variable(block: Any, variable: ScalarVariable, component: Component) -> None:
+def _write_variable(
+    block: Any, variable: ScalarVariable, component: Component, exchange: ModelExchange | None
+) -> None:
     initial = initial_kind(variable)
     named = {"name": variable.name, "valueReference": str(variable.reference)}
     element = etree.SubElement(block, "ScalarVariable", **named, **attributes(variable, initial))
     value = etree.SubElement(element, _ELEMENT[variable.slot.type], **of_type(variable))
     if initial != "calculated":
         value.set("start", start_of(variable, component))
+    if exchange and variable.is_kept:
+        stands = getattr(variable.slot.declaration, "standstill", False)
+        if stands or variable.name in exchange.reinitialised:
+            value.set("reinit", "true")
 
 
 def _write_rate(block: Any, rate: Rate) -> None:

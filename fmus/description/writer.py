@@ -17,7 +17,7 @@ from ..kinds import NOTE_OF_KIND, FmiVersion, FmuKind, Profile
 from ..references import summary
 from ..units import BASE, parse
 from ..variables import scalar_variables
-from .dialect import Described, Dialect
+from .dialect import Described, Dialect, ModelExchange
 from .fmi2 import Fmi2
 from .fmi3 import Fmi3
 from .structure import rates_of, structure, unknowns
@@ -25,6 +25,8 @@ from .text import arguments, number
 
 _DIALECTS: dict[FmiVersion, Dialect] = {"2": Fmi2(), "3": Fmi3()}
 _PROJECT = __name__.partition(".")[0]
+_STEPS = {"ModelExchange": "completedIntegratorStepNotNeeded", "CoSimulation": "canHandleVariableCommunicationStepSize"}
+"""What is said of steps."""
 _LOG_CATEGORIES = {
     "logAll": "all of these",
     "logStatusError": "what went wrong; always sent",
@@ -34,7 +36,12 @@ _LOG_CATEGORIES = {
 
 
 def write(
-    component: Component, kind: FmuKind, digest: str, profile: Profile = "standard", fmi: FmiVersion = "2"
+    component: Component,
+    kind: FmuKind,
+    digest: str,
+    profile: Profile = "standard",
+    fmi: FmiVersion = "2",
+    exchange: ModelExchange | None = None,
 ) -> bytes:
     """The model description of a component's FMU.
 
@@ -44,6 +51,7 @@ def write(
         digest: hash of everything in the FMU; it becomes the GUID, or the instantiation token.
         profile: of a native FMU; a real-time one saves no states.
         fmi: the version of FMI; only native FMUs are written in 3.0.
+        exchange: of FMI 2.0, where the FMU is for model exchange as well.
 
     Raises:
         ComponentError: a name that FMI does not allow, build arguments that are not JSON, or equations that cannot be
@@ -68,19 +76,21 @@ def write(
     )
     if not root.get("license"):
         del root.attrib["license"]
-    native, saves = kind == "native", "true" if profile == "standard" else "false"
-    capabilities = etree.SubElement(
-        root,
-        "CoSimulation",
-        modelIdentifier=cls.__name__,
-        needsExecutionTool="false" if native else "true",
-        canHandleVariableCommunicationStepSize="true",
-        **{f"canGetAndSetFMU{dialect.states}": saves, f"canSerializeFMU{dialect.states}": saves},
-    )
-    if native:
-        capabilities.set(dialect.derivatives, "true")
+    native, saves = kind == "native", "false" if profile == "real-time" else "true"
     moves = any(v.causality == "input" and v.slot.type is float for v in variables)
-    dialect.complete(capabilities, native=native, interpolates=native and moves)
+    if exchange:
+        root.set("numberOfEventIndicators", str(exchange.indicators))
+    for part in ("ModelExchange", "CoSimulation") if exchange else ("CoSimulation",):
+        simulates = part == "CoSimulation"
+        capabilities = etree.SubElement(
+            root, part, modelIdentifier=cls.__name__, needsExecutionTool="false" if native else "true"
+        )
+        capabilities.set(_STEPS[part], "true")
+        for can in ("canGetAndSetFMU", "canSerializeFMU"):
+            capabilities.set(f"{can}{dialect.states}", saves)
+        if native:
+            capabilities.set(dialect.derivatives, "true")
+        dialect.complete(capabilities, native=native, interpolates=native and moves and simulates)
     rates = rates_of(variables) if native else ()
     units = {v.slot.unit for v in variables if v.slot.type is float} | {rate.unit for rate in rates}
     _write_units(root, units | dialect.units)
@@ -90,7 +100,8 @@ def write(
             etree.SubElement(categories, "Category", name=name, description=description)
     etree.SubElement(root, "DefaultExperiment", startTime="0", stepSize=number(default_step(component)))
     annotation = _annotation(component, kind, digest, depends.used)
-    dialect.write_model(root, Described(component, variables, rates, unknowns(variables, rates, depends), annotation))
+    told = unknowns(variables, rates, depends)
+    dialect.write_model(root, Described(component, variables, rates, told, annotation, exchange))
     text: bytes = etree.tostring(root, xml_declaration=True, encoding="UTF-8", pretty_print=True)
     return text
 

@@ -19,8 +19,8 @@ from .ccode import Call, number
 
 KNOWN: dict[str, Call] = {}
 """How the functions that were made are written, by their names, which follow from what they hold."""
-_TABLES: dict[str, list[NDArray[np.float64]]] = {}
-"""The tables they read, by the same names."""
+TABLES: dict[str, list[NDArray[np.float64]]] = {}
+"""The tables they read, by the same names: where the cells begin along each axis, then the constants."""
 _MADE: dict[str, Any] = {}
 """CasADi's functions, by the same names."""
 _NAME = re.compile(r"\b(?:cells|product)_[0-9a-f]{16}")
@@ -108,7 +108,7 @@ def product(matrix: NDArray[np.float64], vector: Sequence[Any]) -> list[Any]:
 def tables(code: str) -> Iterator[str]:
     """The tables that C reads."""
     for name in sorted(set(_NAME.findall(code))):
-        for k, array in enumerate(_TABLES[name]):
+        for k, array in enumerate(TABLES[name]):
             entries = "".join(f"    {number(x)},\n" for x in array.flat)
             yield f"static const double {name}_{k}[] = {{\n{entries}}};\n"
 
@@ -118,7 +118,7 @@ def _named(kind: str, arrays: list[NDArray[np.float64]]) -> str:
     for array in arrays:
         digest.update(array.tobytes())
     name = f"{kind}_{digest.hexdigest()[:16]}"
-    _TABLES[name] = arrays
+    TABLES[name] = arrays
     return name
 
 

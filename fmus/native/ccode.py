@@ -135,6 +135,11 @@ def function(
     return [*called, _definition(f"{kept_in_place} void {name}", names, [*unused, *lines])]
 
 
+def called_in(compiled: Any) -> list[str]:
+    """The names of the functions that a CasADi function calls, one for each call, in order."""
+    return _CALL.findall(compiled.str(True))
+
+
 def _called(compiled: Any, name: str, known: Mapping[str, Call]) -> tuple[str, list[str]]:
     """The name in C of a function that is called, and what defines it: its arguments stand in one array."""
     firsts = [0]
@@ -164,7 +169,7 @@ def _body(
     unknown = [each for each in compiled.get_function() if each not in known]
     called = {each: _called(compiled.get_function(each), name, known) for each in unknown}
     written = {**known, **{each: _Defined(defined) for each, (defined, _) in called.items()}}
-    calls = iter([written[each] for each in _CALL.findall(compiled.str(True))])
+    calls = iter([written[each] for each in called_in(compiled)])
     steps = _steps(compiled, value, calls)
     inside: dict[Path, list[int]] = {}
     wanted = _wanted(steps)

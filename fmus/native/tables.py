@@ -12,9 +12,11 @@ from ...components.component import Component
 from ...components.declarations import Input, Output, Parameter, State, Tape
 from ...components.errors import ComponentError
 from ...components.tracing import feedthrough, start_name
+from ..description import default_step
 from ..kinds import FmiVersion, Profile
 from ..variables import ScalarVariable, scalar_variables
 from .ccode import number
+from .relations import Exchange
 from .trace import Traced
 
 _TYPES = {float: "TYPE_REAL", int: "TYPE_INTEGER", bool: "TYPE_BOOLEAN", str: "TYPE_STRING"}
@@ -29,12 +31,18 @@ _RUNTIME_VARIABLES = (
     "trip_time",
 )
 _EQUATIONS = ("outputs", "derivatives", "initial", "update", "keep", "directional", "initial_directional")
+_FROZEN = ("frozen_outputs", "frozen_derivatives", "relations")
 _MAX_TEXT = 1024
 """Bytes of a text with its end, as in ``instance.h``."""
 
 
 def model_header(
-    component: Component, traced: Traced, guid: str, profile: Profile = "standard", fmi: FmiVersion = "2"
+    component: Component,
+    traced: Traced,
+    guid: str,
+    profile: Profile = "standard",
+    fmi: FmiVersion = "2",
+    exchange: Exchange | None = None,
 ) -> str:
     """``model.h`` of a component.
 
@@ -44,6 +52,7 @@ def model_header(
         guid: as the model description has it.
         profile: what the runtime may do.
         fmi: in 3.0 the value reference of an array's first element means all of it.
+        exchange: what model exchange adds, where the FMU is for that as well.
     """
     name = type(component).__name__
     variables = scalar_variables(component)
@@ -86,6 +95,7 @@ def model_header(
         "IS_SAMPLED": int(component.is_sampled),
         "HAS_HELD": int(any(held)),
         "REAL_TIME": int(profile == "real-time"),
+        "MODEL_EXCHANGE": int(exchange is not None),
         **{word.upper(): references.get(word, 0) for word in _RUNTIME_VARIABLES},
     }
     tape_start = [float(x) for slot in component.of(Tape) for x in np.ravel(component.present_values[slot.name])]
@@ -106,7 +116,16 @@ def model_header(
         _array("const bool model_held", ["true" if flag else "false" for flag in held], "false"),
         _array("const double model_tape_start", [number(x) for x in tape_start], "0.0"),
     ]
-    return "\n".join(parts)
+    return "\n".join([*parts, *([] if exchange is None else _exchange(component, name, exchange))])
+
+
+def _exchange(component: Component, name: str, exchange: Exchange) -> Iterable[str]:
+    """The tables of model exchange. A sample that is taken once per communication step has a period there."""
+    yield f"#define N_MODES {len(exchange.modes)}\n#define N_INDICATORS {exchange.indicators(component)}"
+    yield f"#define MODEL_STEP {number(default_step(component))}"
+    yield "".join(f"#define MODEL_{f.upper()} {name}_{f}\n" for f in _FROZEN)
+    yield _array("const Mode model_modes", [f"MODE_{mode.kind}" for mode in exchange.modes], "MODE_LESS")
+    yield _array("const bool model_indicated", ["true" if mode.indicated else "false" for mode in exchange.modes], "false")
 
 
 def _tape_room(component: Component) -> dict[str, int]:

@@ -48,6 +48,9 @@ enum { MAX_TEXT = 1024, MAX_MESSAGE = 1024 };
 /* The highest derivative of an input that is taken: a polynomial of this degree is what Runge-Kutta integrates exactly. */
 enum { MAX_ORDER = 3 };
 
+/* What a choice in the equations is that model exchange keeps between events (exchange.c). */
+typedef enum { MODE_LESS, MODE_NOT_ABOVE, MODE_BEFORE, MODE_AFTER, MODE_PIECE, MODE_TIME_PIECE } Mode;
+
 /* One method's equations: `clock` is the time and the length of the sample. */
 typedef void Equations(const double *clock, const double *values, double *result);
 
@@ -92,6 +95,9 @@ typedef enum {
     PHASE_ERROR = 16
 } Phase;
 
+/* Of an instance for model exchange that is running: an event, or integration by somebody else. */
+typedef enum { REGIME_EVENT = 1, REGIME_CONTINUOUS = 2 } Regime;
+
 /* The tape: two buffers of `rows` times N_TAPE numbers, and a line to filter one column in; allocated together when the
    initial state is prepared, or for hard real time in the instance. */
 typedef struct {
@@ -131,6 +137,13 @@ typedef struct {
     double base[N_BASE];                  /* the values there */
     double scratch[AT_LEAST_ONE(N_SCRATCH)];
     double direction[N_VALUES]; /* of a directional derivative */
+#if MODEL_EXCHANGE
+    bool exchanges; /* for model exchange, not for co-simulation */
+    Regime regime;
+    double modes[AT_LEAST_ONE(N_MODES)];
+    double relations[AT_LEAST_ONE(2 * N_MODES)]; /* what the modes follow from */
+    int sides[AT_LEAST_ONE(N_STANDSTILL)];       /* on which side of its standstill a state is */
+#endif
     double slopes[4][AT_LEAST_ONE(N_STATES)];
     double states[AT_LEAST_ONE(N_STATES)];
     char texts[AT_LEAST_ONE(N_TEXTS)][MAX_TEXT];

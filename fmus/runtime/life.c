@@ -181,6 +181,11 @@ static Status exit_initialization(void *c, const char *call)
     }
     s->phase = PHASE_RUNNING;
     s->fresh = false;
+#if MODEL_EXCHANGE
+    if (s->exchanges) {
+        begin_exchange(s);
+    }
+#endif
     tell_event(s, "initialized");
     return STATUS_OK;
 }
@@ -220,6 +225,11 @@ static Status do_step(void *c, double point, double h, const char *call)
     if (s == NULL) {
         return STATUS_ERROR;
     }
+#if MODEL_EXCHANGE
+    if (s->exchanges) {
+        return fail(s, "%s: this instance is for model exchange", call);
+    }
+#endif
     /* A communication point is told with a few roundings; the last step of a time that was summed up may end far more
        of them past the stop time. */
     double reached = s->last_successful_time, rounding = 1e-6 * h + 4.0 * DBL_EPSILON * fabs(reached);

@@ -166,6 +166,21 @@ static Status integrate(Instance *s, double begin, double elapsed, double length
 }
 #endif
 
+#if MODEL_EXCHANGE
+static Status evaluate_frozen(Instance *s);
+#endif
+
+/* Outputs at the present values. */
+static Status evaluate_now(Instance *s)
+{
+#if MODEL_EXCHANGE
+    if (s->exchanges && s->phase != PHASE_INITIALIZATION) {
+        return evaluate_frozen(s);
+    }
+#endif
+    return evaluate(s, 0.0, false);
+}
+
 /* Outputs as the present inputs make them; after an error the values stay as they are, to be looked at. */
 static Status refresh(Instance *s)
 {
@@ -175,7 +190,7 @@ static Status refresh(Instance *s)
     if (s->phase == PHASE_INITIALIZATION && prepare(s) != STATUS_OK) {
         return STATUS_ERROR;
     }
-    if (!s->fresh && evaluate(s, 0.0, false) != STATUS_OK) {
+    if (!s->fresh && evaluate_now(s) != STATUS_OK) {
         return STATUS_ERROR;
     }
     s->fresh = true;

@@ -80,6 +80,11 @@ typedef struct {
     double taken;
     double reached;
     double base_time;
+#if MODEL_EXCHANGE
+    Regime regime;
+    double modes[AT_LEAST_ONE(N_MODES)];
+    int sides[AT_LEAST_ONE(N_STANDSTILL)];
+#endif
     double values[N_VALUES];
     double held[AT_LEAST_ONE(N_OUTPUTS)];
     double base[N_BASE];
@@ -128,6 +133,11 @@ static void save_state(const Instance *s, State *state)
     state->tape_trip = s->tape.trip;
     state->tape_first = s->tape.first;
     state->tape_last = s->tape.last;
+#if MODEL_EXCHANGE
+    state->regime = s->regime;
+    memcpy(state->modes, s->modes, sizeof state->modes);
+    memcpy(state->sides, s->sides, sizeof state->sides);
+#endif
     memcpy(state->values, s->values, sizeof state->values);
     memcpy(state->held, s->held, sizeof state->held);
     if (s->based) {
@@ -145,6 +155,11 @@ static Status restore_state(Instance *s, const State *state)
     if (!is_ours(&state->head, state->head.size)) {
         return fail(s, "the saved state belongs to another model");
     }
+#if MODEL_EXCHANGE
+    s->regime = state->regime;
+    memcpy(s->modes, state->modes, sizeof s->modes);
+    memcpy(s->sides, state->sides, sizeof s->sides);
+#endif
     memcpy(s->values, state->values, sizeof s->values);
     memcpy(s->held, state->held, sizeof s->held);
     memcpy(s->base, state->base, sizeof s->base);

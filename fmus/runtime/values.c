@@ -28,11 +28,24 @@ static bool is_rate(Reference reference, Type type)
            elements(FIRST_STATE + (reference - N_VARIABLES)) > 0;
 }
 
+#if N_STATES > 0
+static void find_rates(Instance *s, double *result)
+{
+#if MODEL_EXCHANGE
+    if (s->exchanges && s->phase != PHASE_INITIALIZATION) {
+        frozen_rates(s, result);
+        return;
+    }
+#endif
+    call_equations(s, MODEL_DERIVATIVES, result);
+}
+#endif
+
 /* The rates of the states into the scratch space, from which rates are read. */
 static Status rates(Instance *s)
 {
 #if N_STATES > 0
-    call_equations(s, MODEL_DERIVATIVES, s->slopes[0]);
+    find_rates(s, s->slopes[0]);
 #endif
     for (int n = 0; n < N_STATES; n++) {
         if (!isfinite(s->slopes[0][n])) {
@@ -168,6 +181,13 @@ static const Variable *settable(Instance *s, Reference reference, Type type, con
         fail(s, "%s: %s is a fixed parameter; it can only be set before the run begins", call, variable->name);
         return NULL;
     }
+#if MODEL_EXCHANGE
+    bool moves = variable->role == ROLE_INPUT && type == TYPE_REAL;
+    if (s->exchanges && s->phase == PHASE_RUNNING && s->regime == REGIME_CONTINUOUS && !moves) {
+        fail(s, "%s: %s is set at events only; enter event mode", call, variable->name);
+        return NULL;
+    }
+#endif
     return variable;
 }
 

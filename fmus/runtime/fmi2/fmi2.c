@@ -1,4 +1,4 @@
-/* The functions of FMI 2.0 for co-simulation, by those of the runtime. */
+/* The functions of FMI 2.0 for co-simulation, and those that model exchange shares with it, by those of the runtime. */
 
 /* The importer reads a message as a printf format, and #r12# in it as a reference to a variable: double both signs.
    There is room for twice the longest message. */
@@ -47,11 +47,19 @@ fmi2Component fmi2Instantiate(fmi2String instanceName, fmi2Type fmuType, fmi2Str
         listener.log = functions->logger;
         listener.environment = functions->componentEnvironment;
     }
+#if MODEL_EXCHANGE
+    Instance *s = create(listener, instanceName, fmuGUID, loggingOn != fmi2False);
+    if (s != NULL) {
+        s->exchanges = fmuType == fmi2ModelExchange;
+    }
+    return s;
+#else
     if (fmuType != fmi2CoSimulation) {
         return refuse_instance(listener, instanceName == NULL ? "?" : instanceName,
                                MODEL_NAME ": this is a co-simulation FMU");
     }
     return create(listener, instanceName, fmuGUID, loggingOn != fmi2False);
+#endif
 }
 
 void fmi2FreeInstance(fmi2Component c)
@@ -174,6 +182,11 @@ fmi2Status fmi2SetRealInputDerivatives(fmi2Component c, const fmi2ValueReference
                                        const fmi2Integer order[], const fmi2Real value[])
 {
     Instance *s = enter(c, SETTABLE, "fmi2SetRealInputDerivatives");
+#if MODEL_EXCHANGE
+    if (s != NULL && s->exchanges) {
+        return fail(s, "fmi2SetRealInputDerivatives: this instance is for model exchange");
+    }
+#endif
     Status status = begin_set(s, vr, nvr, order == NULL ? NULL : value, "fmi2SetRealInputDerivatives");
     for (size_t k = 0; k < nvr && status == STATUS_OK; k++) {
         status = check_derivative(s, vr[k], order[k], value[k]);
