@@ -16,6 +16,7 @@ from .kinds import FmiVersion, PackagingKind, Profile
 from .references import resolve
 
 CHECKSUMS = "SHA256SUMS"
+_WITH: dict[Profile, str] = {"model-exchange": " with model exchange"}
 
 
 def release(
@@ -38,7 +39,8 @@ def release(
         directory: made if it is not there.
         kind: ``"auto"`` is native where that is possible, and tells why where it is not.
         platforms: of native FMUs, keys of `toolchain.PLATFORMS` or ``all``; this machine's by default.
-        profile: ``"real-time"`` makes native FMUs, and counts the instructions of a step where valgrind is there.
+        profile: other than ``"standard"`` makes native FMUs; ``"real-time"`` counts the instructions of a step, too,
+            where valgrind is there.
         fmi: the version of FMI; those in 3.0 are native.
         checksums: whether to write `CHECKSUMS`, which ``sha256sum -c`` checks.
         tell: takes a line on each FMU's progress.
@@ -50,7 +52,7 @@ def release(
         ComponentError: two components of one name, or platforms asked of a Python FMU, or what FMI 3.0 has not.
         ComponentError: a component cannot be built; what was built before it stays.
     """
-    if profile == "real-time" or fmi == "3":
+    if profile != "standard" or fmi == "3":
         kind = "native" if kind == "auto" else kind  # what cannot be compiled is an error, no reason for another kind
     _check(references, kind, platforms, profile, fmi)
     chosen = toolchain.chosen(platforms)
@@ -66,7 +68,7 @@ def release(
         write_whole(source.read_bytes(), target)
         written.append(target)
         note = f", not a native one: {problem}" if problem else ""
-        version = ", FMI 3.0" if fmi == "3" else ""
+        version = ", FMI 3.0" if fmi == "3" else _WITH.get(profile, "")
         what = f"native{version}, {' '.join(chosen)}" if made == "native" else f"a Python FMU{note}"
         cost = f"{time.perf_counter() - begin:.1f} s, {target.stat().st_size / 1000:.0f} kB"
         tell(f"[{count}/{len(references)}] {target.stem}: {what} ({cost})")
@@ -100,6 +102,10 @@ def _check(
 ) -> None:
     if fmi == "3" and profile == "real-time":
         raise ComponentError("--profile real-time is FMI 2.0, whose functions its host in C calls; leave out --fmi 3")
+    if fmi == "3" and profile == "model-exchange":
+        raise ComponentError("--model-exchange is FMI 2.0: of FMI 3.0 there is co-simulation alone; leave out --fmi 3")
+    if kind == "python" and profile == "model-exchange":
+        raise ComponentError("--model-exchange is for native FMUs; pythonfmu's wrapper has co-simulation alone")
     if fmi == "3" and kind == "python":
         raise ComponentError("--fmi 3 is for native FMUs; Python FMUs, by pythonfmu's wrapper, are FMI 2.0")
     if kind == "python" and profile == "real-time":

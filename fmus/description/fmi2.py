@@ -52,9 +52,7 @@ class Fmi2(Dialect):
                     entry.set("dependencies", " ".join(sorted((index[n] for n in sources), key=int)))
 
 
-def _write_variable(
-    block: Any, variable: ScalarVariable, component: Component, exchange: ModelExchange | None
-) -> None:
+def _write_variable(block: Any, variable: ScalarVariable, component: Component, exchange: ModelExchange | None) -> None:
     initial = initial_kind(variable)
     named = {"name": variable.name, "valueReference": str(variable.reference)}
     element = etree.SubElement(block, "ScalarVariable", **named, **attributes(variable, initial))

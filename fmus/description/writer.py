@@ -41,6 +41,7 @@ def write(
     digest: str,
     profile: Profile = "standard",
     fmi: FmiVersion = "2",
+    *,
     exchange: ModelExchange | None = None,
 ) -> bytes:
     """The model description of a component's FMU.

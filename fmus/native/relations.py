@@ -1,4 +1,4 @@
-"""What model exchange asks of equations: choices that stay as they are between events, and what tells that one has to change.
+"""What model exchange asks of equations: choices that stay as they are between events, and what tells when to change.
 
 A comparison of anything that moves in continuous time becomes a *mode*, a truth that is kept from event to event; of a
 table, or of ``floor``, the place is kept that was looked up. What both branches agree on where they meet (the smaller
@@ -96,10 +96,14 @@ class _Step:
 
 @dataclass
 class _Value:
-    """What a step has become: its expressions, and whether they move in continuous time."""
+    """What a step has become: its expressions, whether they move in continuous time, and how far it is from the time.
+
+    The last is none but of the time itself, and of what is the time but for something that does not move.
+    """
 
     cells: list[Any]
     moves: bool = False
+    after: Any = None
 
 
 @dataclass
@@ -135,9 +139,7 @@ class _Freezer:
     def _value(self, k: int, step: _Step) -> _Value:
         operation = step.operation
         if operation == ca.OP_INPUT:
-            argument, place = step.what
-            cell = (self.found.clock, self.found.values)[argument][place]
-            return _Value([cell], place == 0 if argument == 0 else place in self.moving)
+            return self._argument(*step.what)
         if operation == ca.OP_CONST:
             return _Value([ca.SX(step.what)])
         read = self._read(step.read)
@@ -150,7 +152,23 @@ class _Freezer:
             place = self._piece(step.read[0], read[0], lambda p: (ca.floor(p), ca.floor(p) + 1.0))
             return _Value([ca.floor(place)])
         apply = ca.SX.unary if len(read) == 1 else ca.SX.binary
-        return _Value([apply(operation, *read)], moves)
+        return _Value([apply(operation, *read)], moves, self._after(step, read))
+
+    def _argument(self, argument: int, place: int) -> _Value:
+        if argument == 1:
+            return _Value([self.found.values[place]], place in self.moving)
+        is_time = place == 0
+        return _Value([self.found.clock[place]], is_time, ca.SX(0.0) if is_time else None)
+
+    def _after(self, step: _Step, read: list[Any]) -> Any:
+        """How far a sum or difference is from the time."""
+        first, *others = [self.values[k] for k, _ in step.read]
+        if step.operation not in (ca.OP_ADD, ca.OP_SUB) or sum(v.moves for v in (first, *others)) != 1:
+            return None
+        if first.after is not None:
+            return ca.SX.binary(step.operation, first.after, read[1])
+        (second,) = others
+        return second.after + read[0] if step.operation == ca.OP_ADD and second.after is not None else None
 
     def _call(self, step: _Step, read: list[Any], moves: bool) -> _Value:
         function = self.compiled.get_function(step.what)
@@ -165,8 +183,9 @@ class _Freezer:
     def _comparison(self, step: _Step, a: Any, b: Any) -> Any:
         strict = step.operation == ca.OP_LT
         for clock, other, kind in ((0, 1, "BEFORE"), (1, 0, "AFTER")):
-            if self._is_time(step.read[clock]) and not self.values[step.read[other][0]].moves:
-                return self._mode(Mode(kind, indicated=False), (a, b)[other], ca.SX(0.0))  # type: ignore[arg-type]
+            after = self.values[step.read[clock][0]].after
+            if after is not None and not self.values[step.read[other][0]].moves:
+                return self._mode(Mode(kind, indicated=False), (a, b)[other] - after, ca.SX(0.0))  # type: ignore[arg-type]
         # A state with a standstill has an indicator for that already.
         stands = any(
             self.steps[x[0]].operation == ca.OP_INPUT
@@ -183,9 +202,11 @@ class _Freezer:
         """The place that is kept of one that is looked up."""
         place = ca.SX.sym(f"mode{len(self.modes)}")
         low, high = bounds(place)
-        if self._is_time(read):
-            return self._mode(Mode("TIME_PIECE", indicated=False), high, a, place)
-        return self._mode(Mode("PIECE", indicated=True), ca.fmin(a - low, high - a), a, place)
+        after = self.values[read[0]].after
+        if after is not None:
+            return self._mode(Mode("TIME_PIECE", indicated=False), high - after, a, place)
+        below, above = a - low, high - a
+        return self._mode(Mode("PIECE", indicated=True), ca.if_else(below < above, below, above), a, place)
 
     def _mode(self, mode: Mode, first: Any, second: Any, symbol: Any = None) -> Any:
         symbol = ca.SX.sym(f"mode{len(self.modes)}") if symbol is None else symbol
@@ -193,10 +214,6 @@ class _Freezer:
         self.kinds.append(mode)
         self.relations += [first, second]
         return symbol
-
-    def _is_time(self, read: tuple[int, int]) -> bool:
-        step = self.steps[read[0]]
-        return step.operation == ca.OP_INPUT and step.what == (0, 0)
 
     def _is_kink(self, k: int) -> bool:
         """Whether a comparison chooses between the two that it compares, and nothing else: continuous, with a kink."""

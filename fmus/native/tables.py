@@ -42,6 +42,7 @@ def model_header(
     guid: str,
     profile: Profile = "standard",
     fmi: FmiVersion = "2",
+    *,
     exchange: Exchange | None = None,
 ) -> str:
     """``model.h`` of a component.
@@ -125,7 +126,9 @@ def _exchange(component: Component, name: str, exchange: Exchange) -> Iterable[s
     yield f"#define MODEL_STEP {number(default_step(component))}"
     yield "".join(f"#define MODEL_{f.upper()} {name}_{f}\n" for f in _FROZEN)
     yield _array("const Mode model_modes", [f"MODE_{mode.kind}" for mode in exchange.modes], "MODE_LESS")
-    yield _array("const bool model_indicated", ["true" if mode.indicated else "false" for mode in exchange.modes], "false")
+    yield _array(
+        "const bool model_indicated", ["true" if mode.indicated else "false" for mode in exchange.modes], "false"
+    )
 
 
 def _tape_room(component: Component) -> dict[str, int]:

@@ -128,6 +128,15 @@ static int side_of(double x)
     return (x > 0.0) - (x < 0.0);
 }
 
+/* On which sides states are that were set. */
+static void find_sides(Instance *s, bool were_set)
+{
+    for (int k = 0; k < N_STANDSTILL && were_set; k++) {
+        s->sides[k] = side_of(s->values[FIRST_STATE + model_standstill[k]]);
+    }
+}
+
+/* Whether a state sets off that stands. */
 static bool set_off(Instance *s)
 {
     bool any = false;
@@ -176,9 +185,7 @@ static void begin_exchange(Instance *s)
     }
 #endif
 #if N_STANDSTILL > 0
-    for (int k = 0; k < N_STANDSTILL; k++) {
-        s->sides[k] = side_of(s->values[FIRST_STATE + model_standstill[k]]);
-    }
+    find_sides(s, true);
 #endif
     settle(s);
 }
@@ -196,9 +203,9 @@ static Status take_samples(Instance *s, bool *again)
         s->time = time;
         *again = *again || N_REINITIALISED > 0;
     }
-    for (int k = 0; k < N_STANDSTILL && *again; k++) {
-        s->sides[k] = side_of(s->values[FIRST_STATE + model_standstill[k]]);
-    }
+#if N_STANDSTILL > 0
+    find_sides(s, *again);
+#endif
     return STATUS_OK;
 }
 #endif
@@ -217,6 +224,10 @@ static double next_time_event(const Instance *s)
         next = timed && when > s->time && when < next ? when : next;
     }
 #endif
+    for (int n = 0; n < N_NOISES; n++) {
+        double hold = s->values[model_noises[n].hold], when = (floor(s->time / hold + 1e-6) + 1.0) * hold;
+        next = when < next ? when : next;
+    }
     return next < 1e300 ? next : INFINITY;
 }
 
@@ -225,7 +236,7 @@ static Status update_discrete(Instance *s, bool *states_changed, double *next)
 {
     *states_changed = false;
 #if IS_SAMPLED
-    if (take_samples(s, states_changed) != STATUS_OK) {
+    if (take_samples(s, states_changed) != STATUS_OK || draw(s) != STATUS_OK) {
         return STATUS_ERROR;
     }
 #endif

@@ -182,8 +182,8 @@ static const Variable *settable(Instance *s, Reference reference, Type type, con
         return NULL;
     }
 #if MODEL_EXCHANGE
-    bool moves = variable->role == ROLE_INPUT && type == TYPE_REAL;
-    if (s->exchanges && s->phase == PHASE_RUNNING && s->regime == REGIME_CONTINUOUS && !moves) {
+    /* The standard would have discrete inputs refused as well, but FMPy sets all inputs whenever it looks for events. */
+    if (s->exchanges && s->phase == PHASE_RUNNING && s->regime == REGIME_CONTINUOUS && variable->role != ROLE_INPUT) {
         fail(s, "%s: %s is set at events only; enter event mode", call, variable->name);
         return NULL;
     }

@@ -121,6 +121,12 @@ def build(
         typer.Option(help="real-time: native FMUs without files, and without memory taken after instantiation."),
     ] = ProfileName.standard,
     fmi: Annotated[FmiName, typer.Option(help="Version of FMI: 2 (2.0), or 3 (3.0, native FMUs).")] = FmiName.two,
+    model_exchange: Annotated[
+        bool,
+        typer.Option(
+            "--model-exchange", help="Model exchange beside co-simulation in one archive: native FMUs of FMI 2.0."
+        ),
+    ] = False,
     output: Annotated[Path | None, typer.Option("--output", "-o", help="Directory for the FMUs.")] = None,
     quiet: Quiet = False,
 ) -> Answer:
@@ -133,6 +139,8 @@ def build(
     wanted = [*(names or []), *(CATALOGUE if every else [])]
     if not wanted:
         raise ScenarioError(f"name the components to build, or --all; there is {', '.join(CATALOGUE)}")
+    if model_exchange and profile is not ProfileName.standard:
+        raise ScenarioError(f"--model-exchange and --profile {profile.value} exclude each other; build two FMUs")
     with show_compilations(quiet):
         paths = release(
             tuple(dict.fromkeys(wanted)),
@@ -140,7 +148,7 @@ def build(
             output or default_directory(),
             kind=kind.value,
             platforms=[name.strip() for name in (platforms or "").split(",") if name.strip()],
-            profile=profile.value,
+            profile="model-exchange" if model_exchange else profile.value,
             fmi=fmi.value,
             checksums=every,
             tell=(lambda line: None) if quiet else tell,

@@ -5,17 +5,18 @@ import math
 from ctypes import byref, c_char_p, c_double, c_int, c_size_t, c_uint, c_void_p
 
 import fmpy
-from fmpy.fmi2 import fmi2CallbackFunctions, fmi2CallbackLoggerTYPE
+from fmpy.fmi2 import fmi2CallbackFunctions, fmi2CallbackLoggerTYPE, fmi2EventInfo
 
 OK = 0
 STEP = 0.25
 NULL = None
+EXCHANGE, SLAVE = 0, 1
 
 
 class Fmu:
     """One instance behind the C functions themselves; every call gives the status."""
 
-    def __init__(self, folder, name="it", logging=False, logger=True):
+    def __init__(self, folder, name="it", logging=False, logger=True, kind=SLAVE):
         self.description = fmpy.read_model_description(folder, validate=False)
         (path,) = (folder / "binaries").glob("*/*.so")
         self.library = ctypes.CDLL(str(path))
@@ -26,7 +27,7 @@ class Fmu:
         self._logger = fmi2CallbackLoggerTYPE(self._log)  # kept: C holds no reference
         if logger:
             self.callbacks.logger = self._logger
-        self.instance = self.instantiate(name, logging=logging)
+        self.instance = self.instantiate(name, kind, logging=logging)
         self.time = 0.0
 
     def _log(self, environment, instance, status, category, message):
@@ -37,7 +38,7 @@ class Fmu:
         """The last message."""
         return self.messages[-1][3] if self.messages else ""
 
-    def instantiate(self, name="it", kind=1, guid=None, logging=False, callbacks=True):
+    def instantiate(self, name="it", kind=SLAVE, guid=None, logging=False, callbacks=True):
         create = self.library.fmi2Instantiate
         create.restype = c_void_p
         create.argtypes = [c_char_p, c_int, c_char_p, c_char_p, c_void_p, c_int, c_int]
@@ -125,6 +126,33 @@ class Fmu:
         value = c_double(math.nan)
         assert self.GetRealStatus(2, byref(value)) == OK
         return value.value
+
+    # ------------------------------------------------------------ model exchange
+
+    def numbers(self, name, count=None):
+        """States, derivatives, indicators, nominals: all of them, or the status where a call asks for others."""
+        known = {"EventIndicators": self.description.numberOfEventIndicators}
+        cells = (c_double * (known.get(name, self.description.numberOfContinuousStates) if count is None else count))()
+        status = getattr(self, f"Get{name}")(cells, c_size_t(len(cells)))
+        return list(cells) if status == OK else status
+
+    def put(self, *states):
+        return self.SetContinuousStates((c_double * len(states))(*states), c_size_t(len(states)))
+
+    def event(self, time=None, integrate=True, **inputs):
+        """An event, in which inputs may jump: whether states have changed, and the next time event."""
+        if time is not None:
+            assert self.SetTime(c_double(time)) == OK
+            assert self.EnterEventMode() == OK
+        for name, value in inputs.items():
+            assert self.set(name, value) == OK
+        info = fmi2EventInfo()
+        assert self.NewDiscreteStates(byref(info)) == OK, self.said
+        assert not info.newDiscreteStatesNeeded + info.terminateSimulation + info.nominalsOfContinuousStatesChanged
+        if integrate:
+            assert self.EnterContinuousTimeMode() == OK
+        next_event = info.nextEventTime if info.nextEventTimeDefined else NULL
+        return bool(info.valuesOfContinuousStatesChanged), next_event
 
     # ------------------------------------------------------------ states
 

@@ -28,10 +28,10 @@ STRICT = ("-std=c11", "-Wall", "-Wextra", "-Wconversion", "-Wshadow", "-pedantic
 HEADERS = Path(fmpy.__file__).parent / "c-code"
 
 
-def native(reference, arguments=None):
+def native(reference, profile="standard"):
     if reference.rpartition(":")[2] in TEXTS:
         pytest.skip("computes a text")
-    return build(reference, arguments, kind="native")
+    return build(reference, kind="native", profile=profile)
 
 
 def unzip(path, folder):
@@ -232,10 +232,10 @@ def test_a_component_may_bear_the_name_of_a_file_of_the_runtime(write_component,
 COMPILERS = {"gcc": ("gcc",), "zig": (sys.executable, "-m", "ziglang", "cc")}
 
 
-def strictly_compiled(reference, folder, compiler, *flags):
+def strictly_compiled(reference, folder, compiler, *flags, profile="standard"):
     if shutil.which(COMPILERS[compiler][0]) is None:
         pytest.skip(f"{compiler} is not installed")
-    source = unzip(native(reference), folder) / "sources" / "all.c"
+    source = unzip(native(reference, profile), folder) / "sources" / "all.c"
     compile_program([source], folder / "o", *STRICT, *flags, "-c", "-I", HEADERS, compiler=COMPILERS[compiler])
 
 
@@ -244,9 +244,10 @@ def test_every_component_compiles_without_a_warning(tmp_path, reference):
     strictly_compiled(reference, tmp_path, "gcc", "-fsyntax-only")
 
 
+@pytest.mark.parametrize("profile", ["standard", "model-exchange"])
 @pytest.mark.parametrize("compiler", COMPILERS)
-def test_the_optimizer_of_either_compiler_finds_nothing_to_warn_of(tmp_path, compiler):
-    strictly_compiled(MIXED, tmp_path, compiler, "-O2")
+def test_the_optimizer_of_either_compiler_finds_nothing_to_warn_of(tmp_path, compiler, profile):
+    strictly_compiled(MIXED, tmp_path, compiler, "-O2", profile=profile)
 
 
 def test_fmi_3_has_folders_of_its_own():
@@ -311,11 +312,17 @@ def _prefixing(folder):
 
 @pytest.mark.skipif(shutil.which("g++") is None, reason="needs g++")
 @pytest.mark.parametrize(
-    ("name", "fmi"), [(MIXED, "2"), (MIXED, "3"), ("PidAto", "2"), ("Gust", "2")], ids=["Mixed", "3", "PidAto", "Gust"]
+    ("name", "fmi", "profile"),
+    [
+        *((MIXED, fmi, "standard") for fmi in ("2", "3")),
+        *((name, "2", "standard") for name in ("PidAto", "Gust")),
+        *((name, "2", "model-exchange") for name in (MIXED, "PointMassTrain", "Gust")),
+    ],
+    ids=["Mixed", "3", "PidAto", "Gust", "Mixed-exchange", "PointMassTrain-exchange", "Gust-exchange"],
 )
-def test_the_sources_compile_as_c_plus_plus_with_the_functions_of_c(tmp_path, name, fmi):
+def test_the_sources_compile_as_c_plus_plus_with_the_functions_of_c(tmp_path, name, fmi, profile):
     (tmp_path / "sources").mkdir()
-    for file, text in native_fmu.sources(resolve(name)(), "{x}", fmi=fmi).items():
+    for file, text in native_fmu.sources(resolve(name)(), "{x}", profile, fmi).items():
         (tmp_path / "sources" / file).write_text(text, encoding="utf-8")
     flags = (
         "-x",
@@ -409,16 +416,17 @@ def test_the_cross_compiler_gives_the_same_bits(tmp_path, what):
         assert np.array_equal(ours[name], cross[name]), name
 
 
+@pytest.mark.parametrize("profile", ["standard", "model-exchange"])
 @pytest.mark.parametrize(
     "what",
     [MIXED, *(pytest.param(x, marks=pytest.mark.long) for x in ("PointMassTrain", "Learner", "Dice", "Counter"))],
 )
-def test_the_whole_interface_runs_clean_under_the_sanitizers(tmp_path, sample, what):
+def test_the_whole_interface_runs_clean_under_the_sanitizers(tmp_path, sample, what, profile):
     """AddressSanitizer (leaks included) and UndefinedBehaviorSanitizer, on a driver that calls everything."""
     if shutil.which("gcc") is None:
         pytest.skip("needs gcc")
     reference = sample(what) if what in ("Learner", "Dice", "Counter") else what
-    folder = unzip(build(reference, kind="native"), tmp_path / "fmu")
+    folder = unzip(build(reference, kind="native", profile=profile), tmp_path / "fmu")
     program = compile_program(
         [HERE / "c" / "whole_api.c"],
         tmp_path / "driver",

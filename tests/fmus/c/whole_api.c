@@ -124,6 +124,35 @@ static int steps(fmi2Component c, int from, int to, double *sum)
     return 0;
 }
 
+#if MODEL_EXCHANGE
+/* An explicit Euler solver that meets time events and answers each change of an indicator by an event. */
+static int exchange(fmi2Component c, double *sum)
+{
+    double x[AT_LEAST_ONE(N_STATES)], rates_of[AT_LEAST_ONE(N_STATES)], z[AT_LEAST_ONE(N_INDICATORS)], time = 0.0;
+    fmi2EventInfo info;
+    fmi2Boolean event = fmi2False, end = fmi2False;
+    for (int k = 0; k < STEPS; k++) {
+        CHECK(k == 0 || (fmi2SetTime(c, time) == fmi2OK && fmi2EnterEventMode(c) == fmi2OK));
+        CHECK(set_inputs(c, k) == 0 && fmi2NewDiscreteStates(c, &info) == fmi2OK && get_everything(c, sum) == 0);
+        CHECK(fmi2EnterContinuousTimeMode(c) == fmi2OK && fmi2DoStep(c, time, STEP, fmi2True) == fmi2Error);
+        double h = info.nextEventTimeDefined && info.nextEventTime < time + STEP ? info.nextEventTime - time : STEP;
+        CHECK(fmi2GetContinuousStates(c, x, N_STATES) == fmi2OK && fmi2GetDerivatives(c, rates_of, N_STATES) == fmi2OK);
+        for (int n = 0; n < N_STATES; n++) {
+            x[n] += h * rates_of[n];
+        }
+        time += h;
+        CHECK(fmi2SetTime(c, time) == fmi2OK && fmi2SetContinuousStates(c, x, N_STATES) == fmi2OK);
+        CHECK(fmi2GetEventIndicators(c, z, N_INDICATORS) == fmi2OK && get_everything(c, sum) == 0);
+        CHECK(fmi2CompletedIntegratorStep(c, fmi2True, &event, &end) == fmi2OK && !event && !end);
+        CHECK(fmi2GetNominalsOfContinuousStates(c, x, N_STATES) == fmi2OK && fmi2SetTime(c, NAN) == fmi2Error);
+    }
+    fmi2FMUstate state = NULL;
+    CHECK(fmi2GetFMUstate(c, &state) == fmi2OK && fmi2SetFMUstate(c, state) == fmi2OK);
+    CHECK(fmi2FreeFMUstate(c, &state) == fmi2OK);
+    return 0;
+}
+#endif
+
 static int abuse(fmi2Component c)
 {
     unsigned far[] = {N_VARIABLES + N_STATES, 0x7FFFFFFFu, 0xFFFFFFFFu};
@@ -162,7 +191,15 @@ int main(int count, char **arguments)
     const fmi2CallbackFunctions functions = {logger, calloc, free, NULL, &environment};
     double expected = 0.0, again = 0.0, other = 0.0;
     CHECK(count == 2 && fmi2GetVersion()[0] == '2' && fmi2GetTypesPlatform()[0] == 'd');
-    CHECK(fmi2Instantiate("x", fmi2ModelExchange, MODEL_GUID, "", &functions, fmi2False, fmi2True) == NULL);
+    fmi2Component e = fmi2Instantiate("x", fmi2ModelExchange, MODEL_GUID, "", &functions, fmi2False, fmi2True);
+#if MODEL_EXCHANGE
+    CHECK(e != NULL && start(e, "") == 0 && exchange(e, &again) == 0 && fmi2Reset(e) == fmi2OK);
+    CHECK(start(e, "") == 0 && exchange(e, &expected) == 0 && again == expected);
+    fmi2FreeInstance(e);
+    expected = again = 0.0;
+#else
+    CHECK(e == NULL);
+#endif
     fmi2Component c = fmi2Instantiate("%s#1#", fmi2CoSimulation, MODEL_GUID, "", &functions, fmi2False, fmi2True);
     fmi2Component d = fmi2Instantiate("d", fmi2CoSimulation, MODEL_GUID, NULL, NULL, fmi2False, fmi2False);
     CHECK(c != NULL && d != NULL && start(c, "") == 0 && start(d, arguments[1]) == 0);

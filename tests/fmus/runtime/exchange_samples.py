@@ -1,0 +1,86 @@
+"""Components for the tests of model exchange: every kind of choice, and a sampled block with a standstill."""
+
+from railcosim.components import Component, Input, Memory, Output, Parameter, State
+from railcosim.components.maths import floor, log, maximum, piecewise_constant, sin, where
+
+
+class Choices(Component):
+    """A state that grows, and every kind of choice on it and on time."""
+
+    level = Parameter("1", 2.0, tunable=True)
+    begin = Parameter("s", 1.0, tunable=True)
+    u = Input("1", 0.5)
+    on = Input("1", False)
+    x = State("1", 0.25, output=True)
+    under = Output("1", bool)
+    up_to = Output("1", bool)
+    early = Output("1", bool)
+    late = Output("1", bool)
+    whole = Output("1", int, description="the part before the point")
+    stair = Output("1", description="by the state")
+    clock = Output("1", description="by the time")
+    safe = Output("1", description="has no value in a branch that is not chosen")
+    bounded = Output("1", description="with a kink, and no event")
+    chosen = Output("1", description="by an input that changes at events")
+    either = Output("1", description="two choices, one in the other")
+
+    def derivatives(self):
+        return {"x": where(self.on, -self.u, self.u) + 0.0 * self._safe()}
+
+    def outputs(self):
+        return {
+            "under": self.x < self.level,
+            "up_to": self.x <= 1.0,
+            "early": self.time < self.begin,
+            "late": self.time - 1.0 >= self.begin,
+            "whole": floor(self.x),
+            "stair": piecewise_constant(self.x, [0.0, 1.0, 4.0], [1.0, 2.0, 3.0]),
+            "clock": piecewise_constant(0.5 + self.time, [0.0, 1.5, 2.0], [1.0, 2.0, 3.0]),
+            "safe": self._safe(),
+            "bounded": maximum(self.x, 1.0),
+            "chosen": where(self.on, self.level, self.x),
+            "either": where(where(self.x > 1.0, self.u, 0.0) > 0.25, 1.0, -1.0),
+        }
+
+    def _safe(self):
+        beyond = self.x > 3.0
+        return where(beyond, log(where(beyond, self.x - 3.0, 1.0)), 0.0)
+
+
+class Sampler(Component):
+    """A block that stops, and counts and holds at samples; at one where it is told to it is put back."""
+
+    sample_time = Parameter("s", 0.0, minimum=0.0)
+    u = Input("1", 0.0)
+    back = Input("1", False)
+    v = State("m/s", 1.0, output=True, standstill=True)
+    n = Memory("1", 0, type=int, output=True)
+    y = Output("1", description="with feed-through: held")
+    z = Output("1", description="without: fresh")
+
+    def derivatives(self):
+        return {"v": self.u}
+
+    def outputs(self):
+        return {"y": 2.0 * self.u + self.n, "z": 3.0 * self.v}
+
+    def update(self):
+        return {"n": self.n + 1, "v": where(self.back, -1.0, self.v)}
+
+
+class Driven(Component):
+    """A block that stops, and that time sets off again."""
+
+    v = State("m/s", 0.0, output=True, standstill=True)
+
+    def derivatives(self):
+        return {"v": sin(self.time)}
+
+
+class Nothing(Component):
+    """Without inputs, outputs and choices."""
+
+    x = State("1", 1.0)
+
+    def derivatives(self):
+        return {"x": -self.x}
