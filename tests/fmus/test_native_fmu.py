@@ -91,6 +91,28 @@ def test_the_description_says_what_a_native_fmu_can(tmp_path):
     assert rate.get("dependencies") == str(index["speed"])
 
 
+def test_model_exchange_stands_beside_co_simulation(tmp_path):
+    path = build("Consist", kind="native", profile="model-exchange")
+    assert list(validate_fmu(str(path))) == []
+    root = etree.parse(unzip(path, tmp_path) / "modelDescription.xml").getroot()
+    exchange, slave = root.find("ModelExchange"), root.find("CoSimulation")
+    state = ("canGetAndSetFMUstate", "canSerializeFMUstate")
+    for capability in (*state, "providesDirectionalDerivative", "completedIntegratorStepNotNeeded"):
+        assert exchange.get(capability) == "true"
+    assert exchange.get("canInterpolateInputs") is None
+    assert slave.get("canInterpolateInputs") == "true"
+    assert [file.get("name") for file in exchange.find("SourceFiles")] == ["all.c"]
+    again = [v.get("name") for v in root.find("ModelVariables") if v[0].get("reinit") == "true"]
+    assert again == ["speed[1]", "speed[2]", "speed[3]"]
+    # At rest each carriage is set off either way; and it comes to rest.
+    assert root.get("numberOfEventIndicators") == "9"
+    assert (tmp_path / "sources" / "exchange2.c").is_file()
+    plain = etree.parse(unzip(build("Consist", kind="native"), tmp_path / "plain") / "modelDescription.xml").getroot()
+    assert not list(plain.iter("ModelExchange"))
+    assert not {"reinit", "numberOfEventIndicators"} & {key for element in plain.iter() for key in element.attrib}
+    assert not list((tmp_path / "plain" / "sources").glob("exchange*"))
+
+
 def test_it_runs_in_fmpy_as_in_plain_python(tmp_path):
     given = {"force": 3e5, "speed": 3.0}
     starts = {"force": 3e5, "speed_start": 3.0}
