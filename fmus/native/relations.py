@@ -89,7 +89,7 @@ class _Step:
     """One operation of a CasADi function: the steps it reads, and of an input its place, of a constant its value."""
 
     operation: int
-    read: tuple[int, ...]
+    read: tuple[tuple[int, int], ...]
     what: Any = None
     results: int = 1
 
