@@ -316,7 +316,8 @@ def of_folder(folder: Path, place: Path, tools: Iterable[str]) -> dict[str, Outc
         own = place / str(number)
         own.mkdir()
         try:
-            outcomes[archive.stem] = outcome(Path(shutil.copy(archive, own)), tools)
+            name = archive.relative_to(folder).with_suffix("").as_posix()
+            outcomes[name] = outcome(Path(shutil.copy(archive, own)), tools)
         except RailcosimError as error:
             print(f"{archive}: we do not run it: {error}", file=sys.stderr)
     return outcomes

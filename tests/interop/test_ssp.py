@@ -70,6 +70,20 @@ def test_the_table_of_clauses(agreement, clauses):
     assert lines[-1] == "- fmu-manipulation-toolbox: `Wrong: all`"
 
 
+def test_archives_of_a_folder_that_we_do_not_run_are_told(agreement, tmp_path, capsys):
+    for name in ("one", "deep/one", "run"):
+        (tmp_path / "theirs" / name).parent.mkdir(exist_ok=True, parents=True)
+        (tmp_path / "theirs" / f"{name}.ssp").write_text("no archive")
+    (tmp_path / "own").mkdir()
+    run = agreement.outcome
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(agreement, "outcome", lambda path, tools: "ran" if path.stem == "run" else run(path, tools))
+        assert agreement.of_folder(tmp_path / "theirs", tmp_path / "own", []) == {"run": "ran"}
+    told = capsys.readouterr().err
+    assert told.count("we do not run it: ") == told.count("it is no SSP") == 2
+    assert f"{tmp_path}/theirs/deep/one.ssp: " in told
+
+
 def test_the_page_has_every_clause(clauses):
     """Made by another version of the archives, the page would tell of others."""
     page = PAGE.read_text(encoding="utf-8")
