@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from functools import cache
+from importlib.util import find_spec
 from pathlib import Path
 from typing import Any, final
 
@@ -78,10 +79,11 @@ class Document:
         if local(self.root) != kind:
             raise ScenarioError(Problem(self.place(self.root), f"it is a {local(self.root)}, not a {kind}"))
         version = self.root.get("version", "")
-        if version.partition(".")[0] != "1":
-            self.note(self.root, f"no schema for version {version!r} is at hand; it is read without one")
+        schema = _schema(schema_folder(version), _SCHEMAS[kind])
+        if schema is None:
+            get = ": pip install 'railcosim[ssp]'" if version.startswith("2.") else ""
+            self.note(self.root, f"no schema for version {version!r} is at hand; it is read without one{get}")
             return
-        schema = _schema(_SCHEMAS[kind])
         if schema.validate(self.root):
             return
         found = list(schema.error_log)
@@ -176,6 +178,16 @@ def _units(root: Any) -> Iterator[Unit]:
             yield Unit(element.get("name", ""), None)
 
 
+def schema_folder(version: str) -> Path | None:
+    """Where the schemas of a version are, if they are installed: FMPy has those of 1, pyssp-standard those of 2."""
+    major = version.partition(".")[0]
+    if major == "1":
+        return Path(fmpy.__file__).parent / "ssp" / "schema"
+    found = find_spec("pyssp_standard") if major == "2" else None
+    return None if found is None or found.origin is None else Path(found.origin).parent / "resources" / "ssp2"
+
+
 @cache
-def _schema(name: str) -> Any:
-    return etree.XMLSchema(file=str(Path(fmpy.__file__).parent / "ssp" / "schema" / f"{name}.xsd"))
+def _schema(folder: Path | None, name: str) -> Any | None:
+    path = None if folder is None else folder / f"{name}.xsd"
+    return etree.XMLSchema(file=str(path)) if path is not None and path.is_file() else None

@@ -1,8 +1,10 @@
 """From archive to `System`: variants, bare structures, versions, times, steps and algorithms."""
 
+from importlib.machinery import ModuleSpec
+
 import pytest
 from railcosim.orchestrator import ScenarioError, load
-from railcosim.orchestrator.ssp import is_ssp_name, read_system
+from railcosim.orchestrator.ssp import documents, is_ssp_name, read_system
 
 from .conftest import DESCRIPTION, GADGET, UNITS, component, connection, connectors, packed, structure, system
 
@@ -49,8 +51,8 @@ def told(found, *texts):
     return [any(text in note for note in found.provenance.notes) for text in texts]
 
 
-def test_what_the_schema_says(read, archive, tmp_path):
-    """Three of it, and how many more; of 2.0, that there is none."""
+def test_what_the_schema_says(read, archive, tmp_path, monkeypatch):
+    """Three of it, and how many more; of 2.0, that there is none where none is installed."""
     wrong = "".join(f"<ssd:Wrong{k}/>" for k in range(1))
     many = "".join(f'<ssd:Connector name="c{k}" kind="wrong{k}"/>' for k in range(5))
     found = read(system(component("a") + wrong, shown=f"<ssd:Connectors>{many}</ssd:Connectors>"))
@@ -58,9 +60,35 @@ def test_what_the_schema_says(read, archive, tmp_path):
     assert len(against) == 4
     assert "SystemStructure.ssd:4: against the schema: Element" in against[0]
     assert "more places are against the schema" in against[-1]
+    monkeypatch.setattr(documents, "find_spec", lambda _: None)
+    for version, more in (("2.0", ": pip install 'railcosim[ssp]'"), ("3.0", "")):
+        text = structure(system(component("a")), version=version)
+        found = read_system(archive(text, name=f"{version}.ssp"), tmp_path / version)
+        (note,) = (note for note in found.provenance.notes if "no schema" in note)
+        assert note.endswith(f"no schema for version '{version}' is at hand; it is read without one{more}")
+
+
+NEW = (
+    '<ssd:Connectors><ssd:Connector name="u" kind="input"><ssc:Float64 unit="m/s"/></ssd:Connector>'
+    '<ssd:Connector name="k" kind="parameter"><ssc:Float64/><ssc:Dimension size="2"/></ssd:Connector></ssd:Connectors>'
+)
+
+
+def test_what_the_schema_of_2_says(archive, tmp_path, monkeypatch):
+    """The words that 2.0 has brought are none of 1.0; what neither has is told. A package without schemas has none."""
+    pytest.importorskip("pyssp_standard")
+    lines = {}
+    for version, shown in (("2.0", NEW), ("1.0", NEW), ("2.0", NEW.replace("Float64/", "Float16/"))):
+        text = structure(system(component("a", shown=shown)), version=version)
+        found = read_system(archive(text, name=f"{len(lines)}.ssp"), tmp_path / str(len(lines)))
+        lines[len(lines)] = [note for note in found.provenance.notes if "the schema" in note]
+    assert lines[0] == []
+    assert "Float64" in lines[1][0]
+    assert "Float16" in lines[2][0]
+    empty = ModuleSpec("pyssp_standard", None, origin=str(tmp_path / "__init__.py"))
+    monkeypatch.setattr(documents, "find_spec", lambda _: empty)
     text = structure(system(component("a")), version="2.0")
-    found = read_system(archive(text, name="two.ssp"), tmp_path / "two")
-    assert told(found, "no schema for version '2.0' is at hand; it is read without one") == [True]
+    assert told(read_system(archive(text), tmp_path / "none"), "no schema for version '2.0' is at hand") == [True]
 
 
 EXPERIMENT = '<ssd:DefaultExperiment startTime="1" stopTime="5">{}</ssd:DefaultExperiment>'
