@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 
 from ...fmi import Interface
+from ...isolation import IsolatedSlave
 from ...system import System
 from ...wiring import Wiring
 from .algorithm import Batch, Explicit, Fit, Operation
@@ -22,6 +23,14 @@ class GaussSeidel(Explicit):
         return Fit()
 
     def batches(self) -> Sequence[Batch]:
-        """Set, step, get, instance by instance."""
-        whole = (Operation.SET, Operation.STEP, Operation.GET)
-        return [Batch(whole, (slave.name,)) for slave in self.coupling.sequence]
+        """Set, step, get, instance by instance; at once for isolated ones in a row that hand nothing on."""
+        links = {(link.source.instance, link.target.instance) for link in self.coupling.exchange.every_link}
+        groups: list[list[str]] = []
+        are_apart = False
+        for slave in self.coupling.sequence:
+            was_apart, are_apart = are_apart, isinstance(slave, IsolatedSlave)
+            if was_apart and are_apart and not any((before, slave.name) in links for before in groups[-1]):
+                groups[-1].append(slave.name)
+            else:
+                groups.append([slave.name])
+        return [Batch((Operation.SET, Operation.STEP, Operation.GET), tuple(group)) for group in groups]

@@ -72,6 +72,40 @@ def test_every_type_with_delays_events_and_steps_of_its_own(apart, odd, ring, al
     assert set(result["odd[1].off"]) == {0.0, 1.0}
 
 
+@pytest.mark.parametrize("isolated", [["all"], ["together"], ["a", "c"]])
+def test_isolated_neighbours_that_hand_nothing_on_step_at_once(apart, odd, instantiated, isolated):
+    """With an event, a delay and a step of one's own; in a cycle, in which one instance is a step late."""
+    system = System(stop_time=9.0, step=0.25, order=list("abcd"))
+    for name in "abcd":
+        system.add(name, odd, u=1.0)
+    for source, target in ("ac", "bc", "cd", "da"):
+        system.connect(f"{source}.x", f"{target}.{'v' if source == 'b' else 'u'}", offset=0.5)
+    system.connect("a.n", "b.m", delay=1)
+    system.connect("d.off", "b.on")
+    system.instances["d"].step = 0.5
+    system.events = [Event("a.u", "bias", 2.0, value=0.5, duration=3.0), Event("c.x", "freeze", 4.0, duration=1.0)]
+    apart(system, *isolated)
+    system.connections = [x for x in system.connections if x.delay == 0]
+    apart(system, *isolated)
+    names = [batch.names for batch in instantiated(isolate(system, isolated)).algorithm.program()]
+    assert names == [("a",), ("b",), ("c",), ("d",)] if isolated == ["a", "c"] else [("a", "b"), ("c",), ("d",)]
+
+
+@pytest.mark.parametrize("isolated", ["all", "together"])
+@pytest.mark.parametrize("modes", [(41, 41), (3, 0), (0, 23), (3, 33), (10, 3)])
+def test_of_isolated_neighbours_the_first_that_fails_is_named(apart, odd_fmu, tmp_path, *, modes, isolated):
+    path = odd_fmu(tmp_path, "canHandleVariableCommunicationStepSize")
+    system = System(stop_time=9.0, step=0.25)
+    for name, mode in zip("ab", modes, strict=True):
+        system.add(name, path, u=1.0, mode=mode)
+    system.add("c", path)
+    for k, name in enumerate("ab"):
+        system.connect(f"{name}.x", f"c.{'uv'[k]}")
+        system.connect("c.x", f"{name}.u")
+    result = apart(system, isolated)
+    assert (result.error is None) == (modes == (41, 41))
+
+
 @ALGORITHMS
 def test_whoever_is_not_waited_for_in_the_loop_is_waited_for_outside(apart, odd, ring, algorithm, hurried):
     assert apart(ring(odd, 2, algorithm=algorithm), "all").status == "completed"
