@@ -5,8 +5,9 @@
 
 Microseconds per FMU step, wall time and CPU time of all processes together, and the ratio to the ring without
 isolation; both are driven from this process and step in turn, so that a busy machine slows both alike; medians. Then
-FMUs that are heavy (many Runge-Kutta steps inside), which isolation lets compute at the same time with ``jacobi``. That
-both compute the same is checked. The last column is the wall time in which the processes start and are initialized.
+the FMUs of a platoon, each in a process of its own and those of one kind together, and FMUs that are heavy (many
+Runge-Kutta steps inside), which isolation lets compute at the same time with ``jacobi``. That both compute the same is
+checked. The last column is the wall time in which the processes start and are initialized.
 CPU time of other processes is told by Linux.
 """
 
@@ -27,6 +28,7 @@ from railcosim.orchestrator.isolation.proxy import IsolatedSlave
 from railcosim.orchestrator.master import compiled
 from railcosim.orchestrator.master.loop import Master
 from railcosim.orchestrator.run.checking import check
+from railcosim.orchestrator.scenario import load
 from railcosim.orchestrator.system import TOGETHER, System, Together
 from ring import HERE, light
 
@@ -35,21 +37,24 @@ Isolated = bool | Together
 """Whether instances are in processes of their own, or together in one."""
 
 
-class Candidate:
-    """A ring with all of its instances isolated, or none; or all of them in one process."""
+def ring_of(path: Path, count: int, algorithm: str, **start: float) -> System:
+    """FMUs in a ring."""
+    system = System(stop_time=STOP, step=STEP, algorithm=algorithm)
+    for k in range(count):
+        system.add(f"lag{k}", str(path), x=(k + 1) / count, **start)
+        system.connect(f"lag{k - 1 if k else count - 1}.x", f"lag{k}.u")
+    return system
 
-    def __init__(
-        self, path: Path, count: int, algorithm: str, workspace: Workspace, isolated: Isolated, **start: float
-    ):
-        system = System(stop_time=STOP, step=STEP, algorithm=algorithm)
-        for k in range(count):
-            system.add(f"lag{k}", str(path), x=(k + 1) / count, **start)
-            system.connect(f"lag{k - 1 if k else count - 1}.x", f"lag{k}.u")
+
+class Candidate:
+    """A system with all of its instances isolated, or none; or those of one FMU together in one process."""
+
+    def __init__(self, system: System, workspace: Workspace, isolated: Isolated):
         begin = time.perf_counter()
         checked = check(system, workspace)
         instances = {name: replace(x, isolate=isolated) for name, x in system.instances.items()}
         self.slaves = dict(instantiate(checked.models, instances))
-        wiring = checked.wiring
+        wiring, algorithm, self.step = checked.wiring, system.stepping.algorithm, system.stepping.step
         self.master = Master(self.slaves, checked.order.sequence, wiring.links, wiring.starts, algorithm)
         self.master.initialize(0.0, STOP)
         self.setup = time.perf_counter() - begin
@@ -58,7 +63,7 @@ class Candidate:
     def run(self, steps: int) -> tuple[float, float]:
         """Seconds of wall time and of CPU time."""
         wall, cpu = time.perf_counter(), self._cpu()
-        self.master.run(self.done * STEP, STEP, steps, 1, lambda *_: True)
+        self.master.run(self.done * self.step, self.step, steps, 1, lambda *_: True)
         self.done += steps
         return time.perf_counter() - wall, self._cpu() - cpu
 
@@ -77,12 +82,10 @@ def cpu_of(process: int) -> float:
     return int(file.read_text().split()[0]) * 1e-9 if file.exists() else 0.0
 
 
-def compare(
-    path: Path, count: int, algorithm: str, steps: int, repetitions: int, *, isolated: Isolated = True, **start: float
-) -> str:
+def compare(system: System, steps: int, repetitions: int, isolated: Isolated = True) -> str:
     """One row of the table."""
     with Workspace() as workspace:
-        both = [Candidate(path, count, algorithm, workspace, how, **start) for how in (False, isolated)]
+        both = [Candidate(system, workspace, how) for how in (False, isolated)]
         costs: list[list[Sequence[float]]] = [[], []]
         try:
             for _ in range(repetitions):
@@ -92,7 +95,9 @@ def compare(
         finally:
             for candidate in both:
                 candidate.close()
-    cells = [f"{count}", "1" if isolated == TOGETHER else f"{count}", algorithm]
+    count = len(system.instances)
+    processes = len({slave.pid for slave in both[1].slaves.values() if isinstance(slave, IsolatedSlave)})
+    cells = [f"{count}", f"{processes}", system.stepping.algorithm]
     for which in (0, 1):
         here, apart = ([seconds[which] / steps / count * 1e6 for seconds in found] for found in costs)
         ratio = statistics.median(b / a for a, b in zip(here, apart, strict=True))
@@ -114,15 +119,17 @@ def main() -> None:
     with tempfile.TemporaryDirectory() as folder:
         least = light(own, Path(folder))
         rows: tuple[tuple[int, Isolated], ...] = (1, True), (2, True), (2, TOGETHER), (8, True), (8, TOGETHER)
+        how = options.steps, options.repetitions
         for count, isolated in rows:
             for algorithm in ("gauss-seidel", "jacobi"):
-                print(
-                    compare(least, count, algorithm, options.steps, options.repetitions, isolated=isolated), flush=True
-                )
+                print(compare(ring_of(least, count, algorithm), *how, isolated), flush=True)
+    print("\nThe trains of comfort_cruise:\n")
+    for isolated in (True, TOGETHER):
+        print(compare(load("comfort_cruise"), *how, isolated), flush=True)
     print("\nHeavy FMUs:\n")
     for count in (2, 8):
-        steps = max(1, options.steps // 50)
-        print(compare(own, count, "jacobi", steps, options.repetitions, max_step=STEP / 30_000), flush=True)
+        ring = ring_of(own, count, "jacobi", max_step=STEP / 30_000)
+        print(compare(ring, max(1, options.steps // 50), options.repetitions), flush=True)
 
 
 if __name__ == "__main__":
