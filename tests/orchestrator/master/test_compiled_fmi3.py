@@ -174,6 +174,29 @@ def test_a_real_that_no_whole_number_holds(both, third, target, sign):
     assert f"'{target}' cannot become" in str(result.error)
 
 
+def test_feed_through_that_is_refreshed(both, third):
+    """y is x + gain * u: of the point itself."""
+    system = System(stop_time=2.0, step=0.25, refresh=True)
+    system.add("a", third, x=2.0)
+    system.add("b", third)
+    system.connect("a.x", "b.u", scale=2.0)
+    system.connect("a.o32", "b.i32")
+    result = both(system)
+    assert result["b.y"] == pytest.approx(result["b.x"] + 2.0 * result["a.x"])
+
+
+def test_bits_that_are_no_number_agree(both, third):
+    """-1 in 64 bits is no number as a double, but the same from one round of a circle of feed-through to the next."""
+    system = System(stop_time=2.0, step=0.25, refresh=True)
+    for name, other in ("ab", "ba"):
+        system.add(name, third, gain=0.5)
+        system.connect(f"{other}.y", f"{name}.u", scale=0.0, offset=1.0)
+    system.add("c", third, i64=-1)
+    result = both(system)
+    assert result["c.o64"][-1] == -1.0
+    assert result["a.y"] == pytest.approx(result["a.x"] + 0.5)
+
+
 @ALGORITHMS
 @pytest.mark.parametrize("mode", [3, 6, 7, 8, 9, 11, 12, 13, 23])
 def test_steps_that_are_not_over_or_fail(both, third, algorithm, mode):

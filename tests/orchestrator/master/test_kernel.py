@@ -76,6 +76,25 @@ def test_a_sound_plan(arguments):
     assert call(arguments, loops=np.zeros(1, LOOP)) == (4, 4, 1), "a loop of which no operation speaks"
 
 
+@pytest.mark.parametrize(
+    ("kind", "field", "value"), [(1, "period", 2), (1, "phase", 1), (1, "is_late", 1), (2, "kind", 4), (2, "kind", 2)]
+)
+def test_calls_that_differ_are_made_one_by_one(arguments, kind, field, value):
+    """Calls that nobody watches are one group, but not if one is due at another time, late, or may be infinite."""
+    operations = changed(arguments["operations"], "is_watched", 0, slice(None))
+    one, other = np.flatnonzero(operations["kind"] == kind)[:2]
+    if kind == 2:
+        operations["index"][other] = operations["index"][one]
+    if field == "phase":
+        operations["period"][[one, other]] = 2
+    operations[field][other] = value
+    assert call(arguments, operations=operations) == (4, 4, 1)
+    table = arguments["table"][:, :4]
+    assert np.isfinite(table).all()
+    stands = [bool((np.diff(table[1 + 4 * n]) == 0.0).any()) for n in range(3)]  # x, where a step is left out
+    assert stands == {"period": [False, True, False], "phase": [True, True, False]}.get(field, [False] * 3)
+
+
 def test_a_block_ends_where_there_is_no_room_for_a_row(arguments):
     assert call(arguments, row=6)[:2] == (2, 2)
     assert list(arguments["table"][0, 6:]) == [0.25, 0.5]
@@ -117,6 +136,11 @@ def going_round(arguments, *, place=0, compared=0.0, **of):
     work[1] = compared
     operations = changed(changed(arguments["operations"], "kind", 9), "index", 0)
     return {"loops": loops, "work": work, "passed": np.array([place]), "operations": operations}
+
+
+def beginning_twice(arguments):
+    operations = changed(arguments["operations"], "is_watched", 0, slice(None))
+    return changed(changed(operations, "kind", [9, 9], [0, 1]), "index", [0, 1], [0, 1])
 
 
 def noting(arguments, *, points=(0, 1), **of):
@@ -259,6 +283,9 @@ WRONG = {
             *(("plain_count", -1), ("plain_count", 2), ("shown_count", -1), ("shown_count", 2)),
         ]
     },
+    "two loops that begin at once": lambda a: (
+        going_round(a) | {"loops": np.repeat(going_round(a)["loops"], 2), "operations": beginning_twice(a)}
+    ),
     "a loop that does not begin": ending,
     "a loop that does not end": going_round,
     "a table with half a column": lambda a: {"table": a["table"].ravel()[:-1]},
