@@ -269,13 +269,15 @@ def drive(
     input is wrong, or no driving keeps to it.
     """
     try:
-        from ..driving import load_case, optimise, write_profile
+        from ..driving import MESHES, load_case, optimise, write_profile
     except ImportError:
         raise ScenarioError(Problem("", "driving needs casadi", "pip install 'railcosim[native]'")) from None
     from .documents import drive_document
-    from .printing import show_drive
+    from .printing import show_drive, show_meshes
 
     changes = {"time": time, "minimize": minimize and minimize.value}
-    optimum = optimise(load_case(case, settings or (), changes))
+    found = load_case(case, settings or (), changes)
+    with show_meshes(found.title, quiet, MESHES) as solved:
+        optimum = optimise(found, solved)
     path = write_profile(output or Path("results") / f"{optimum.case.name}-drive", optimum.solution)
     return Answer(lambda: drive_document(optimum, path), lambda: show_drive(optimum, path, quiet))

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -13,7 +14,7 @@ from .case import Case
 from .collocation import Solution, solve
 from .dynamics import Dynamics, Floats
 
-_MESHES = 10
+MESHES = 10
 """Meshes at most."""
 _CHANGE = 0.05
 """Share of the largest traction by which it may change within an interval that stays as it is."""
@@ -51,37 +52,46 @@ class Optimum:
     iterations: int
 
 
-def optimise(case: Case) -> Optimum:
+Solved = Callable[[int, int], object]
+"""Is told how many meshes are solved, and how many intervals the next one has."""
+
+
+def optimise(case: Case, solved: Solved = lambda *_: None) -> Optimum:
     """The best driving of a case.
 
     Args:
         case: what is asked for.
+        solved: is told how far it has got.
 
     Raises:
         ScenarioError: nothing keeps all limits; the running time is too short, and the message names the least one.
     """
     dynamics = Dynamics(case)
-    quick = solve(dynamics, _first_mesh(dynamics), _Gentle(dynamics), None, warm=False)
+    nodes = _first_mesh(dynamics)
+    solved(0, len(nodes) - 1)
+    quick = solve(dynamics, nodes, _Gentle(dynamics), None, warm=False)
     if case.wish.minimize == "time":
-        return _refined(dynamics, quick, None)
+        return _refined(dynamics, quick, None, solved)
     wanted = case.wish.time or 0.0
     if wanted < quick.time * 1.01:  # the coarse mesh knows the least time to a share of that
-        quickest = _refined(dynamics, quick, None)
+        quickest = _refined(dynamics, quick, None, solved)
         quick = quickest.solution
         if wanted < quick.time:
             what = f"{wanted:g} s are too short: the least running time is {quick.time:.2f} s"
             raise ScenarioError(Problem(case.name, what, "give a longer 'time' (--time)"))
-    return _refined(dynamics, solve(dynamics, quick.nodes, quick, wanted, warm=False), wanted)
+    return _refined(dynamics, solve(dynamics, quick.nodes, quick, wanted, warm=False), wanted, solved)
 
 
-def _refined(dynamics: Dynamics, solution: Solution, time: float | None) -> Optimum:
+def _refined(dynamics: Dynamics, solution: Solution, time: float | None, solved: Solved) -> Optimum:
     change: float | None = None
     meshes, iterations = [len(solution.nodes) - 1], solution.iterations
     errors, divided = _judged(dynamics, solution)
     tolerance = dynamics.case.wish.tolerance
-    while divided.any() and len(meshes) < _MESHES and (change is None or change > tolerance):
+    while divided.any() and len(meshes) < MESHES and (change is None or change > tolerance):
         middles = 0.5 * (solution.nodes[:-1] + solution.nodes[1:])[divided]
-        finer = solve(dynamics, np.sort(np.concatenate([solution.nodes, middles])), solution, time, warm=True)
+        nodes = np.sort(np.concatenate([solution.nodes, middles]))
+        solved(len(meshes), len(nodes) - 1)
+        finer = solve(dynamics, nodes, solution, time, warm=True)
         before, after = (each.time if time is None else each.energy for each in (solution, finer))
         change = abs(after - before) / max(abs(after), 1e-9)
         solution = finer

@@ -4,7 +4,7 @@ from .findings import show_findings
 from .interface import show_interface, show_model, show_report
 from .listing import show_list
 from .outcome import show_reproduced, show_run
-from .progress import show_cases, show_compilations, show_progress
+from .progress import show_cases, show_compilations, show_meshes, show_progress
 from .scenario import show_check, show_system
 from .searches import show_drive, show_falsified, show_optimized, show_search
 from .study import show_runs, show_study
@@ -21,6 +21,7 @@ __all__ = [
     "show_findings",
     "show_interface",
     "show_list",
+    "show_meshes",
     "show_model",
     "show_notes",
     "show_optimized",

@@ -135,6 +135,22 @@ def show_cases(count: int, quiet: bool) -> Iterator[Callable[[str], None]]:
             yield lambda _: None
 
 
+@contextmanager
+def show_meshes(title: str, quiet: bool, most: int) -> Iterator[Callable[[int, int], None]]:
+    """A bar over the meshes of an optimum, on a terminal only; to be told how many are solved, and the next one's size.
+
+    Args:
+        title: what is driven.
+        quiet: whether to show nothing.
+        most: how many meshes there may be; few need them all.
+    """
+    if quiet:
+        yield lambda *_: None
+        return
+    with progress_bar(printable(title), console=open_console(stderr=True)) as bar:
+        yield lambda done, size: bar.count(done, most, f"{done} meshes solved, {size} intervals")
+
+
 def _lines(title: str, start: float, reached: float) -> OnProgress:
     told = 0
 

@@ -126,6 +126,13 @@ def test_the_least_time_and_what_is_below_it(hop):
         optimise(hop(*plain, time=40.0))
 
 
+def test_each_mesh_is_told_before_it_is_solved(hop):
+    told = []
+    optimum = optimise(hop("line.neutral_sections=[]"), lambda *mesh: told.append(mesh))
+    assert told == list(enumerate(optimum.meshes))
+    assert len(told) > 1
+
+
 def test_without_regeneration_it_costs_more(rows):
     optimum, _ = rows("regeneration=false")
     assert optimum.solution.energy > rows()[0].solution.energy * 1.01

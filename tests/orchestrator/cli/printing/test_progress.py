@@ -9,7 +9,7 @@ from functools import partial
 import pytest
 from railcosim.fmus import toolchain
 from railcosim.orchestrator.cli.printing import progress as progress_module
-from railcosim.orchestrator.cli.printing import show_cases, show_compilations, show_progress
+from railcosim.orchestrator.cli.printing import show_cases, show_compilations, show_meshes, show_progress
 
 
 class Terminal(io.StringIO):
@@ -102,3 +102,20 @@ def test_on_a_terminal_the_bar_names_what_runs(monkeypatch, at_once):
         tell("second")
     assert "1 of 2" in terminal.getvalue()
     assert "second" in terminal.getvalue()
+
+
+@pytest.mark.parametrize("quiet", [False, True])
+def test_the_meshes_of_an_optimum_are_a_bar_on_a_terminal(monkeypatch, at_once, quiet):
+    terminal = Terminal()
+    monkeypatch.setattr(sys, "stderr", terminal)
+    with show_meshes("a hop\x1b[2J", quiet, 10) as solved:
+        solved(3, 120)
+    shown = terminal.getvalue()
+    assert ("3 meshes solved, 120 intervals" in shown) == (not quiet)
+    assert "\x1b[2J" not in shown
+
+
+def test_without_a_terminal_meshes_are_not_told(capsys):
+    with show_meshes("hop", False, 10) as solved:
+        solved(3, 120)
+    assert capsys.readouterr() == ("", "")
