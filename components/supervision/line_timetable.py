@@ -85,21 +85,21 @@ def _plan_through(rows: Sequence[_Row]) -> Plan:
     points = [(row.time - first.time, row.position, row.speed) for row in rows]
     if first.speed > 0.0:
         lead = _to_rest(first, rows[1], "begins")
-        way = 0.5 * first.speed * lead
+        way = first.speed * lead / 3.0
         points = [(0.0, first.position - way, 0.0), *((t + lead, x, v) for t, x, v in points)]
     if last.speed > 0.0:
         rest = _to_rest(last, rows[-2], "ends")
-        points.append((points[-1][0] + rest, last.position + 0.5 * last.speed * rest, 0.0))
+        points.append((points[-1][0] + rest, last.position + last.speed * rest / 3.0, 0.0))
     arrival, place, _ = points[-1]
     return Plan(Profile.through([*points, (arrival + _STAY, place, 0.0)]), arrival + _STAY, place)
 
 
 def _to_rest(end: _Row, inside: _Row, verb: str) -> float:
-    """How long it takes, in s, from rest to the speed at an end by the acceleration beside it."""
+    """How long it takes, in s, from rest to the speed at an end by an even rise to the acceleration beside it."""
     change = inside.speed - end.speed
     if change <= 0.0:
         raise ValueError(f"it {verb} at {end.speed:g} m/s without a change of speed that leads to rest")
-    return end.speed * abs(inside.time - end.time) / change
+    return 2.0 * end.speed * abs(inside.time - end.time) / change
 
 
 PROFILE = Table(
@@ -129,8 +129,9 @@ class ProfileTimetable(TripTimetable):
     """Trips along a profile over place, such as ``orchestrate drive`` finds.
 
     Between two rows the jerk is constant, so that places, times and speeds are met. A profile begins and ends on the
-    way, at 1 m/s for instance: the acceleration beside each end leads from and to rest, so that the trip departs
-    ahead of the profile's first place and arrives beyond its last, where it lasts for 5 s more. ``speed_limit`` is
+    way, at 1 m/s for instance: from rest the acceleration rises evenly to that beside the first row, and falls as
+    evenly to nothing behind the last one, so that the trip departs ahead of the profile's first place and arrives
+    beyond its last, where it lasts for 5 s more. ``speed_limit`` is
     that at the reference position.
     """
 

@@ -59,23 +59,25 @@ def test_a_profile_is_met_row_by_row_and_led_from_and_to_rest():
     timetable = ProfileTimetable(
         profile=rows, sample_time=0.5, wait=1.0, mean_acceleration=False, line=LINE, train={"mass": 1e4}
     )
-    trip, time, x, v, a = _columns(timetable, names, 44, 0.5)
+    trip, time, x, v, a = _columns(timetable, names, 48, 0.5)
     at = {t: k for k, t in enumerate(time) if trip[k] == 1}
-    assert (x[at[0.0]], v[at[0.0]], a[at[0.0]]) == (98.0, 0.0, 1.0)  # 1 m/s2 for two seconds to the first row
-    for row, t in zip(rows, (2.0, 6.0, 11.0, 13.5, 15.5), strict=True):
+    # evenly to 1 m/s2 in four seconds, which are 2 m/s and 8/3 m, at the first row
+    assert (x[at[0.0]], v[at[0.0]], a[at[0.0]]) == pytest.approx((100.0 - 8.0 / 3.0, 0.0, 0.0), abs=1e-9)
+    assert a[at[2.0]] == pytest.approx(0.5)
+    for row, t in zip(rows, (4.0, 8.0, 13.0, 15.5, 17.5), strict=True):
         assert (x[at[t]], v[at[t]]) == pytest.approx((row["position"], row["speed"]), abs=1e-9)
-    assert max(at) == 20.5  # 5 s more
-    assert (x[at[20.5]], v[at[20.5]]) == (160.0, 0.0)
-    for k in range(at[0.0], at[15.0]):
+    assert max(at) == 22.5  # 5 s more
+    assert (x[at[22.5]], v[at[22.5]]) == (160.0, 0.0)
+    for k in range(at[0.0], at[17.0]):
         assert x[k + 1] - x[k] == pytest.approx(0.25 * (v[k] + v[k + 1]), abs=0.03)
 
 
 def test_a_profile_that_ends_on_the_way_is_led_to_rest():
     timetable = ProfileTimetable(sample_time=0.5, wait=1.0)
-    time, x, v = _columns(timetable, ("trip_time", "reference_position", "reference_speed"), 143, 0.5)
+    time, x, v = _columns(timetable, ("trip_time", "reference_position", "reference_speed"), 150, 0.5)
     stop = next(k for k, t in enumerate(time) if t > 1.0 and v[k] == 0.0)
-    assert x[stop] == pytest.approx(1001.5, abs=0.01)  # 1 m/s on, at about 1 m/s2
-    assert time[stop] == pytest.approx(70.5, abs=0.51)
+    assert x[stop] == pytest.approx(1001.0 + 2.0 / 3.0, abs=0.01)  # 1 m/s on, from about 1 m/s2 evenly to nothing
+    assert time[stop] == pytest.approx(72.1, abs=0.51)
 
 
 @pytest.mark.parametrize(
