@@ -125,7 +125,7 @@ def linearize(
 def _check_samples(system: System, checked: Checked) -> None:
     """Every step must be like any other, or there is no model of one."""
     interfaces = {name: model.interface for name, model in checked.models.items()}
-    problems = [problem for problem, _ in unmet_samples(system, interfaces, checked.wiring.starts)]
+    problems = [unmet.problem for unmet in unmet_samples(system, interfaces, checked.wiring.starts)]
     if problems:
         raise ScenarioError(problems)
 

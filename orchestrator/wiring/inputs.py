@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Container, Iterable, Iterator, Mapping, Sequence
-from typing import Any
+from typing import Any, NamedTuple
 
 from ..fmi import Interface, Variable
 from ..names import SignalName
@@ -118,10 +118,24 @@ def _kept(instance: str, inputs: Sequence[Variable]) -> list[str]:
     ]
 
 
+class Unmet(NamedTuple):
+    """An instance of ours that does not take a sample, or several, in each communication step.
+
+    Attributes:
+        problem: says so.
+        countable: whether it can take as many samples as there are in a step.
+        between: whether it samples between communication points.
+    """
+
+    problem: Problem
+    countable: bool
+    between: bool
+
+
 def unmet_samples(
     system: System, interfaces: Mapping[str, Interface], starts: Mapping[str, Mapping[str, Any]]
-) -> Iterator[tuple[Problem, bool]]:
-    """Instances of ours that sample between communication points, and whether they can take so many samples."""
+) -> Iterator[Unmet]:
+    """Instances of ours whose communication step is no whole multiple of their sample time."""
     for name, interface in interfaces.items():
         sample = starts[name].get("sample_time")
         if sample is None and interface.sampled and "sample_time" in interface.variables:
@@ -135,17 +149,17 @@ def unmet_samples(
             what = f"step {digits(step)} s is {not_met} of its sample_time {digits(sample)} s"
             remedy = f"set step or {name}.sample_time"
             problem = Problem(name, f"the communication {what}", remedy, (SignalName(name),))
-            yield problem.at(system.instances[name].origin), countable
+            yield Unmet(problem.at(system.instances[name].origin), countable, not _is_multiple(sample, step))
 
 
 def check_sampling(system: System, interfaces: Mapping[str, Interface], wiring: Wiring) -> None:
     """Note steps that meet no sample, or are not those an FMU is made for."""
     told = set()
-    for problem, countable in unmet_samples(system, interfaces, wiring.starts):
-        if countable:
-            wiring.notes.append(f"{problem.place}: {problem.message}: it samples by a clock of its own")
-        else:
+    for problem, countable, between in unmet_samples(system, interfaces, wiring.starts):
+        if not countable:
             wiring.problems.append(problem)
+        elif between:
+            wiring.notes.append(f"{problem.place}: {problem.message}: it samples by a clock of its own")
     for name, interface in interfaces.items():
         own, step = interface.default_step, system.instances[name].step or system.stepping.step
         if own and not interface.variable_step and not interface.annotation and interface.model not in told:

@@ -121,9 +121,9 @@ def test_a_swap_drops_what_the_new_model_lacks(started):
 
 
 @pytest.mark.parametrize(
-    ("step", "fits"), [(0.2, True), (0.4, True), (0.6000000000000001, True), (0.1, False), (0.3, False)]
+    ("step", "fits"), [(0.2, True), (0.4, True), (0.6000000000000001, True), (0.1, True), (0.3, False), (0.15, False)]
 )
-def test_a_step_off_the_sample_time(resolve, mine, step, fits):
+def test_steps_and_samples_that_do_not_meet_are_noted(resolve, mine, step, fits):
     system = System(step=step)
     system.add("it", mine("Needy"), needed=0.0, needed_row=0.0)
     note = (
