@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from .. import world
 from ..errors import FmuError, RunError
-from ..fmi.binding import FmuSlave
+from ..fmi.binding import LoadedSlave
 from ..fmi.guard import GUARD, NOTE_SIZE, NOTES, own_note, said
 from ..isolation import Ride
 from .algorithms import Programmed, Repeated
@@ -187,7 +187,7 @@ class CompiledLoop:
         failed = min((self.plan.rank(n) for n in places["failed"].tolist() if n >= 0), default=None)
         for operation in np.flatnonzero(disturbed).tolist():
             slave = self.plan.culprits[operation][0]
-            if isinstance(slave, FmuSlave) and (
+            if isinstance(slave, LoadedSlave) and (
                 disturbed[operation] <= done or (failed is not None and self.plan.rank(operation) <= failed)
             ):
                 slave.mend()

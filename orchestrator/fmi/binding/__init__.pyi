@@ -1,5 +1,6 @@
 from .arrays import ElementsChannel
 from .channel import FmuChannel, MixedChannel
+from .fmi1 import Fmi1Slave
 from .fmi2 import FmuSlave
 from .fmi3 import Fmi3Slave
 from .interfaces import plain_interface, read_interface
@@ -11,6 +12,7 @@ from .watch import Watch, is_watched
 __all__ = [
     "SLAVES",
     "ElementsChannel",
+    "Fmi1Slave",
     "Fmi3Slave",
     "FmuChannel",
     "FmuSlave",

@@ -2,7 +2,7 @@
    how a step went.
 
    Values pass as the doubles that they are everywhere here; whole numbers of 64 bits, which doubles do not hold, as their
-   bits (`Form`). */
+   bits (`Form`). Truth values of FMI 1.0, a byte each, pass here as well, by functions that do not count values. */
 
 #include "kernel.h"
 
@@ -13,6 +13,8 @@ typedef int (*DoStep)(void *component, double time, double step, bool no_set_sta
                       double *reached);
 typedef int (*Set)(void *component, const unsigned int *references, size_t count, const void *values, size_t value_count);
 typedef int (*Get)(void *component, const unsigned int *references, size_t count, void *values, size_t value_count);
+typedef int (*SetBytes)(void *component, const unsigned int *references, size_t count, const void *values);
+typedef int (*GetBytes)(void *component, const unsigned int *references, size_t count, void *values);
 
 /* By type, what is the least and the greatest number that it holds and a double is. */
 static const double bounds[][2] = {
@@ -39,7 +41,7 @@ static int put(const Plan *plan, const Entry *entry, double time, int type, void
     switch (type) {
     case TYPE_FLOAT64: ((double *)to)[k] = value; return 1;
     case TYPE_FLOAT32: ((float *)to)[k] = (float)value; return 1;
-    case TYPE_BOOLEAN: ((uint8_t *)to)[k] = value != 0.0; return 1;
+    case TYPE_BOOLEAN: case TYPE_BYTE: ((uint8_t *)to)[k] = value != 0.0; return 1;
     default: break;
     }
     if (!(value >= bounds[type][0] && value <= bounds[type][1])) {
@@ -64,7 +66,7 @@ static double taken(int type, const void *from, size_t k)
     switch (type) {
     case TYPE_FLOAT64: return ((const double *)from)[k];
     case TYPE_FLOAT32: return (double)((const float *)from)[k];
-    case TYPE_BOOLEAN: return ((const uint8_t *)from)[k] != 0; /* any bit is true */
+    case TYPE_BOOLEAN: case TYPE_BYTE: return ((const uint8_t *)from)[k] != 0; /* any bit is true */
     case TYPE_INT8: return ((const int8_t *)from)[k];
     case TYPE_UINT8: return ((const uint8_t *)from)[k];
     case TYPE_INT16: return ((const int16_t *)from)[k];
@@ -104,7 +106,9 @@ const Call *set_3(const Hand *hand, const Group *group, double time, int *status
             }
         }
         note_call(hand, call);
-        *status = set(call->component, group->references, group->reference_count, hand->reals, group->count);
+        *status = group->type == TYPE_BYTE
+                      ? ((SetBytes)group->function)(call->component, group->references, group->count, hand->reals)
+                      : set(call->component, group->references, group->reference_count, hand->reals, group->count);
         if (is_failure(*status)) {
             return call;
         }
@@ -118,7 +122,9 @@ const Call *get_3(const Hand *hand, const Group *group, int *status)
     int is_real = group->type == TYPE_FLOAT64 || group->type == TYPE_FLOAT32;
     for (const Call *call = group->begin; call < group->end; call++) {
         note_call(hand, call);
-        *status = get(call->component, group->references, group->reference_count, hand->reals, group->count);
+        *status = group->type == TYPE_BYTE
+                      ? ((GetBytes)group->function)(call->component, group->references, group->count, hand->reals)
+                      : get(call->component, group->references, group->reference_count, hand->reals, group->count);
         if (is_failure(*status)) {
             return call;
         }

@@ -38,10 +38,10 @@ typedef union {
     uint64_t natural;
 } Cell;
 
-/* The types of FMI 3.0; 0 is that of a channel of FMI 2.0. */
+/* The types of FMI 3.0, and one of FMI 1.0; 0 is that of any other channel of FMI 1.0 or 2.0. */
 enum {
     TYPE_FLOAT64 = 1, TYPE_FLOAT32 = 2, TYPE_INT8 = 3, TYPE_UINT8 = 4, TYPE_INT16 = 5, TYPE_UINT16 = 6, TYPE_INT32 = 7, TYPE_UINT32 = 8, TYPE_INT64 = 9, TYPE_UINT64 = 10,
-    TYPE_BOOLEAN = 11,
+    TYPE_BOOLEAN = 11, TYPE_BYTE = 12, /* a truth value of FMI 1.0 */
 };
 
 /* How a step of FMI 3.0 went, beside its status; Python reads it (`Told` in fmi3.py). */
@@ -58,7 +58,7 @@ typedef struct {
     int64_t begin;      /* first of its entries */
     int64_t count;      /* number of its entries */
     int64_t is_real;
-    int64_t type;            /* of FMI 3.0, or 0 */
+    int64_t type;            /* one of those above */
     int64_t reference_count; /* of FMI 3.0: an array has one for all its elements; what is left of `count` is no reference */
 } Channel;
 

@@ -39,7 +39,7 @@ int resolve_channel(const Plan *plan, const Py_buffer *buffers, const Operation 
     }
     const Channel *channel = (const Channel *)buffers[CHANNELS].buf + index;
     if (channel->count < 1 || !is_within(channel->begin, channel->count, length(buffers, ENTRIES)) ||
-        channel->type < 0 || channel->type > TYPE_BOOLEAN || channel->reference_count < 1 ||
+        channel->type < 0 || channel->type > TYPE_BYTE || channel->reference_count < 1 ||
         channel->reference_count > channel->count) {
         return 0;
     }

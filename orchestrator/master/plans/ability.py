@@ -5,14 +5,14 @@ from __future__ import annotations
 from collections.abc import Iterable
 
 from ...fmi import Slave
-from ...fmi.binding import Fmi3Slave, FmuSlave
+from ...fmi.binding import LoadedSlave
 from ...isolation import IsolatedSlave, Ride, may_ride
 from ..coupling import Coupling
 from ..exchange import Exchange
 from .courses import Courses
 from .flattening import can_exchange
 
-Called = FmuSlave | Fmi3Slave | Ride
+Called = LoadedSlave | Ride
 """What the kernel calls."""
 
 
@@ -33,19 +33,25 @@ def _can_be_called(slave: Slave, exchange: Exchange) -> bool:
     if isinstance(slave, IsolatedSlave):
         given = [part.channel for part in exchange.yields[slave.name]]
         return may_ride(slave, [*(feed.channel for feed in exchange.feeds[slave.name]), *given])
-    return isinstance(slave, FmuSlave | Fmi3Slave) and not slave.rolls_back
+    return isinstance(slave, LoadedSlave) and not slave.rolls_back
 
 
 def called(slave: Slave) -> Called:
     """What the kernel calls."""
     if isinstance(slave, IsolatedSlave):
         return slave.ride()
-    assert isinstance(slave, FmuSlave | Fmi3Slave)
+    assert isinstance(slave, LoadedSlave)
     return slave
+
+
+def slopes_call(slave: Called) -> str:
+    """The function that takes the slopes of an instance's inputs."""
+    assert isinstance(slave, LoadedSlave)
+    return slave.INTERPOLATE
 
 
 def can_be_restored(slave: Slave) -> bool:
     """Whether the kernel can save an instance's state and come back to it."""
-    if not isinstance(slave, FmuSlave | Fmi3Slave) or not slave.interface.can_save_state:
+    if not isinstance(slave, LoadedSlave) or not slave.interface.can_save_state:
         return False
     return all(call in slave.functions for call in slave.STATE[:3])

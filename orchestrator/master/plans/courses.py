@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from ...fmi.binding import FmuSlave
+from ...fmi.binding import LoadedSlave
 from ..exchange import Exchange
 from ..extrapolation import Extrapolator
 from .layout import AS_NOTED, AT_END, AT_STAMP, COURSE, POINTS
@@ -39,7 +39,7 @@ class Courses:
         for name, course in of.items():
             slave, end = exchange.slaves[name], begin + len(course.members)
             assert extrapolator is not None
-            assert isinstance(slave, FmuSlave)
+            assert isinstance(slave, LoadedSlave)
             function = slave.addresses(slave.INTERPOLATE)[0]
             for way in ways:
                 own = begin + self.count * (way == AS_NOTED)
@@ -53,7 +53,7 @@ class Courses:
     def are_able(extrapolator: Extrapolator | None, exchange: Exchange) -> bool:
         """Whether the kernel can call for them all."""
         slaves = [exchange.slaves[name] for name in (extrapolator.courses if extrapolator else ())]
-        return all(isinstance(slave, FmuSlave) and slave.INTERPOLATE in slave.functions for slave in slaves)
+        return all(isinstance(slave, LoadedSlave) and slave.INTERPOLATE in slave.functions for slave in slaves)
 
     def widen(self, cells: int) -> None:
         """There are so many numbers more behind the values."""

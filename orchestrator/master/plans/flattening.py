@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...fmi import Channel
-from ...fmi.binding import ElementsChannel, FmuChannel, MixedChannel
+from ...fmi.binding import ElementsChannel, Fmi1Slave, Fmi3Slave, FmuChannel, MixedChannel
 from ...isolation import IsolatedChannel
 from ..exchange import Exchange, Feed
 from .layout import AS_IT_IS, ROUNDED_UP, TRUE_ABOVE
@@ -20,6 +20,8 @@ from .layout import AS_IT_IS, ROUNDED_UP, TRUE_ABOVE
 _NUMBERS = "Float64", "Float32", "Int8", "UInt8", "Int16", "UInt16", "Int32", "UInt32", "Int64", "UInt64", "Boolean"
 TYPES = {name: number for number, name in enumerate(_NUMBERS, 1)} | {"Enumeration": 9}
 """The kernel's numbers for the types of FMI 3.0."""
+_BYTE = 12
+"""That of truth values of FMI 1.0."""
 NUMBER, SIGNED_BITS, UNSIGNED_BITS = 0, 1, 2
 """The kernel's numbers for what a value is."""
 _FORMS = {"Int64": SIGNED_BITS, "Enumeration": SIGNED_BITS, "UInt64": UNSIGNED_BITS}
@@ -116,6 +118,13 @@ def parts_of(channel: Channel) -> Parts | None:
             return None
         found += [(each, [places[k] for k in own_places]) for each, own_places in inner]
     return found or None
+
+
+def type_of(slave: object, kind: str) -> int:
+    """The kernel's number for a type of an instance's; 0 where it is called as FMI 2.0 has it."""
+    if isinstance(slave, Fmi3Slave):
+        return TYPES[kind]
+    return _BYTE if isinstance(slave, Fmi1Slave) and kind == "Boolean" else 0
 
 
 def can_exchange(exchange: Exchange) -> bool:

@@ -15,9 +15,9 @@ from ..algorithms import HEAD, Batch, Iteration, Operation, Repeated
 from ..coupling import Coupling
 from ..exchange import Change, Yield
 from ..refresh import Refresher
-from .ability import Called, called
+from .ability import Called, called, slopes_call
 from .courses import Courses
-from .flattening import TYPES, Entry, Wide, noted, parts_of
+from .flattening import Entry, Wide, noted, parts_of, type_of
 from .layout import (
     AS_IT_IS,
     AS_NOTED,
@@ -133,7 +133,7 @@ class Plan:
         self.arrays = (
             np.array(
                 [
-                    (*operation, isinstance(slave, FmuSlave) and is_watched(slave), late)
+                    (*operation, isinstance(slave, LoadedSlave) and is_watched(slave), late)
                     for operation, late, (slave, _) in zip(self.operations, self.late, self.culprits, strict=True)
                 ],
                 OPERATION,
@@ -313,7 +313,7 @@ class Plan:
             made += self._add_channels(
                 Kind.EXTEND, slave, feed.channel, entries, feed.is_real, due=(rate, 0), index=number
             )
-            self._add_operation(Kind.SLOPES, number, (slave, FmuSlave.INTERPOLATE), (rate, 0))
+            self._add_operation(Kind.SLOPES, number, (slave, slopes_call(slave)), (rate, 0))
 
     def _add_notes(self, slave: Called) -> None:
         """Note the inputs that have just been set, behind the values."""
@@ -340,7 +340,7 @@ class Plan:
                 self._add_operation(Kind.SET, channel, (slave, call), (1, 0))
                 continue
             self._add_operation(Kind.EXTEND, course, (slave, call), (1, 0))
-            self._add_operation(Kind.SLOPES, course, (slave, FmuSlave.INTERPOLATE), (1, 0))
+            self._add_operation(Kind.SLOPES, course, (slave, slopes_call(slave)), (1, 0))
 
     def _add_gets(self, slave: Called, rate: int, direct: bool | None, kind: Kind = Kind.GET) -> None:
         """Read outputs, all or those that are ``direct`` or not; with what events make of them."""
@@ -391,7 +391,7 @@ class Plan:
                 addresses = slave.add(own, is_get=kind == Kind.GET)
             else:
                 addresses = slave.addresses(call)
-            what = len(self._entries), len(places), int(is_real), TYPES.get(own.kind, 0) * isinstance(slave, Fmi3Slave)
+            what = len(self._entries), len(places), int(is_real), type_of(slave, own.kind)
             self._channels.append((*addresses, *what, len(own.references)))
             self._entries += [entries[k] for k in places]
             self._references += [*own.references, *[NONE] * (len(places) - len(own.references))]

@@ -1,10 +1,11 @@
 /* An FMI 1.0 FMU by hand: der(x) = u - x, solved exactly over a step, and an input and an output of every type, which
    gives what the input was a step ago. It insists on the order of calls. From t = 5 s on its parameter `mode` rules:
    1 to 5 and 9: the step gives that status (9: -1); 6: a step takes 0.05 s at most, and says how far it came; 7: a step of
-   more than 0.05 s is refused, and the next must be told to be a repetition; 20 + s: the status of getting reals. At any
+   more than 0.05 s is refused, and the next must be told to be a repetition; 10: numbers are rounded upward; 20 + s: the status of getting reals. At any
    time 40: initialization fails. Value references: reals 0 u, 1 x, 2 y = x + gain * u, 3 gain, 4 guess, 5 pi, 6 twice the
    gain, 7 switch; whole numbers 0 n, 1 m, 2 gear, 3 shown, 4 mode; booleans 0 on, 1 off; texts 0 word, 1 said. */
 
+#include <fenv.h>
 #include <math.h>
 #include <stddef.h>
 #include <stdlib.h>
@@ -194,6 +195,9 @@ int EXPORT(fmiDoStep)(void *c, double time, double step, char is_new)
     s->flags[1] = s->flags[0] ? 0 : -1; /* what is not zero is true */
     strcpy(s->texts[1], s->texts[0]);
     s->time = time + step;
+    if (how == 10) {
+        fesetround(FE_UPWARD);
+    }
     return tell(s, status, "as it was told");
 }
 

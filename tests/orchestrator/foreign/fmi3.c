@@ -1,13 +1,14 @@
 /* An FMI 3.0 FMU by hand, with the functions of co-simulation and no others: der(x) = u - x, solved exactly over a step, and
    an input and an output of every type, which gives what the input was a step ago. From t = 5 s on its parameter `mode`
    rules: 1 to 5 and 9: the step gives that status (9: -1); 6: a step takes 0.05 s at most, and is discarded there; 7: a step
-   of more than 0.05 s is refused; 8: the simulation shall end after half a step; 11: half of a step of more than 0.05 s is
+   of more than 0.05 s is refused; 8: the simulation shall end after half a step; 10: numbers are rounded upward; 11: half of a step of more than 0.05 s is
    taken, and that is told as an early return; 12: y is not a number; 20 + s: the status of getting reals. At any time 40:
    initialization fails. Value references are ten times the place of a type below plus 0 for its input and 1 for its output;
    Float64: 0 time, 1 u, 2 x, 3 y = x + gain * u, 4 gain, 5 der(x); Int32: 62 mode; Int64: 82 gear, 83 shown.
    With -DEVENTS=1 it insists on its event mode: a step ends early at each third of a second, where an event waits whose
    discrete states are updated twice. */
 
+#include <fenv.h>
 #include <math.h>
 #include <stdbool.h>
 #include <stdint.h>
@@ -254,6 +255,9 @@ int fmi3DoStep(void *c, double time, double step, bool final, bool *event, bool 
     v->truth[1] = !v->truth[0];
     strcpy(v->text[1], v->text[0]);
     v->time = *reached = time + step;
+    if (how == 10) {
+        fesetround(FE_UPWARD);
+    }
     return tell(s, status, "as it was told, 100 %");
 }
 

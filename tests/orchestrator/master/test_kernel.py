@@ -188,7 +188,7 @@ WRONG = {
     "a channel without function": lambda a: {"channels": changed(a["channels"], "function", 0)},
     "a channel without an entry": lambda a: {"channels": changed(a["channels"], "count", 0)},
     "a channel of no type": lambda a: {"channels": changed(a["channels"], "type", -1)},
-    "a channel of an unknown type": lambda a: {"channels": changed(a["channels"], "type", 12)},
+    "a channel of an unknown type": lambda a: {"channels": changed(a["channels"], "type", 13)},
     "a channel without a reference": lambda a: {"channels": changed(a["channels"], "reference_count", 0)},
     "more references than values": lambda a: {"channels": changed(a["channels"], "reference_count", 10**6)},
     "forms of some values": lambda a: {"forms": np.zeros(1, np.int64)},
