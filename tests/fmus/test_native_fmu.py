@@ -438,10 +438,16 @@ def test_the_cross_compiler_gives_the_same_bits(tmp_path, what):
         assert np.array_equal(ours[name], cross[name]), name
 
 
-@pytest.mark.parametrize("profile", ["standard", "model-exchange"])
 @pytest.mark.parametrize(
-    "what",
-    [MIXED, *(pytest.param(x, marks=pytest.mark.long) for x in ("PointMassTrain", "Learner", "Dice", "Counter"))],
+    ("what", "profile"),
+    [
+        *((MIXED, profile) for profile in ("standard", "model-exchange")),
+        pytest.param("PointMassTrain", "model-exchange", marks=pytest.mark.long),
+        *(
+            pytest.param(x, "standard", marks=pytest.mark.long)
+            for x in ("PointMassTrain", "Learner", "Dice", "Counter")
+        ),
+    ],
 )
 def test_the_whole_interface_runs_clean_under_the_sanitizers(tmp_path, sample, what, profile):
     """AddressSanitizer (leaks included) and UndefinedBehaviorSanitizer, on a driver that calls everything."""

@@ -102,8 +102,8 @@ def deviation(name, seed, fineness, periods=100):
 
 CASES = sorted(CATALOGUE)
 SOME = sorted(random.Random(19).sample(CASES, 1))
-"""What the long tier tries of the campaign, beside two trains."""
-TRAINS = ["PointMassTrain", "Consist"]
+"""What the long tier tries of the campaign, beside a train."""
+TRAINS = ["PointMassTrain"]
 
 
 TRIED = [
@@ -119,8 +119,13 @@ def test_cvode_comes_to_what_co_simulation_comes_to(name):
         assert found <= NEAR.get(name, USUAL), (seed, output, found)
 
 
-@pytest.mark.long
-@pytest.mark.parametrize("name", TRAINS)
+@pytest.mark.parametrize(
+    "name",
+    [
+        pytest.param("PointMassTrain", marks=pytest.mark.long),
+        *(pytest.param(train, marks=pytest.mark.campaign) for train in ("Consist", "LineTrain", "FreightTrain")),
+    ],
+)
 def test_it_comes_the_nearer_the_finer_both_are(name):
     loose, tight = deviation(name, 0, LOOSE)[1], deviation(name, 0, TIGHT)[1]
     assert tight < 0.1 * loose
