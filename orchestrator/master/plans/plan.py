@@ -39,12 +39,7 @@ from .layout import (
 )
 
 _NOBODY = None, ""
-_STATES = {
-    operation: (kind, int(operation > Operation.FORGET))
-    for operation, kind in zip(
-        range(Operation.SAVE, Operation.FORGET_END + 1), 2 * (Kind.SAVE, Kind.RESTORE, Kind.FORGET), strict=True
-    )
-}
+_STATES = {Operation.SAVE + n: (Kind(Kind.SAVE + n % 3), n // 3) for n in range(6)}
 """What is done to a state, and to which of an instance's."""
 
 
