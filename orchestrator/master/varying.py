@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 
 from .. import world
 from ..errors import RunError
-from ..fmi.binding import FmuSlave, LoadedSlave
+from ..fmi.binding import LoadedSlave
 from ..fmi.guard import NOTES, own_note, said
 from ..times import slack
 from . import compiled
@@ -213,7 +213,7 @@ class Blocks:
         plan.courses.store()
         self._algorithm.take(control)
         for culprit in {plan.culprits[n][0] for n in np.flatnonzero(disturbed).tolist()}:
-            assert isinstance(culprit, FmuSlave)
+            assert isinstance(culprit, LoadedSlave)
             culprit.mend()
         for slave in coupling.slaves.values():
             slave.time = float(control["time"])
