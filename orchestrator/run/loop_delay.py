@@ -74,7 +74,8 @@ def loop_delays(
         if parameters and own_steps <= {None, system.stepping.step}:
             maxima = {str(name): interfaces[name.instance].variables[name.variable].maximum for name in parameters}
             limits = {name: value for name, value in maxima.items() if value is not None}
-            found.append(_loop_delay(system, control, parameters, limits, wiring, sequence))
+            delay = _loop_delay(system, control, parameters, limits, wiring, sequence)
+            found += [delay] if delay.said else []
     return found
 
 
@@ -111,6 +112,9 @@ def _loop_delay(  # noqa: PLR0917
     steps = sum(costs.values())
     sample = wiring.starts[control.controller].get("sample_time") or system.stepping.step
     samples = round(steps * system.stepping.step / sample)
+    # A drive on the way may be late by a lag of its own, which is no step; who previews more means that.
+    is_led = not {link.source.instance for link in control.links} <= {control.controller, control.train}
+    parameters = {n: x for n, x in parameters.items() if n.variable != _PREVIEW or x <= samples or not is_led}
     right = {str(name): bool(samples) if name.variable == _LATE else samples for name in parameters}
     said = {str(name): value for name, value in parameters.items()}
     wanted = {name: value for name, value in right.items() if value != said[name]}

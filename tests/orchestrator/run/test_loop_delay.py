@@ -83,6 +83,20 @@ def test_samples_may_be_shorter_than_steps(found):
     assert "set ato.delay = 4 (which takes 2 at most) with timetable.preview = 4" in str(delay)
 
 
+@pytest.mark.parametrize(("preview", "wanted"), [(5, {}), (2, {}), (1, {"timetable.preview": 2})])
+def test_a_preview_may_be_longer_than_the_delay_where_a_drive_may_lag(found, preview, wanted):
+    """Shorter it may not be; and without anything between controller and train it is that of the delay."""
+    system = ato()
+    system.instances["timetable"].start["preview"] = preview
+    system.instances["ato"].start["delay"] = 2
+    (delay,) = found(system)
+    assert delay.wanted == wanted
+    direct = ato(protected=False)
+    direct.instances["timetable"].start["preview"] = preview
+    (delay,) = found(direct)
+    assert delay.wanted.get("timetable.preview", preview) == 1
+
+
 def test_it_is_told_what_to_set(workspace):
     (told,) = [note for note in check(ato(), workspace, "plain").notes if "acts on train" in note]
     assert told == (
