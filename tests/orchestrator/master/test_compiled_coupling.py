@@ -9,7 +9,7 @@ from railcosim.orchestrator.errors import CouplingError
 from railcosim.orchestrator.master import compiled
 from railcosim.orchestrator.master.plans.ability import can_be_restored
 from railcosim.orchestrator.run.execution import execute
-from railcosim.orchestrator.system import System
+from railcosim.orchestrator.system import Connection, Event, System
 
 pytestmark = [
     pytest.mark.skipif(compiled.kernel is None, reason="installed without the compiled step loop"),
@@ -137,3 +137,32 @@ def test_a_state_that_is_refused(both, able, first, status):
     system.instances["b"].start["mode"] = first + status
     result = both(system)
     assert (result.error.instance, result.time[-1]) == ("b", 4.75 if first == 120 else 5.0)
+
+
+WAYS = {
+    "extrapolation": {"extrapolation": 2},
+    "refresh": {"refresh": True},
+    "both": {"extrapolation": 1, "refresh": True},
+    "iterative": {"algorithm": "iterative", "tolerance": 1e-6},
+    "iterative, extrapolation": {"algorithm": "iterative", "tolerance": 1e-6, "extrapolation": 1},
+    "adaptive": {"algorithm": "adaptive", "tolerance": 0.05},
+    "adaptive, extrapolation": {"algorithm": "adaptive", "tolerance": 0.05, "extrapolation": 1},
+}
+
+
+@pytest.mark.parametrize("way", WAYS)
+@pytest.mark.parametrize("fade", [None, 0.75])
+def test_inputs_that_are_connected_anew(both, able, way, fade):
+    """For a while, again and again and for ever, beside a bias; b follows c and then a again, and c from 2.1 s on b."""
+    links = [("a.x", "b.u", 2.0), ("b.x", "a.u", -1.0), ("a.x", "c.u", 0.5), ("b.x", "a.v", 0.25)]
+    system = system_of(able, links, 4.0, **WAYS[way])
+    there = {"b.u": ("c.x", 0.5, {"duration": 0.5, "every": 1.5}), "c.u": ("b.y", 2.1, {})}
+    there["a.v"] = ("c.x", 1.0, {"duration": 1.0})
+    for signal, (source, at, how) in there.items():
+        connection = Connection(source, signal, scale=0.75)
+        system.events.append(Event(signal, "connect", at, source=connection, fade=fade, **how))
+    system.events.append(Event("b.u", "bias", 1.25, value=0.5, duration=1.0))
+    result = both(system)
+    assert result.status == "completed"
+    plain = both(system_of(able, links, 4.0, **WAYS[way]))
+    assert result["c.x"][-1] != plain["c.x"][-1]
