@@ -12,6 +12,8 @@ import sys
 import tempfile
 from pathlib import Path
 
+import numpy as np
+from numpy.typing import NDArray
 from railcosim.orchestrator import RailcosimError, load, run
 from railcosim.orchestrator.driving import load_case, optimise, write_profile
 
@@ -34,6 +36,8 @@ REST = 1.5 * STEP
 LEVEL = 10.0
 """s: who has followed a change of the acceleration late is level again after it."""
 RESERVE = 2.0 * REST / LEVEL
+TOO_FAST = 0.01
+"""m/s: at rest, and within a limit."""
 TOO_MUCH = 0.01
 """Share of the energy for which the friction brake, too, is used."""
 
@@ -58,6 +62,11 @@ def settings(inertia: float, time: float, lead: float) -> list[str]:
         f"ato[2].integral_gain={gain / integral_time}",
         f"ato[2].derivative_gain={gain * LAG}",
     ]
+
+
+def arrival(time: NDArray[np.float64], speed: NDArray[np.float64]) -> float:
+    """When a train has come to rest for good, in s."""
+    return float(time[np.flatnonzero(np.abs(speed) > TOO_FAST)[-1]])
 
 
 def electric(folder: Path, stock: Path) -> Path:
@@ -102,12 +111,19 @@ def drive(folder: Path, line: str, train: str) -> str:
             builds=builds,
             stop_time=round(time + 10.0 + 2.0 / first + 2.0 / last + 4.0),
         )
-        result = run(system, figures=False)
+        result = run(system.changed(record=STEP), figures=False)
+        due = arrival(result.time, result["timetable.reference_speed"])
         for k in (1, 2):
+            speed = result[f"train[{k}].speed"]
+            over = (speed - result["timetable.speed_limit"]).max()
             used = result[f"drive[{k}].drawn_energy"][-1] - result[f"drive[{k}].recovered_energy"][-1]
             off = result[f"ato[{k}].position_error"][-1]
             more = used - best.energy
-            told += [f"{100.0 * more / abs(best.energy):+.2f} %, {more / 3.6e6:+.2f} kWh", f"{off:+.2f} m"]
+            told += [
+                f"{100.0 * more / abs(best.energy):+.2f} %, {more / 3.6e6:+.2f} kWh",
+                f"{off:+.2f} m, {arrival(result.time, speed) - due:+.2f} s",
+            ]
+            told[-1] += f", {over:.2f} m/s too fast" if over > TOO_FAST else ""
     except RailcosimError as error:
         told = [str(error).splitlines()[0]]
     way = f"{line}, {stop / 1e3:.1f} km"
