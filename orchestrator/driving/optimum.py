@@ -72,19 +72,19 @@ def optimise(case: Case, solved: Solved = lambda *_: None) -> Optimum:
     quick = solve(dynamics, nodes, _Gentle(dynamics), None, warm=False)
     if case.wish.minimize == "time":
         return _refined(dynamics, quick, None, solved)
-    wanted, before = case.wish.time or 0.0, 1
+    wanted, already = case.wish.time or 0.0, 1
     if wanted < quick.time * 1.01:  # the coarse mesh knows the least time to a share of that
         quickest = _refined(dynamics, quick, None, solved)
-        quick, before = quickest.solution, len(quickest.meshes)
+        quick, already = quickest.solution, len(quickest.meshes)
         if wanted < quick.time:
             what = f"{wanted:g} s are too short: the least running time is {quick.time:.2f} s"
             raise ScenarioError(Problem(case.name, what, "give a longer 'time' (--time)"))
-    solved(before, len(quick.nodes) - 1)
+    solved(already, len(quick.nodes) - 1)
     first = solve(dynamics, quick.nodes, quick, wanted, warm=False)
-    return _refined(dynamics, first, wanted, solved, before)
+    return _refined(dynamics, first, wanted, solved, already)
 
 
-def _refined(dynamics: Dynamics, solution: Solution, time: float | None, solved: Solved, before: int = 0) -> Optimum:
+def _refined(dynamics: Dynamics, solution: Solution, time: float | None, solved: Solved, already: int = 0) -> Optimum:
     change: float | None = None
     meshes, iterations = [len(solution.nodes) - 1], solution.iterations
     errors, divided = _judged(dynamics, solution)
@@ -92,7 +92,7 @@ def _refined(dynamics: Dynamics, solution: Solution, time: float | None, solved:
     while divided.any() and len(meshes) < MESHES and (change is None or change > tolerance):
         middles = 0.5 * (solution.nodes[:-1] + solution.nodes[1:])[divided]
         nodes = np.sort(np.concatenate([solution.nodes, middles]))
-        solved(before + len(meshes), len(nodes) - 1)
+        solved(already + len(meshes), len(nodes) - 1)
         finer = solve(dynamics, nodes, solution, time, warm=True)
         before, after = (each.time if time is None else each.energy for each in (solution, finer))
         change = abs(after - before) / max(abs(after), 1e-9)
