@@ -128,10 +128,10 @@ static int side_of(double x)
     return (x > 0.0) - (x < 0.0);
 }
 
-/* On which sides states are that were set. */
-static void find_sides(Instance *s, bool were_set)
+/* On which sides states are. */
+static void find_sides(Instance *s)
 {
-    for (int k = 0; k < N_STANDSTILL && were_set; k++) {
+    for (int k = 0; k < N_STANDSTILL; k++) {
         s->sides[k] = side_of(s->values[FIRST_STATE + model_standstill[k]]);
     }
 }
@@ -152,26 +152,19 @@ static bool set_off(Instance *s)
     return any;
 }
 
-/* States that have passed their standstill stand; those that stand and are driven set off. */
-static bool stop_and_go(Instance *s)
+/* States that have passed their standstill stand. */
+static bool stop(Instance *s)
 {
-    bool changed = false;
+    bool any = false;
     for (int k = 0; k < N_STANDSTILL; k++) {
         double *x = &s->values[FIRST_STATE + model_standstill[k]];
-        int side = side_of(*x);
-        if (s->sides[k] != 0 && side != s->sides[k]) {
+        if (s->sides[k] != 0 && side_of(*x) != s->sides[k]) {
             *x = 0.0;
-            side = 0;
-            changed = true;
+            any = true;
         }
-        s->sides[k] = side;
     }
-    settle(s);
-    while (set_off(s)) {
-        changed = true;
-        settle(s);
-    }
-    return changed;
+    find_sides(s);
+    return any;
 }
 #endif
 
@@ -185,7 +178,7 @@ static void begin_exchange(Instance *s)
     }
 #endif
 #if N_STANDSTILL > 0
-    find_sides(s, true);
+    find_sides(s);
 #endif
     settle(s);
 }
@@ -204,7 +197,7 @@ static Status take_samples(Instance *s, bool *again)
         *again = *again || N_REINITIALISED > 0;
     }
 #if N_STANDSTILL > 0
-    find_sides(s, *again);
+    find_sides(s);
 #endif
     return STATUS_OK;
 }
@@ -235,15 +228,20 @@ static double next_time_event(const Instance *s)
 static Status update_discrete(Instance *s, bool *states_changed, double *next)
 {
     *states_changed = false;
+#if N_STANDSTILL > 0
+    *states_changed = stop(s); /* before a sample, which as in co-simulation sees nothing beyond a standstill */
+#endif
 #if IS_SAMPLED
     if (take_samples(s, states_changed) != STATUS_OK || draw(s) != STATUS_OK) {
         return STATUS_ERROR;
     }
 #endif
-#if N_STANDSTILL > 0
-    *states_changed = stop_and_go(s) || *states_changed;
-#else
     settle(s);
+#if N_STANDSTILL > 0
+    while (set_off(s)) {
+        *states_changed = true;
+        settle(s);
+    }
 #endif
     s->fresh = false;
     *next = next_time_event(s);

@@ -189,3 +189,25 @@ def test_a_train_brakes_to_rest_rests_and_departs_as_scipy_has_it():
     assert result["position"][rests][0] == pytest.approx(place, abs=1e-6)
     assert result["position"][-1] == pytest.approx(leaving.y[0, -1], abs=1e-6)
     assert result["speed"][-1] == pytest.approx(leaving.y[1, -1], abs=1e-7)
+
+
+@pytest.mark.long
+def test_a_train_rests_where_the_solver_has_no_steps_but_its_samples():
+    """Euler's steps end where samples are due: what passes its standstill in one stands before the sample is taken."""
+    result = fmpy.simulate_fmu(
+        exported("SubwayTrain"),
+        fmi_type="ModelExchange",
+        solver="Euler",
+        step_size=0.01,
+        output_interval=0.01,
+        stop_time=10.0,
+        record_events=False,
+        start_values={"speed_start": 2.0, "sample_time": 0.01},
+        input=np.array([(0.0, -2e5)], dtype=[("time", float), ("force", float)]),
+        output=["position", "speed"],
+    )
+    (arrived, *_) = np.flatnonzero(result["speed"] == 0.0)
+    assert 10 < arrived < 900
+    assert set(result["speed"][arrived:]) == {0.0}
+    assert np.ptp(result["position"][arrived:]) == 0.0
+    assert min(result["speed"]) == 0.0

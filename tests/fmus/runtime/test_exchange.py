@@ -222,6 +222,17 @@ def test_it_sets_off_with_a_sign_and_no_size(exchanged, side):
     assert fmu.numbers("EventIndicators") == [v]
 
 
+@pytest.mark.parametrize("side", [1.0, -1.0])
+def test_what_arrives_as_a_sample_is_due_stands_before_it_is_taken(exchanged, side):
+    fmu = exchanged("Sampler").initialize(v=side, sample_time=0.5)
+    fmu.event()
+    fmu.put(-1e-3 * side)
+    assert fmu.event(0.5) == (True, 1.0)
+    assert fmu.get("n") == 2
+    assert fmu.numbers("ContinuousStates") == [0.0]
+    assert fmu.event(1.0) == (False, 1.5)
+
+
 def test_what_time_sets_off_is_noticed(exchanged):
     fmu = exchanged("Driven").initialize()
     assert fmu.event() == (False, NULL)
