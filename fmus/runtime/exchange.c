@@ -153,18 +153,15 @@ static bool set_off(Instance *s)
 }
 
 /* States that have passed their standstill stand. */
-static bool stop(Instance *s)
+static void stop(Instance *s)
 {
-    bool any = false;
     for (int k = 0; k < N_STANDSTILL; k++) {
         double *x = &s->values[FIRST_STATE + model_standstill[k]];
         if (s->sides[k] != 0 && side_of(*x) != s->sides[k]) {
             *x = 0.0;
-            any = true;
         }
     }
     find_sides(s);
-    return any;
 }
 #endif
 
@@ -184,8 +181,8 @@ static void begin_exchange(Instance *s)
 }
 
 #if IS_SAMPLED
-/* The samples that are due, each at its own time; `again` tells whether they put states back. */
-static Status take_samples(Instance *s, bool *again)
+/* The samples that are due, each at its own time. */
+static Status take_samples(Instance *s)
 {
     double time = s->time;
     for (; sample_is_due(s); s->taken += 1.0) {
@@ -194,7 +191,6 @@ static Status take_samples(Instance *s, bool *again)
             return STATUS_ERROR;
         }
         s->time = time;
-        *again = *again || N_REINITIALISED > 0;
     }
 #if N_STANDSTILL > 0
     find_sides(s);
@@ -227,22 +223,25 @@ static double next_time_event(const Instance *s)
 /* What an event changes; whether states are among it, and when the next one is known to be. */
 static Status update_discrete(Instance *s, bool *states_changed, double *next)
 {
-    *states_changed = false;
+    memcpy(s->states, s->values + FIRST_STATE, N_STATES * sizeof(double));
 #if N_STANDSTILL > 0
-    *states_changed = stop(s); /* before a sample, which as in co-simulation sees nothing beyond a standstill */
+    stop(s); /* before a sample, which as in co-simulation sees nothing beyond a standstill */
 #endif
 #if IS_SAMPLED
-    if (take_samples(s, states_changed) != STATUS_OK || draw(s) != STATUS_OK) {
+    if (take_samples(s) != STATUS_OK || draw(s) != STATUS_OK) {
         return STATUS_ERROR;
     }
 #endif
     settle(s);
 #if N_STANDSTILL > 0
     while (set_off(s)) {
-        *states_changed = true;
         settle(s);
     }
 #endif
+    *states_changed = false;
+    for (int k = 0; k < N_STATES; k++) {
+        *states_changed = *states_changed || s->values[FIRST_STATE + k] != s->states[k];
+    }
     s->fresh = false;
     *next = next_time_event(s);
     return STATUS_OK;

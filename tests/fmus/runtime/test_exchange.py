@@ -153,7 +153,7 @@ def test_an_output_without_a_value_between_events_is_an_error(exchanged):
 
 def test_samples_are_taken_when_they_are_due_and_held_between(exchanged):
     fmu = exchanged("Sampler").initialize(sample_time=0.5)
-    assert fmu.event(u=1.0) == (True, 0.5)
+    assert fmu.event(u=1.0) == (False, 0.5)
     assert (fmu.get("n"), fmu.get("y")) == (1, 2.0)
     assert fmu.set("u", 3.0) == OK
     assert fmu.put(2.0) == OK
@@ -164,7 +164,7 @@ def test_samples_are_taken_when_they_are_due_and_held_between(exchanged):
     assert fmu.SetTime(c_double(0.5)) == OK
     assert fmu.EnterEventMode() == OK
     assert fmu.get("y") == 7.0  # of the inputs of this sample, and the memory before it
-    assert fmu.event() == (True, 1.0)
+    assert fmu.event() == (False, 1.0)
     assert (fmu.get("n"), fmu.get("y")) == (2, 7.0)
     assert fmu.event(2.0)[1] == 2.5  # those that were passed by are made up for
     assert fmu.get("n") == 5
@@ -181,6 +181,7 @@ def test_a_sample_may_put_a_state_back(exchanged):
     assert fmu.event(back=True)[0]
     assert fmu.numbers("ContinuousStates") == [-1.0]
     assert fmu.numbers("EventIndicators") == [-1.0]
+    assert fmu.event(0.1)[0] is False  # to where it is
 
 
 def test_random_numbers_change_when_their_hold_is_over(exchanged):
