@@ -25,6 +25,9 @@ Kind = Literal["LESS", "NOT_ABOVE", "BEFORE", "AFTER", "PIECE", "TIME_PIECE"]
 """Of modes: ``a < b``, ``a <= b``; time before or after something that does not move; the piece that a place is in."""
 _FAR = 1e300
 """Where pieces end that do not."""
+_AHEAD = 2e-12
+"""How far a piece of time is looked up ahead, so that the event at its end, whatever the rounding, is past it: further than
+the runtime is from a time event (`HYSTERESIS` of exchange.c), which so has every end before it that is not yet passed."""
 
 
 class Mode(NamedTuple):
@@ -204,7 +207,8 @@ class _Freezer:
         low, high = bounds(place)
         after = self.values[read[0]].after
         if after is not None:
-            return self._mode(Mode("TIME_PIECE", indicated=False), high - after, a, place)
+            ahead = a + _AHEAD * (1.0 + ca.fabs(self.found.clock[0]) + ca.fabs(after))
+            return self._mode(Mode("TIME_PIECE", indicated=False), high - after, ahead, place)
         below, above = a - low, high - a
         return self._mode(Mode("PIECE", indicated=True), ca.if_else(below < above, below, above), a, place)
 

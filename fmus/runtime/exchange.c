@@ -5,7 +5,8 @@
    A state that has a standstill and reaches it stands there exactly, and sets off with a sign and no size. */
 
 #if MODEL_EXCHANGE
-/* How far, of the size of what is compared, a comparison may be passed before it is told. */
+/* How far, of the size of what is compared, a comparison may be passed before it is told; for a time event, how far from
+   it an importer may come that sums up or multiplies times. */
 static const double HYSTERESIS = 1e-12;
 
 #if IS_SAMPLED
@@ -27,6 +28,12 @@ static void relate(Instance *s)
     MODEL_RELATIONS(clock, s->values, s->modes, s->relations);
 }
 
+/* The time that comparisons with it see. */
+static double time_seen(const Instance *s)
+{
+    return s->time + HYSTERESIS * (1.0 + fabs(s->time));
+}
+
 /* What a mode is at the present values. */
 static double present_mode(const Instance *s, int k)
 {
@@ -34,8 +41,8 @@ static double present_mode(const Instance *s, int k)
     switch (model_modes[k]) {
     case MODE_LESS: return first > 0.0 ? 1.0 : 0.0;
     case MODE_NOT_ABOVE: return first >= 0.0 ? 1.0 : 0.0;
-    case MODE_BEFORE: return s->time < first ? 1.0 : 0.0;
-    case MODE_AFTER: return s->time >= first ? 1.0 : 0.0;
+    case MODE_BEFORE: return time_seen(s) < first ? 1.0 : 0.0;
+    case MODE_AFTER: return time_seen(s) >= first ? 1.0 : 0.0;
     default: return second; /* the place of a piece */
     }
 }
@@ -210,7 +217,7 @@ static double next_time_event(const Instance *s)
     for (int k = 0; k < N_MODES; k++) {
         bool timed = model_modes[k] == MODE_BEFORE || model_modes[k] == MODE_AFTER || model_modes[k] == MODE_TIME_PIECE;
         double when = s->relations[2 * k];
-        next = timed && when > s->time && when < next ? when : next;
+        next = timed && when > time_seen(s) && when < next ? when : next;
     }
 #endif
     for (int n = 0; n < N_NOISES; n++) {

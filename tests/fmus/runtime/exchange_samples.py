@@ -84,3 +84,20 @@ class Nothing(Component):
 
     def derivatives(self):
         return {"x": -self.x}
+
+
+class Stairs(Component):
+    """Steps over time, whose ends are not where the roundings of one and of the other meet."""
+
+    after = Parameter("s", 3.7)
+    stair = Output("1")
+    whole = Output("1", int)
+    begun = Output("1", bool)
+
+    def outputs(self):
+        ends = [0.1 * k for k in range(1, 41)]
+        return {
+            "stair": piecewise_constant(self.time - self.after, ends, [float(k) for k in range(1, 41)]),
+            "whole": floor(self.time - self.after),
+            "begun": self.time >= 2.1,
+        }

@@ -86,6 +86,28 @@ def test_time_events_are_told_ahead_and_are_exact(exchanged):
     assert found == [(NULL, 1, 0, 1.0), (1.0, 0, 0, 2.0), (1.5, 0, 0, 3.0), (2.0, 0, 1, 3.0)]
 
 
+@pytest.mark.parametrize("after", [3.7, 0.3, -1.1, 1000.1])
+def test_at_a_time_event_a_piece_is_behind_whatever_the_rounding(exchanged, after):
+    fmu = exchanged("Stairs").initialize(start=after, after=after)
+    found = []
+    _, time = fmu.event()
+    while time < after + 4.05:
+        _, following = fmu.event(time)
+        found.append((time, fmu.get("stair"), fmu.get("whole")))
+        time = following
+    expected = [(after + 0.1 * k, float(k), k // 10) for k in range(2, 41)]  # the first has no beginning
+    assert found == [(pytest.approx(time, abs=1e-9), stair, whole) for time, stair, whole in expected]
+
+
+def test_an_importer_whose_times_are_rounded_comes_to_a_time_event_and_goes_on(exchanged):
+    fmu = exchanged("Stairs").initialize(start=2.0, after=100.0)
+    assert fmu.event()[1] == 2.1
+    assert fmu.get("begun") == 0
+    assert 3 * 0.7 < 2.1
+    assert fmu.event(3 * 0.7)[1] == 3.0
+    assert fmu.get("begun") == 1
+
+
 def test_a_frozen_branch_without_a_value_gives_way_to_the_equations_as_they_stand(choices):
     choices.put(5.0)
     choices.event(0.1)
