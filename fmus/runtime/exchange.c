@@ -258,7 +258,12 @@ static Status update_discrete(Instance *s, bool *states_changed, double *next)
 static void find_indicators(Instance *s, double *result)
 {
     int n = 0;
-    if (s->regime != REGIME_CONTINUOUS) {
+#if N_STANDSTILL > 0
+    if (s->phase == PHASE_INITIALIZATION) {
+        find_sides(s);
+    }
+#endif
+    if (s->regime == REGIME_EVENT) {
         settle(s);
     }
 #if N_MODES > 0

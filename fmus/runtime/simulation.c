@@ -215,6 +215,12 @@ static void restart(Instance *s)
     s->phase = PHASE_INSTANTIATED;
     s->time = s->start_time = s->last_successful_time = s->reached = 0.0;
     s->has_stop_time = s->fresh = s->prepared = s->based = false;
-    s->step = s->taken = 0.0;
+    s->step = s->taken = s->stop_time = s->base_time = 0.0;
+    memset(s->held, 0, sizeof s->held);
+#if MODEL_EXCHANGE
+    s->regime = REGIME_EVENT;
+    memset(s->modes, 0, sizeof s->modes);
+    memset(s->sides, 0, sizeof s->sides);
+#endif
     stop_inputs(s);
 }

@@ -299,6 +299,37 @@ def test_a_reset_begins_anew_and_is_still_for_model_exchange(exchanged):
     assert fmu.numbers("Derivatives") == [-1.0]
 
 
+@pytest.mark.parametrize("name", ["Choices", "Sampler", "Nothing"])
+def test_after_a_reset_all_is_as_in_a_new_instance(exchanged, name):
+    fmu = exchanged(name)
+    new = fmu.to_bytes(fmu.save())
+    fmu.initialize(stop=10.0)
+    fmu.event()
+    fmu.put(-1.5)
+    fmu.event(0.5)
+    fmu.put(-2.5)
+    assert fmu.Reset() == OK
+    assert fmu.to_bytes(fmu.save()) == new
+
+
+def test_in_initialization_mode_indicators_are_of_the_present_states(exchanged):
+    anew, again = exchanged("Choices"), exchanged("Choices").initialize(x=0.1)
+    again.event()
+    assert again.Reset() == OK
+    for fmu in (anew, again):
+        fmu.enter()
+        assert fmu.set("x_start", 2.5) == OK
+    first = anew.numbers("EventIndicators")
+    assert again.numbers("EventIndicators") == first
+    assert anew.ExitInitializationMode() == OK
+    assert anew.numbers("EventIndicators") == first
+    moving = exchanged("Sampler").enter()
+    assert moving.set("v_start", -7.5) == OK
+    assert moving.numbers("EventIndicators") == [-7.5]
+    assert moving.set("v_start", 7.5) == OK
+    assert moving.numbers("EventIndicators") == [7.5]
+
+
 def one_state(*states):
     return (c_double * 1)(*states)
 
