@@ -26,8 +26,8 @@ Kind = Literal["LESS", "NOT_ABOVE", "BEFORE", "AFTER", "PIECE", "TIME_PIECE"]
 _FAR = 1e300
 """Where pieces end that do not."""
 _AHEAD = 2e-12
-"""How far a piece of time is looked up ahead, so that the event at its end, whatever the rounding, is past it: further than
-the runtime is from a time event (`HYSTERESIS` of exchange.c), which so has every end before it that is not yet passed."""
+"""How far a piece of time is looked up ahead, so that the event at its end, whatever the rounding, is past it: further
+than what the runtime takes for the same time (`HYSTERESIS` of exchange.c), so that no end that is ahead is left out."""
 
 
 class Mode(NamedTuple):
