@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 
 from ...fmi import Interface
-from ...isolation import IsolatedSlave
 from ...system import System
 from ...wiring import Wiring
 from .algorithm import Batch, Explicit, Fit, Operation
@@ -24,6 +23,8 @@ class GaussSeidel(Explicit):
 
     def batches(self) -> Sequence[Batch]:
         """Set, step, get, instance by instance; at once for isolated ones in a row that hand nothing on."""
+        from ...isolation import IsolatedSlave  # noqa: PLC0415 (`list` loads this file, and no FMU)
+
         links = {(link.source.instance, link.target.instance) for link in self.coupling.exchange.every_link}
         groups: list[list[str]] = []
         are_apart = False
