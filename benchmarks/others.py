@@ -62,7 +62,7 @@ def fit(ours: Mapping[str, Any], found: Mapping[str, Any], direct: Set[str] = fr
         if own.shape != got.shape:
             raise ValueError(f"{name}: {len(got)} points, not {len(own)}")
         stands, ahead = _deviation(own, got), _deviation(own[1:], got[:-1])
-        if min(stands, ahead) > SAME:
+        if not min(stands, ahead) <= SAME:
             mixed += name in direct
             if name not in direct:
                 off[name] = stands
@@ -74,6 +74,9 @@ def fit(ours: Mapping[str, Any], found: Mapping[str, Any], direct: Set[str] = fr
 
 
 def _deviation(own: Any, got: Any) -> float:
+    """The largest, relative to the largest value above one unit; infinite where either holds no finite number."""
+    if not (np.isfinite(own).all() and np.isfinite(got).all()):
+        return np.inf
     return float(np.max(np.abs(got - own))) / max(1.0, float(np.max(np.abs(own))))
 
 

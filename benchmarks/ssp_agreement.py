@@ -219,7 +219,10 @@ def beside(own: Mapping[str, Any], signals: Mapping[str, Any]) -> str:
     if not signals:
         return "shows no signal of ours"
     direct = {one for one in signals if re.fullmatch(r".*\.acceleration(\[\d+\])?", one)}
-    return str(fit(own, signals, direct))
+    try:
+        return str(fit(own, signals, direct))
+    except ValueError as error:  # it has another number of points
+        return str(error)
 
 
 def among_each_other(outcomes: Mapping[str, Outcome]) -> Iterator[str]:
@@ -243,12 +246,17 @@ def _pair(outcomes: Mapping[str, Outcome], one: str, other: str) -> str:
         worst += [deviation(np.asarray(a[name]), np.asarray(b[name])) for name in a if name in b]
     if not worst:
         return "nothing in common"
-    apart = sum(each > SAME for each in worst)
+    apart = sum(not each <= SAME for each in worst)
     return f"**{max(worst):.0e}** ({apart} of {len(worst)})" if apart else f"{max(worst):.0e}"
 
 
 def deviation(a: Any, b: Any) -> float:
-    """Of two records of one signal, as they stand or one of them a point on; relative above one unit."""
+    """Of two records of one signal, as they stand or one of them a point on; relative above one unit.
+
+    Infinite where one of them holds what is no finite number.
+    """
+    if not (np.isfinite(a).all() and np.isfinite(b).all()):
+        return np.inf
     length, largest = min(len(a), len(b)), max(1.0, *(float(np.max(np.abs(x))) for x in (a, b)))
     a, b = a[:length], b[:length]
     pairs = ((a, b), (a[1:], b[:-1]), (a[:-1], b[1:]))

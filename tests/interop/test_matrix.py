@@ -29,6 +29,8 @@ def test_signals_are_the_same_early_mixed_or_depart(others):
     assert (found.plain, found.early, found.mixed) == (1, 1, 1)
     assert found.off == {"off": pytest.approx(0.01)}
     assert str(found) == "3e-13, 2 signals, 1 of them early, 1 more mixed, **1 more depart**, `off` most: 1e-02"
+    broken = others.fit({"a": ours}, {"a": np.array([0.0, np.nan, 300.0, 200.0])})
+    assert (broken.plain, broken.off) == (0, {"a": np.inf})
     with pytest.raises(ValueError, match="same: 3 points, not 4"):
         others.fit({"same": ours}, {"same": ours[:3]})
 

@@ -32,6 +32,8 @@ def test_records_are_compared_as_they_stand_or_a_point_on(agreement):
     assert agreement.deviation(values[1:], values) == 0.0
     assert agreement.deviation(values, values + 3.0) == pytest.approx(3 / 303)
     assert agreement.deviation(np.zeros(4), values) == 1.0
+    assert agreement.deviation(np.array([0.0, np.nan, 300.0, 200.0]), values) == np.inf
+    assert agreement.beside({"a.x": values}, {"a.x": values[:3]}) == "a.x: 3 points, not 4"
 
 
 def made(agreement, **signals):
