@@ -181,8 +181,10 @@ def valued(values: NDArray[Any]) -> NDArray[np.bool_] | None:
     places = np.flatnonzero(there)
     if len(places) in (len(values), 1) or not there[:1].any():
         return None
-    due = np.arange(len(values)) % places[1] == 0
-    return there if (due[:-1] == there[:-1]).all() else None
+    every = places[1]
+    due = np.arange(len(values)) % every == 0
+    kept = every > 1 and (due[:-1] == there[:-1]).all() and (there[-1] or not due[-1])
+    return there if kept else None
 
 
 def without_blanks(time: NDArray[np.float64], values: NDArray[Any]) -> tuple[NDArray[np.float64], NDArray[Any]]:

@@ -30,6 +30,8 @@ def test_values_at_every_so_many_points_and_the_last(values, places):
         [1.0, 2.0, 3.0, 4.0, 5.0, 6.0],
         [1.0, NAN, NAN, NAN, NAN, NAN],
         [1.0, 2.0, 3.0, NAN, NAN, NAN],
+        [1.0, 2.0, 3.0, 4.0, 5.0, NAN],
+        [1.0, NAN, 3.0, NAN, NAN],
         [NAN, 2.0, 3.0, 4.0, 5.0, 6.0],
         [1.0, NAN, 3.0, NAN, NAN, 6.0],
         [1.0, 2.0, NAN, 4.0, 5.0, 6.0],
