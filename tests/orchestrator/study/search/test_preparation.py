@@ -51,6 +51,21 @@ def test_a_search_is_the_same_on_workers(lagging, tmp_path, scheduler, once):
     assert not worker._OPEN
 
 
+def test_a_signal_is_nominally_what_it_is_however_little_is_recorded(lagging, tmp_path):
+    """The runs of the search record what the scenario says."""
+    found = []
+    for number, patterns in enumerate(([], ["lag.x"], {"lag.x": 0.1, "target.value": 1.0})):
+        system = lagging()
+        system.instances["target"].build["points"] = 2
+        system.instances["target"].start.update(times=[0.0, 0.5], values=[1.0, 2.0])
+        system.stepping.record_only = patterns
+        how = {"kind": "plain", "workers": 0}
+        with preparation.prepared(system, ["lag.u=signal(0, 9, 4)"], tmp_path / str(number), {}, **how) as made:
+            found.append(list(made.space.nominal.values()))
+        assert load(str(made.nominal)).stepping.record_only == patterns
+    assert found == [[1.0, 2.0, 2.0, 2.0]] * 3
+
+
 def test_models_that_take_the_place_of_others_reach_workers(lagging, tmp_path, scheduler, mine):
     vary = [f"lag={mine('Lag')},{mine('LagWithSlope')},NoSuch"]
     how = {"budget": 9, "kind": "plain", "figures": False}
