@@ -33,6 +33,7 @@ from .options import (
     check_workers,
     interrupted,
     load_system,
+    variant_of,
 )
 
 if TYPE_CHECKING:
@@ -113,7 +114,7 @@ def study(
     )
     plan = make_plan(system, vary or (), runs=runs, seed=seed, design=design)
     how: dict[str, Any] = {
-        "scenario": scenario,
+        "scenario": scenario if variant is None else variant_of(scenario, variant),
         "preset": preset,
         "settings": [*(settings or ()), *_isolating(system, isolated or [])],
         "builds": builds or [],

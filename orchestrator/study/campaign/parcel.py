@@ -21,6 +21,7 @@ from ...digests import digest_of
 from ...errors import ScenarioError, naming
 from ...fmi import is_fmu_name, packaged
 from ...scenario import parse_value
+from ...ssp import is_ssp_name
 from ...system import System
 
 MODELS = os.path.dirname(os.path.abspath(models.__file__ or ""))
@@ -151,7 +152,9 @@ def moved(value: Any, folder: str, where: Where) -> Any:
 def moved_options(how: Mapping[str, Any], folder: str, where: Where) -> dict[str, Any]:
     """The arguments of a `Runner` with the files that they name where those are now."""
     found = dict(how)
-    found["scenario"] = moved(how["scenario"], folder, where)
+    scenario = str(how["scenario"])
+    file, sign, variant = scenario.partition("#") if is_ssp_name(scenario) else (scenario, "", "")
+    found["scenario"] = f"{moved(file, folder, where)}{sign}{variant}"
     for option in ("settings", "builds", "swaps"):
         found[option] = [_moved_assignment(text, folder, where) for text in how.get(option) or ()]
     return found

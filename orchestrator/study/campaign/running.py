@@ -19,6 +19,7 @@ from ...errors import RailcosimError, ScenarioError
 from ...fmi import Workspace
 from ...run import Interruption, RunDirectory, check
 from ...scenario import is_structural
+from ...ssp import is_ssp_name
 from ...system import System
 from ..design import Plan
 from ..structure import Runner
@@ -118,7 +119,13 @@ def need_packages(*names: str) -> None:
 
 def _absolute(scenario: str) -> str:
     """A scenario's path, which leads there from everywhere; the name of a shipped one as it is."""
-    return os.path.abspath(scenario) if os.path.dirname(scenario) or scenario.endswith(".toml") else scenario
+    is_file = scenario.endswith(".toml") or is_ssp_name(scenario)
+    return os.path.abspath(scenario) if os.path.dirname(scenario) or is_file else scenario
+
+
+def _variant(scenario: str) -> str:
+    """Which of the system structures of an SSP a scenario is."""
+    return scenario.partition("#")[2] if is_ssp_name(scenario) else ""
 
 
 def _systems(runner: Runner, plan: Plan) -> list[System]:
@@ -212,7 +219,9 @@ def _opened(place: RunDirectory, dataset: Dataset, told: dict[str, Any], resume:
             "another directory by -o"
         )
     now = json.loads(json.dumps(told, default=str))
-    now["how"]["scenario"] = before.told["how"]["scenario"]  # it may stand elsewhere: its content counts
+    began = before.told["how"]["scenario"]
+    if _variant(began) == _variant(now["how"]["scenario"]):
+        now["how"]["scenario"] = began  # it may stand elsewhere: its content counts
     other = [what for key, what in _SAME.items() if before.told.get(key) != now[key]]
     if other:
         raise ScenarioError(

@@ -119,7 +119,7 @@ class Unpacked:
 
     def _make_absolute_paths_lead_here(self) -> None:
         scenario = self._laid(str(self._parcel.how["scenario"]))
-        if not scenario.is_file():  # one that is shipped
+        if scenario.suffix.lower() != ".toml" or not scenario.is_file():  # an SSP names no file, one is shipped
             return
         text = world.read_text(scenario, encoding="utf-8")
         for file in self._parcel.files:

@@ -2,6 +2,7 @@
 
 import json
 
+import pandas
 import pytest
 from railcosim.fmus.build import build
 from railcosim.orchestrator import Results, ScenarioError, load, run
@@ -86,6 +87,17 @@ def test_a_variant_by_option(passing, tmp_path, capsys, monkeypatch):
         assert said in " ".join(capsys.readouterr().err.split())
     assert call(["describe", "PointMassTrain", "--variant", "Four"]) == 2
     assert call(["run", "--resume", str(tmp_path / "results" / "system-Four"), "--variant", "Four"]) == 2
+
+
+def test_a_study_of_a_variant(passing, tmp_path, capsys, monkeypatch):
+    """It runs the variant, not the default; it is not gone on with as a study of another one."""
+    monkeypatch.chdir(tmp_path)
+    words = ["study", "system.ssp", "--vary", "first.gain=1,2", "--record", "first.y", "--workers", "0", "-q"]
+    assert call([*words, "--variant", "Four", "--no-figures"]) == 0
+    series = pandas.read_parquet(tmp_path / "results" / "system-Four-study" / "series.parquet")
+    assert set(series["first.y"]) == {5.0, 9.0}  # u = 4, and not 2
+    assert call([*words, "-o", "results/system-Four-study", "--no-figures", "--resume"]) == 2
+    assert "another study: the options differs" in " ".join(capsys.readouterr().err.split())
 
 
 def test_an_archive_without_a_default_asks_for_a_variant(archive, capsys):

@@ -3,12 +3,14 @@
 import hashlib
 import os
 import shutil
+import zipfile
 from dataclasses import replace
 
 import pytest
-from railcosim.orchestrator import world
+from railcosim.orchestrator import System, world
 from railcosim.orchestrator.errors import RailcosimError
 from railcosim.orchestrator.fmi import models
+from railcosim.orchestrator.packing import export
 from railcosim.orchestrator.study import Runner
 from railcosim.orchestrator.study.campaign import worker
 from railcosim.orchestrator.study.campaign.parcel import MODELS, packed, this_version
@@ -121,6 +123,30 @@ def test_a_shipped_scenario_does_not_travel(monkeypatch):
     elsewhere = replace(parcel, models="/opt/models", files={"/opt/models/comfort_cruise.toml": "0" * 64})
     with pytest.raises(RailcosimError, match=r"a worker has another comfort_cruise\.toml than the study"):
         worker.work(elsewhere, [{}], [])
+
+
+def test_an_archive_travels_with_its_variants(tmp_path, monkeypatch):
+    """By a path from a folder, too; the variant is named behind the file, wherever that is."""
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "home").mkdir()
+    system = System(stop_time=2.0, step=0.5)
+    system.add("target", "Schedule", values=1.0)
+    export(system, tmp_path / "home/a.ssp")
+    with zipfile.ZipFile(tmp_path / "home/a.ssp", "a") as archive:
+        text = archive.read("SystemStructure.ssd")
+        assert b'stopTime="2.0"' in text
+        archive.writestr("Short.ssd", text.replace(b'stopTime="2.0"', b'stopTime="1.0"').replace(b"= 2.0", b"= 1.0"))
+    for name, end in (("home/a.ssp", 2.0), ("home/a.ssp#Short", 1.0)):
+        how = {"scenario": name, "record": ["target.value"]}
+        with Runner(**how) as runner:
+            parcel = packed(how, [runner.load({})], "auto")
+        contents = unpack_all(parcel)
+        with monkeypatch.context() as patch:
+            patch.chdir("/")
+            (row,), _ = worker.work(parcel, [{}], contents)
+        worker.forget(parcel.digest)
+        assert row.status == "completed", row.error
+        assert row.series["time"][-1] == end
 
 
 def test_another_version_is_refused(study):
