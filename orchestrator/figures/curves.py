@@ -79,7 +79,11 @@ def _entry(x: Any, text: str, label: str, entry: int, signals: Signals) -> list[
             across = np.broadcast_to(across, y.shape)
         resolved = expression.resolve(names, index)
         recorded = [name for each in resolved for name in each if name in signals.names()]
-        blank = bool(np.isnan(y).any()) and any(valued(signals[name]) is not None for name in recorded)
+        beside = parse(x, FUNCTIONS).resolve(names, index) if isinstance(x, str) else []
+        recorded += [name for each in beside for name in each if name in signals.names()]
+        blank = bool(np.isnan(y).any() or np.isnan(across).any()) and any(
+            valued(signals[name]) is not None for name in recorded
+        )
         unit = unit_of(expression, signals, index)
         drawn += [
             (
@@ -103,7 +107,7 @@ def _entry(x: Any, text: str, label: str, entry: int, signals: Signals) -> list[
 
 def _filled(x: Array, y: Array, *, blank: bool) -> tuple[Array, Array]:
     """A line through the points that there are, where some are blank because a signal is recorded less often."""
-    there = ~np.isnan(y) | (not blank)
+    there = ~(np.isnan(x) | np.isnan(y)) | (not blank)
     return x[there], y[there]
 
 

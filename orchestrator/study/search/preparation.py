@@ -110,7 +110,9 @@ def prepared(
     dimensions, signals = read_space(vary)
     _check(system, requirements, [one.name for one in dimensions])
     system = system.changed(metrics={**system.judged.metrics, **(metrics or {})}, modified=True)
-    nominal = execute(system.changed(record=None, record_only=[]) if signals else system, kind=kind)  # as they are varied
+    nominal = execute(
+        system.changed(record=None, record_only=[]) if signals else system, kind=kind
+    )  # as they are varied
     if nominal.signal:
         raise InterruptedSearch(nominal.signal)
     if nominal.error is not None:
