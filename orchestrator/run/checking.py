@@ -121,7 +121,17 @@ def _recorded(system: System, names: Collection[str]) -> tuple[Collection[str], 
         for pattern in patterns
         if not matching(names, [pattern])
     ]
-    return matching(names, patterns) if patterns else names, problems
+    return matching(names, patterns) if patterns else names, [*problems, *_apart(system)]
+
+
+def _apart(system: System) -> Iterator[Problem]:
+    """What is wrong with how often signals are recorded, where that is said for each."""
+    patterns, rows = system.stepping.record_only, system.stepping.record or system.stepping.step
+    for pattern, apart in patterns.items() if isinstance(patterns, dict) and 0.0 < rows < math.inf else ():
+        if count_steps(0.0, apart, rows) is None:
+            message = f"{digits(apart)} s of {pattern!r} is no whole number of rows, which are {digits(rows)} s apart"
+            remedy = f"take a multiple of {digits(rows)} s, or a simulation.record that divides all"
+            yield Problem("simulation.record_only", message, remedy)
 
 
 def _without_unrecorded(system: System, drawable: Collection[str], every_step: bool) -> tuple[System, list[str]]:

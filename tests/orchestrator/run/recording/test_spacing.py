@@ -1,6 +1,8 @@
 """Groups of signals that are recorded as often as is said for each: values by hand, files, figures, comparisons."""
 
 import csv
+import json
+import re
 
 import numpy as np
 import pandas
@@ -10,7 +12,8 @@ from railcosim.orchestrator.cli.app import call
 from railcosim.orchestrator.errors import ScenarioError
 from railcosim.orchestrator.figures.curves import curves_of
 from railcosim.orchestrator.figures.outline import MOST_POINTS
-from railcosim.orchestrator.report.content import Columns, read_content
+from railcosim.orchestrator.report import content
+from railcosim.orchestrator.report.content import pack
 from railcosim.orchestrator.run.recording.spacing import Spacing, kept_signals
 from railcosim.orchestrator.scenario import dump
 from railcosim.orchestrator.system import Stepping
@@ -105,12 +108,34 @@ def test_a_scenario_that_is_written_has_them(scenario, tmp_path):
         ),
         ('record_only = { "lag[1].z" = 0.1 }', r"record_only: no signal is called 'lag\[1\]\.z'"),
         ("record_only = {}", "is not a list of names, nor a table of names and times"),
-        ('record = 0\nrecord_only = { "lag[1].x" = 0.1 }', r"record"),
+        (
+            'record = 0\nrecord_only = { "lag[1].x" = 0.1 }',
+            r"simulation\.record: 0 s is not a whole number of steps of 0\.1 s",
+        ),
     ],
 )
 def test_what_is_no_group_is_refused(scenario, written, message):
     with pytest.raises(ScenarioError, match=message):
         run(scenario(written), kind="plain")
+
+
+@pytest.mark.parametrize(
+    ("stepping", "said"),
+    [
+        (
+            {"record": 0.2},
+            "0.3 s of 'lag*.x' is no whole number of rows, which are 0.2 s apart; take a multiple of 0.2",
+        ),
+        ({"record": 0.1, "record_only": {"lag*.x": -0.2}}, "-0.2 s of 'lag*.x' is no whole number of rows"),
+        ({"record": None, "record_only": {"lag*.x": 0.25}}, "0.25 s of 'lag*.x' is no whole number of rows"),
+        ({"record": 0.1, "record_only": {"lag*.x": float("nan")}}, "nan s of 'lag*.x' is no whole number of rows"),
+        ({"record": float("inf")}, "record = inf s is inf steps of 0.1 s"),
+    ],
+)
+def test_distances_that_python_sets_are_checked_too(scenario, stepping, said):
+    system = scenario('record_only = { "lag*.x" = 0.3 }').changed(stop_time=1.2, **stepping)
+    with pytest.raises(ScenarioError, match=re.escape(said)):
+        run(system, kind="plain")
 
 
 def test_texts_are_blank_texts():
@@ -150,11 +175,27 @@ def test_what_is_drawn_goes_through_the_values_that_there_are(scenario, tmp_path
     assert (len(every.x), len(second.x)) == (12, 7)
     assert list(second.x.round(9)) == [0.0, 0.2, 0.4, 0.6, 0.8, 1.0, 1.1]
     assert not np.isnan(second.y).any()
+    for x, y in (("lag[1].x", "lag[2].x"), ("lag[2].x", "lag[1].x")):
+        (beside,) = curves_of({"x": x, "y": [y]}, few.results)
+        assert (beside.x == beside.y).all()
+        assert len(beside.x) == 7
     (gap,) = curves_of({"y": ["1 / (lag[1].x - lag[1].x)"]}, few.results)
     assert len(gap.x) == 12
     assert len(few.figures) == 1
-    content = read_content(tmp_path / "out", Columns())
-    assert set(content.places) == set(few.results)
+
+
+def test_a_page_has_a_line_or_the_last_value_where_there_is_none(scenario, tmp_path, monkeypatch):
+    few = run(scenario(GROUPS), kind="plain", output=tmp_path / "out")
+    record = json.loads((tmp_path / "out" / "run.json").read_text()) | {"stepwise": ["lag[2].x"]}
+    (tmp_path / "out" / "run.json").write_text(json.dumps(record))
+    packed = []
+    monkeypatch.setattr(content, "pack", lambda column: (packed.append(column), pack(column))[1])
+    places = content.read_content(tmp_path / "out", content.Columns()).places
+    assert set(places) == set(few.results)
+    assert not np.isnan(packed).any()
+    second, third = (few.results[f"lag[{k}].x"] for k in (2, 3))
+    assert packed[places["lag[2].x"]].tolist() == [second[k] for k in (0, 0, 2, 2, 4, 4, 6, 6, 8, 8, 10, 11)]
+    assert packed[places["lag[3].x"]][2] == pytest.approx((third[0] + third[4]) / 2)
 
 
 def test_a_long_run_is_outlined_by_the_values_that_there_are():
