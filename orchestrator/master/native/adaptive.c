@@ -291,16 +291,22 @@ static int choose(Doubling *it, double until)
     }
 }
 
-/* One step; where it is for Python, all but the FMUs is as it was at its begin. */
+/* All but the FMUs is again as it was at the begin of the step. */
+static void undo(Doubling *it)
+{
+    recall(it, &it->begin);
+    copy(it, it->plan->values, it->begin.values);
+}
+
+/* One step, unless it is for Python; what to undo is kept before the first call, which may be left. */
 static int advance(Doubling *it, double until)
 {
-    go(it, KEEP, it->control->time, 0.0);
     keep_memory(it, &it->begin);
+    go(it, KEEP, it->control->time, 0.0);
     if (choose(it, until)) {
         return 1;
     }
-    recall(it, &it->begin);
-    copy(it, it->plan->values, it->begin.values);
+    undo(it);
     return 0;
 }
 
@@ -341,6 +347,7 @@ Outcome take_adaptive(Plan *plan, Hand *hand, const Block *block, Control *contr
     int way = guard.safely(take_all, &it, &code);
     if (way != 0) {
         note_failure(hand, block->places, way, code);
+        undo(&it);
     }
     return it.outcome;
 }

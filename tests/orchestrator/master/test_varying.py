@@ -156,10 +156,11 @@ def test_an_observer_ends_a_run(species, instantiated, record, after):
         assert list(seen[-1][3][-1]) == [master.time, *master.values]
 
 
-def test_an_fmu_that_would_end_the_process(both, lag, lag_description):
-    """It is not tried again."""
+@pytest.mark.parametrize("record", [None, 0.1])
+def test_an_fmu_that_would_end_the_process(both, lag, lag_description, record):
+    """It is not tried again; the last row is that of the begin of its step."""
     text = lag_description.replace("modelIdentifier=", 'canHandleVariableCommunicationStepSize="true" modelIdentifier=')
-    system = System(stop_time=1.0, step=0.1, algorithm="adaptive", tolerance=1e-2)
+    system = System(stop_time=1.0, step=0.1, algorithm="adaptive", tolerance=1e-2, record=record)
     system.add("good", str(lag(text, name="good.fmu")))
     system.add(
         "bad", str(lag(text, name="bad.fmu", options=["-include", "stdlib.h"], on_step="if (t > 0.45) exit(0);"))
