@@ -67,6 +67,18 @@ int resolve_channel(const Plan *plan, const Py_buffer *buffers, const Operation 
     return group->function != 0;
 }
 
+/* Whether there are the inputs of a channel that points belong to, and no more points than there is room for. */
+static int points_fit(const Plan *plan, const Course *course, int64_t width)
+{
+    for (int64_t n = course->begin; n < course->begin + course->count; n++) {
+        const Points *points = &plan->points[n];
+        if (!is_within(points->place, 1, (size_t)width) || points->count < 0 || points->count > 3) {
+            return 0;
+        }
+    }
+    return 1;
+}
+
 int resolve_course(Plan *plan, const Py_buffer *buffers, const Operation *operation, Group *group, Call *call)
 {
     if (!is_within(operation->index, 1, length(buffers, COURSES))) {
@@ -79,11 +91,8 @@ int resolve_course(Plan *plan, const Py_buffer *buffers, const Operation *operat
         course->at < AT_STAMP || course->at > AS_NOTED || (course->at == AT_STAMP && plan->stamps == NULL)) {
         return 0;
     }
-    for (int64_t n = course->begin; n < course->begin + course->count; n++) {
-        const Points *points = &plan->points[n];
-        if (!is_within(points->place, 1, group->count) || points->count < 0 || points->count > 3) {
-            return 0;
-        }
+    if (!points_fit(plan, course, (int64_t)group->count)) {
+        return 0;
     }
     size_t room = 4 * (size_t)course->count; /* for two orders and as many references, as integers */
     plan->largest = room > plan->largest ? room : plan->largest;
@@ -96,7 +105,7 @@ int resolve_course(Plan *plan, const Py_buffer *buffers, const Operation *operat
     return 1;
 }
 
-/* Whether a course's points can take those of another. */
+/* Whether a course's points can take those of another: they are used as they are there. */
 static int courses_fit(const Plan *plan, const Py_buffer *buffers, const Noting *noting)
 {
     size_t count = length(buffers, COURSES), room = length(buffers, POINTS);
@@ -104,8 +113,9 @@ static int courses_fit(const Plan *plan, const Py_buffer *buffers, const Noting 
         return 0;
     }
     const Course *from = &plan->courses[noting->course], *to = &plan->courses[noting->shown];
-    return from->count >= 0 && from->count == to->count && is_within(from->begin, from->count, room) &&
-           is_within(to->begin, to->count, room);
+    return from->channel == noting->from && to->channel == noting->to && from->count >= 0 && from->count == to->count &&
+           is_within(from->begin, from->count, room) && is_within(to->begin, to->count, room) &&
+           points_fit(plan, from, plan->channels[noting->to].count);
 }
 
 int resolve_note(const Plan *plan, const Py_buffer *buffers, const Operation *operation, Group *group, Call *call)

@@ -154,6 +154,13 @@ def noting(arguments, *, points=(0, 1), **of):
     return {"notes": notes, "courses": courses, "points": np.zeros(1, POINTS), "operations": operations}
 
 
+def noting_by(arguments, name, value, at=0):
+    """The same, but for one thing of a course; or of its point, which nothing else has a look at."""
+    made = noting(arguments)
+    array = "points" if name in ("place", "count") else "courses"
+    return made | {array: changed(made[array], name, value, at)}
+
+
 def varying(arguments, *, place=0, parts=13, **of):
     """Steps that vary, but for one thing."""
     control = np.zeros(1, CONTROL)
@@ -274,6 +281,12 @@ WRONG = {
         f"a note whose {name} is {value}": partial(noting, **{name: value})
         for name, value in [("from", -1), ("from", 10**6), ("to", -1), ("to", 10**6), ("course", 2), ("shown", -1)]
     },
+    "a note of a course of another channel": partial(noting_by, name="channel", value=1),
+    "a note to a course of another channel": partial(noting_by, name="channel", value=1, at=1),
+    **{
+        f"a note of a point whose {name} is {value}": partial(noting_by, name=name, value=value)
+        for name, value in [("place", 10**6), ("place", -1), ("count", 4), ("count", -1)]
+    },
     "steps that vary in one part": partial(varying, parts=1),
     "a value that is not there is watched": partial(varying, plain_count=1, place=10**6),
     **{
@@ -307,6 +320,13 @@ WRONG = {
 def test_a_plan_that_is_not_sound_is_refused(arguments, wrong):
     with pytest.raises(ValueError, match=r"^kernel: "):
         call(arguments, **WRONG[wrong](arguments))
+
+
+def test_points_that_are_noted(arguments):
+    """Where nothing of it is wrong; see `WRONG`."""
+    made = noting(arguments)
+    assert call(arguments, **made) == (4, 4, 1)
+    assert call(arguments, **made | {"notes": changed(made["notes"], "course", -1)}) == (4, 4, 1)
 
 
 def test_what_is_not_an_array_is_refused(arguments):
