@@ -129,7 +129,8 @@ class HostProcess:
             HostLostError: it is gone, or does not listen.
         """
         self._asked = seat
-        if self._expecting and self._unread + len(frames) > _MOST_UNREAD:  # lest both wait for the other to listen
+        is_much = len(self._expecting) >= _MOST_EXPECTED or self._unread + len(frames) > _MOST_UNREAD
+        if self._expecting and is_much:  # lest both wait for the other to listen
             self._collect()
         if seat != self._told_seat:
             frames = messages.frame(messages.SEAT, seat) + frames
@@ -363,8 +364,9 @@ class HostProcess:
         return [cut(line, _LINE) for line in lines[-_LINES:]]
 
 
-_MOST_UNREAD = 1 << 15
-"""Bytes that may be sent before an answer is read: less than a socket holds."""
+_MOST_UNREAD, _MOST_EXPECTED = 1 << 12, 64
+"""Bytes that may be sent before an answer is read, and answers that may be under way: less than a socket holds, on
+either side. It counts what it keeps of each message as well: a few hundred small ones fill it."""
 _KILL = 9
 """SIGKILL, which Windows has no name for."""
 

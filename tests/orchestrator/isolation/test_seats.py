@@ -3,6 +3,7 @@
 import os
 import re
 import shutil
+import socket
 import sys
 import time
 from pathlib import Path
@@ -110,8 +111,9 @@ def test_what_is_asked_of_one_is_not_answered_by_another(shared):
     assert len({one.pid for one in (a, b, c)}) == 1
 
 
-def test_answers_are_read_before_more_is_said_than_a_socket_holds(shared, monkeypatch):
-    monkeypatch.setattr(host_process, "_MOST_UNREAD", 10)
+@pytest.mark.parametrize(("limit", "most"), [("_MOST_UNREAD", 10), ("_MOST_EXPECTED", 1)])
+def test_answers_are_read_before_more_is_said_than_a_socket_holds(shared, monkeypatch, limit, most):
+    monkeypatch.setattr(host_process, limit, most)
     a, b = shared("a", "b")
     for k in range(3):
         for one in (a, b):
@@ -119,7 +121,18 @@ def test_answers_are_read_before_more_is_said_than_a_socket_holds(shared, monkey
             assert one.channel("Real", ["calls"]).get() == [k + 1.0]
     for one in (a, b):
         one.step(1.5, 0.5)
+    assert len(a._process._expecting) == 1, "what a has answered was read before b was asked"
     assert [one.channel("Real", ["calls"]).get() for one in (a, b)] == [[4.0], [4.0]]
+
+
+def test_a_socket_holds_what_is_not_read():
+    """Of whatever length: what goes there, and what comes back while nobody reads it."""
+    one, other = socket.socketpair()
+    with one, other:
+        for end in (one, other):
+            end.setblocking(False)
+            for _ in range(host_process._MOST_EXPECTED):
+                end.send(bytes(max(1, host_process._MOST_UNREAD // host_process._MOST_EXPECTED)))
 
 
 def test_one_is_given_back_and_the_other_goes_on(shared):
