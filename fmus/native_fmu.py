@@ -16,11 +16,11 @@ from .toolchain import PLATFORMS, compile_library, folders
 _RUNTIME = Path(__file__).parent / "runtime"
 _PARTS = (
     *("log.c", "noise.c", "tape.c", "inputs.c", "integration.c", "simulation.c"),
-    *("advance.c", "exchange.c", "life.c", "values.c", "derivatives.c", "state.c"),
+    *("advance.c", "exchange.c", "life.c", "values.c", "regimes.c", "derivatives.c", "state.c"),
 )
 _FUNCTIONS: dict[FmiVersion, tuple[str, ...]] = {"2": ("fmi2.c",), "3": ("fmi3.c", "absent.c")}
-_EXCHANGE = ("exchange.c", "exchange2.c")
-"""The parts of model exchange: what no version knows, and the functions of FMI 2.0."""
+_EXCHANGE = ("exchange.c", "regimes.c", "exchange2.c", "exchange3.c")
+"""The parts of model exchange: what no version knows, and the functions of each."""
 
 # The standards differ: sources have a prefix that a shared library takes off, or none that a program may put on.
 _PREFIX: dict[FmiVersion, str] = {
@@ -90,7 +90,7 @@ def _sources(
         files["equations.c"] += f"\n{added.code}"
     else:
         files = {file: text for file, text in files.items() if file not in _EXCHANGE}
-    parts = ("lookup.c", "equations.c", *_PARTS, *_FUNCTIONS[fmi], _EXCHANGE[1])
+    parts = ("lookup.c", "equations.c", *_PARTS, *_FUNCTIONS[fmi], f"exchange{fmi}.c")
     includes = "".join(f'#include "{part}"\n' for part in parts if part in files)
     files[SOURCE] = (
         f"/* {name}: one translation unit. {_PREFIX[fmi].format(name=name)}"
