@@ -168,8 +168,9 @@ def exports(components: list[str]) -> Iterator[tuple[str, list[Path]]]:
     for fmi in get_args(FmiVersion):
         print(f"FMI {fmi}", file=sys.stderr, flush=True)
         yield f"FMI {fmi}.0, native", [build(name, kind="native", fmi=fmi) for name in components]
-    both = [build(name, kind="native", profile="model-exchange") for name in components]
-    yield "FMI 2.0, native, with model exchange", both
+    for fmi in get_args(FmiVersion):
+        both = [build(name, kind="native", profile="model-exchange", fmi=fmi) for name in components]
+        yield f"FMI {fmi}.0, native, with model exchange", both
     yield "FMI 2.0, Python", [build(name, kind="python") for name in components]
 
 

@@ -68,7 +68,7 @@ def release(
         write_whole(source.read_bytes(), target)
         written.append(target)
         note = f", not a native one: {problem}" if problem else ""
-        version = ", FMI 3.0" if fmi == "3" else _WITH.get(profile, "")
+        version = _WITH.get(profile, "") + (", FMI 3.0" if fmi == "3" else "")
         what = f"native{version}, {' '.join(chosen)}" if made == "native" else f"a Python FMU{note}"
         cost = f"{time.perf_counter() - begin:.1f} s, {target.stat().st_size / 1000:.0f} kB"
         tell(f"[{count}/{len(references)}] {target.stem}: {what} ({cost})")
@@ -102,8 +102,6 @@ def _check(
 ) -> None:
     if fmi == "3" and profile == "real-time":
         raise ComponentError("--profile real-time is FMI 2.0, whose functions its host in C calls; leave out --fmi 3")
-    if fmi == "3" and profile == "model-exchange":
-        raise ComponentError("--model-exchange is FMI 2.0: of FMI 3.0 there is co-simulation alone; leave out --fmi 3")
     if kind == "python" and profile == "model-exchange":
         raise ComponentError("--model-exchange is for native FMUs; pythonfmu's wrapper has co-simulation alone")
     if fmi == "3" and kind == "python":

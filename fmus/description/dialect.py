@@ -18,6 +18,11 @@ class ModelExchange(NamedTuple):
     indicators: int
     reinitialised: tuple[str, ...]
 
+    def puts_back(self, variable: ScalarVariable) -> bool:
+        """Whether events may set a state anew: at samples, or where it stands still."""
+        stands = getattr(variable.slot.declaration, "standstill", False)
+        return variable.is_kept and (stands or variable.name in self.reinitialised)
+
 
 class Described(NamedTuple):
     """What every version says of a component, each in its way.
@@ -47,6 +52,7 @@ class Dialect(ABC):
         token: the attribute that binary and description share.
         states: how the attributes for states spell their word.
         derivatives: the attribute for directional derivatives.
+        steps: the attribute, and its value, that says of model exchange that no step has to be told.
         units: those of variables that this version has beside the component's.
     """
 
@@ -54,6 +60,7 @@ class Dialect(ABC):
     token: ClassVar[str]
     states: ClassVar[str]
     derivatives: ClassVar[str]
+    steps: ClassVar[tuple[str, str]]
     units: ClassVar[frozenset[str]] = frozenset()
 
     @abstractmethod

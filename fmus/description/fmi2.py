@@ -24,6 +24,7 @@ class Fmi2(Dialect):
     """FMI 2.0."""
 
     version, token, states, derivatives = "2.0", "guid", "state", "providesDirectionalDerivative"
+    steps = ("completedIntegratorStepNotNeeded", "true")
 
     def complete(self, capabilities: Any, *, native: bool, interpolates: bool) -> None:
         """No memory is asked for; inputs take derivatives; sources stand in the description."""
@@ -35,6 +36,8 @@ class Fmi2(Dialect):
 
     def write_model(self, root: Any, model: Described) -> None:
         """Annotation, variables, structure."""
+        if model.exchange:
+            root.set("numberOfEventIndicators", str(model.exchange.indicators))
         write_annotation(model.annotation, root, "2")
         block = etree.SubElement(root, "ModelVariables")
         for variable in model.variables:
@@ -59,10 +62,8 @@ def _write_variable(block: Any, variable: ScalarVariable, component: Component, 
     value = etree.SubElement(element, _ELEMENT[variable.slot.type], **of_type(variable))
     if initial != "calculated":
         value.set("start", start_of(variable, component))
-    if exchange and variable.is_kept:
-        stands = getattr(variable.slot.declaration, "standstill", False)
-        if stands or variable.name in exchange.reinitialised:
-            value.set("reinit", "true")
+    if exchange and exchange.puts_back(variable):
+        value.set("reinit", "true")
 
 
 def _write_rate(block: Any, rate: Rate) -> None:

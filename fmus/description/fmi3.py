@@ -11,7 +11,7 @@ from ...components.component import Component
 from ...components.tracing import start_name
 from ..annotation import write as write_annotation
 from ..variables import ScalarVariable
-from .dialect import Described, Dialect
+from .dialect import Described, Dialect, ModelExchange
 from .structure import Rate, Unknowns, initial_kind
 from .text import attributes, of_type, starts_of
 
@@ -24,31 +24,36 @@ class Fmi3(Dialect):
     """FMI 3.0."""
 
     version, token, states, derivatives = "3.0", "instantiationToken", "State", "providesDirectionalDerivatives"
+    steps = ("needsCompletedIntegratorStep", "false")
     units = frozenset({"s"})
 
     def complete(self, capabilities: Any, *, native: bool, interpolates: bool) -> None:
         """Nothing: there are no derivatives of inputs, and sources have a description of their own."""
 
     def write_model(self, root: Any, model: Described) -> None:
-        """Variables, the time among them; structure; annotation."""
+        """Variables, the time among them, and the event indicators; structure; annotation."""
+        exchange = model.exchange
         block = etree.SubElement(root, "ModelVariables")
         for variable in model.variables:
             if not variable.element:
-                _write_variable(block, variable, model.component)
+                _write_variable(block, variable, model.component, exchange)
         for rate in model.rates:
             if not rate.state.element:
                 _write_rate(block, rate)
+        reference = len(model.variables) + len(model.rates)
         etree.SubElement(
             block,
             "Float64",
             name="time",
-            valueReference=str(len(model.variables) + len(model.rates)),
-            description="time of the last communication point",
+            valueReference=str(reference),
+            description="time of the last communication point" + (", or that the importer has set" if exchange else ""),
             causality="independent",
             variability="continuous",
             unit="s",
         )
         _write_structure(root, model.variables, model.rates, model.unknowns)
+        if exchange and exchange.indicators:
+            _write_indicators(root, block, exchange.indicators, str(reference + 1))
         write_annotation(model.annotation, root, "3")
 
 
@@ -59,11 +64,13 @@ def name_of(variable: ScalarVariable) -> str:
     return start_name(variable.slot.name) if variable.is_start else variable.slot.name
 
 
-def _write_variable(block: Any, variable: ScalarVariable, component: Component) -> None:
+def _write_variable(block: Any, variable: ScalarVariable, component: Component, exchange: ModelExchange | None) -> None:
     """A scalar, or with its first element an array."""
     initial, kind = initial_kind(variable), variable.slot.type
     named = {"name": name_of(variable), "valueReference": str(variable.reference)}
     element = etree.SubElement(block, _ELEMENT[kind], **named, **attributes(variable, initial), **of_type(variable))
+    if exchange and exchange.puts_back(variable):
+        element.set("reinit", "true")
     _write_dimensions(element, variable)
     if initial == "calculated":
         return
@@ -95,6 +102,22 @@ def _write_rate(block: Any, rate: Rate) -> None:
         derivative=str(rate.state.reference),
     )
     _write_dimensions(element, rate.state)
+
+
+def _write_indicators(root: Any, block: Any, count: int, reference: str) -> None:
+    """The event indicators are one array, with a name that no component can give; they depend on anything."""
+    element = etree.SubElement(
+        block,
+        "Float64",
+        name="event.indicators",
+        valueReference=reference,
+        description="each changes its sign where a choice changes, or where something comes to rest or sets off",
+        causality="local",
+        variability="continuous",
+        initial="calculated",
+    )
+    etree.SubElement(element, "Dimension", start=str(count))
+    etree.SubElement(root.find("ModelStructure"), "EventIndicator", valueReference=reference)
 
 
 def _write_structure(

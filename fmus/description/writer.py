@@ -25,8 +25,6 @@ from .text import arguments, number
 
 _DIALECTS: dict[FmiVersion, Dialect] = {"2": Fmi2(), "3": Fmi3()}
 _PROJECT = __name__.partition(".")[0]
-_STEPS = {"ModelExchange": "completedIntegratorStepNotNeeded", "CoSimulation": "canHandleVariableCommunicationStepSize"}
-"""What is said of steps."""
 _LOG_CATEGORIES = {
     "logAll": "all of these",
     "logStatusError": "what went wrong; always sent",
@@ -52,7 +50,7 @@ def write(
         digest: hash of everything in the FMU; it becomes the GUID, or the instantiation token.
         profile: of a native FMU; a real-time one saves no states.
         fmi: the version of FMI; only native FMUs are written in 3.0.
-        exchange: of FMI 2.0, where the FMU is for model exchange as well.
+        exchange: where the FMU is for model exchange as well.
 
     Raises:
         ComponentError: a name that FMI does not allow, build arguments that are not JSON, or equations that cannot be
@@ -79,14 +77,12 @@ def write(
         del root.attrib["license"]
     native, saves = kind == "native", "false" if profile == "real-time" else "true"
     moves = any(v.causality == "input" and v.slot.type is float for v in variables)
-    if exchange:
-        root.set("numberOfEventIndicators", str(exchange.indicators))
     for part in ("ModelExchange", "CoSimulation") if exchange else ("CoSimulation",):
         simulates = part == "CoSimulation"
         capabilities = etree.SubElement(
             root, part, modelIdentifier=cls.__name__, needsExecutionTool="false" if native else "true"
         )
-        capabilities.set(_STEPS[part], "true")
+        capabilities.set(*(("canHandleVariableCommunicationStepSize", "true") if simulates else dialect.steps))
         for can in ("canGetAndSetFMU", "canSerializeFMU"):
             capabilities.set(f"{can}{dialect.states}", saves)
         if native:

@@ -71,6 +71,7 @@ def model_header(
         layout.outputs[1] + layout.states[1],
         layout.memory[1] + layout.tape[1] + len(traced.reinitialised),
         len(traced.initial),
+        exchange.indicators(component) if exchange and fmi == "3" else 0,  # read as a variable
     )
     constants: dict[str, Any] = {
         "N_VARIABLES": layout.variables,

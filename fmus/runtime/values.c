@@ -100,6 +100,13 @@ ALWAYS_INLINE const double *numbers_of(Instance *s, Reference reference, Type ty
         *count = 1;
         return &s->last_successful_time;
     }
+#if HAS_INDICATORS && MODEL_EXCHANGE && N_INDICATORS > 0
+    if (type == TYPE_REAL && reference == N_VARIABLES + N_STATES + 1) {
+        find_indicators(s, s->scratch);
+        *count = N_INDICATORS;
+        return s->scratch;
+    }
+#endif
     if (is_rate(reference, type)) {
         if (!*rated && rates(s) != STATUS_OK) {
             return NULL;

@@ -123,9 +123,7 @@ def build(
     fmi: Annotated[FmiName, typer.Option(help="Version of FMI: 2 (2.0), or 3 (3.0, native FMUs).")] = FmiName.two,
     model_exchange: Annotated[
         bool,
-        typer.Option(
-            "--model-exchange", help="Model exchange beside co-simulation in one archive: native FMUs of FMI 2.0."
-        ),
+        typer.Option("--model-exchange", help="Model exchange beside co-simulation in one archive, of native FMUs."),
     ] = False,
     output: Annotated[Path | None, typer.Option("--output", "-o", help="Directory for the FMUs.")] = None,
     quiet: Quiet = False,

@@ -279,11 +279,12 @@ def test_fmi_3_has_folders_of_its_own():
     assert {folder for name in found for folder in found[name]} == {*found["darwin64"], *others}
 
 
+@pytest.mark.parametrize("profile", ["standard", pytest.param("model-exchange", marks=pytest.mark.long)])
 @pytest.mark.parametrize("compiler", COMPILERS)
-def test_so_it_is_in_fmi_3(tmp_path, compiler):
+def test_so_it_is_in_fmi_3(tmp_path, compiler, profile):
     if shutil.which(COMPILERS[compiler][0]) is None:
         pytest.skip(f"{compiler} is not installed")
-    folder = unzip(build(MIXED, kind="native", fmi="3"), tmp_path)
+    folder = unzip(build(MIXED, kind="native", profile=profile, fmi="3"), tmp_path)
     flags = (*STRICT, "-O2", "-c", "-isystem", HEADERS)
     compile_program([folder / "sources" / "all.c"], tmp_path / "o", *flags, compiler=COMPILERS[compiler])
 
@@ -339,8 +340,18 @@ def _prefixing(folder):
         *((MIXED, fmi, "standard") for fmi in ("2", "3")),
         *((name, "2", "standard") for name in ("PidAto", "Gust")),
         *((name, "2", "model-exchange") for name in (MIXED, "PointMassTrain", "Gust")),
+        (MIXED, "3", "model-exchange"),
     ],
-    ids=["Mixed", "3", "PidAto", "Gust", "Mixed-exchange", "PointMassTrain-exchange", "Gust-exchange"],
+    ids=[
+        "Mixed",
+        "3",
+        "PidAto",
+        "Gust",
+        "Mixed-exchange",
+        "PointMassTrain-exchange",
+        "Gust-exchange",
+        "Mixed-exchange-3",
+    ],
 )
 def test_the_sources_compile_as_c_plus_plus_with_the_functions_of_c(tmp_path, name, fmi, profile):
     (tmp_path / "sources").mkdir()

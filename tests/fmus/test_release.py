@@ -240,10 +240,6 @@ def test_the_command_prints_files_and_tells_progress_apart(tmp_path):
         (["--kind", "plain"], "Invalid value for '--kind'"),
         (["--fmi", "3", "--kind", "python"], "error: --fmi 3 is for native FMUs"),
         (["--fmi", "3", "--profile", "real-time"], "error: --profile real-time is FMI 2.0"),
-        (
-            ["--fmi", "3", "--model-exchange"],
-            "error: --model-exchange is FMI 2.0: of FMI 3.0 there is co-simulation alone",
-        ),
         (["--kind", "python", "--model-exchange"], "error: --model-exchange is for native FMUs"),
         (
             ["--profile", "real-time", "--model-exchange"],

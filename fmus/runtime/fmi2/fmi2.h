@@ -18,9 +18,10 @@
 #define STATUS_DISCARD fmi2Discard
 #define STATUS_ERROR fmi2Error
 
-/* Whether a value reference may mean a whole array, and whether the time has one. */
+/* Whether a value reference may mean a whole array, and whether the time and the event indicators have one. */
 #define HAS_ARRAYS 0
 #define HAS_TIME 0
+#define HAS_INDICATORS 0
 
 typedef fmi2Status Status;
 typedef fmi2ValueReference Reference;

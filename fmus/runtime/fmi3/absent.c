@@ -64,14 +64,25 @@ ABSENT(CLOCK, fmi3SetShiftFraction, (REFERENCES, const fmi3UInt64 counters[], co
 ABSENT(CLOCK, fmi3ActivateModelPartition,
        (fmi3Instance instance, fmi3ValueReference clockReference, fmi3Float64 activationTime))
 
+/* Those of model exchange are in exchange3.c where they are. */
+#if MODEL_EXCHANGE
+#define KINDS "an FMU for co-simulation and model exchange"
+#define EVENTS "event mode in co-simulation"
+#define EVALUATION "evaluation of discrete states apart from their update"
+#else
+#define KINDS "a co-simulation FMU"
 #define EVENTS "event mode"
+#define EVALUATION EVENTS
 ABSENT(EVENTS, fmi3EnterEventMode, (fmi3Instance instance))
+#endif
 ABSENT(EVENTS, fmi3EnterStepMode, (fmi3Instance instance))
-ABSENT(EVENTS, fmi3EvaluateDiscreteStates, (fmi3Instance instance))
+ABSENT(EVALUATION, fmi3EvaluateDiscreteStates, (fmi3Instance instance))
+#if !MODEL_EXCHANGE
 ABSENT(EVENTS, fmi3UpdateDiscreteStates,
        (fmi3Instance instance, fmi3Boolean *discreteStatesNeedUpdate, fmi3Boolean *terminateSimulation,
         fmi3Boolean *nominalsOfContinuousStatesChanged, fmi3Boolean *valuesOfContinuousStatesChanged,
         fmi3Boolean *nextEventTimeDefined, fmi3Float64 *nextEventTime))
+#endif
 
 #define STRUCTURE "structural parameter: its sizes are those that it was built with"
 ABSENT(STRUCTURE, fmi3EnterConfigurationMode, (fmi3Instance instance))
@@ -93,6 +104,7 @@ ABSENT(DEPENDENCIES, fmi3GetVariableDependencies,
 
 /* --------------------------------------------------------------------------------------------------- model exchange */
 
+#if !MODEL_EXCHANGE
 fmi3Instance fmi3InstantiateModelExchange(fmi3String instanceName, fmi3String instantiationToken, fmi3String resourcePath,
                                           fmi3Boolean visible, fmi3Boolean loggingOn,
                                           fmi3InstanceEnvironment instanceEnvironment, fmi3LogMessageCallback logMessage)
@@ -119,6 +131,7 @@ ABSENT(INTEGRATOR, fmi3GetNominalsOfContinuousStates,
        (fmi3Instance instance, fmi3Float64 nominals[], size_t nContinuousStates))
 ABSENT(INTEGRATOR, fmi3GetNumberOfEventIndicators, (fmi3Instance instance, size_t *nEventIndicators))
 ABSENT(INTEGRATOR, fmi3GetNumberOfContinuousStates, (fmi3Instance instance, size_t *nContinuousStates))
+#endif
 
 /* ----------------------------------------------------------------------------------------------- scheduled execution */
 
@@ -130,7 +143,7 @@ fmi3Instance fmi3InstantiateScheduledExecution(fmi3String instanceName, fmi3Stri
                                                fmi3UnlockPreemptionCallback unlockPreemption)
 {
     const Listener listener = {logMessage, instanceEnvironment};
-    return refuse_instance(listener, instanceName, MODEL_NAME ": this is a co-simulation FMU");
+    return refuse_instance(listener, instanceName, MODEL_NAME ": this is " KINDS);
 }
 
 #if defined(__GNUC__)

@@ -15,9 +15,10 @@
 #define STATUS_OK fmi3OK
 #define STATUS_ERROR fmi3Error
 
-/* Whether a value reference may mean a whole array, and whether the time has one. */
+/* Whether a value reference may mean a whole array, and whether the time and the event indicators have one. */
 #define HAS_ARRAYS 1
 #define HAS_TIME 1
+#define HAS_INDICATORS 1
 
 typedef fmi3Status Status;
 typedef fmi3ValueReference Reference;

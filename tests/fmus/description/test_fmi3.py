@@ -11,7 +11,7 @@ from lxml import etree
 from railcosim.components import CATALOGUE, Component, Memory, Output, Parameter
 from railcosim.components.tracing import TracingError
 from railcosim.fmus.annotation import read
-from railcosim.fmus.description import write
+from railcosim.fmus.description import ModelExchange, write
 from railcosim.fmus.references import resolve
 
 SCHEMA = Path(fmpy.__file__).parent / "schema" / "fmi3" / "fmi3ModelDescription.xsd"
@@ -22,8 +22,8 @@ SCALAR = {"Float64": "Real", "Int32": "Integer", "Boolean": "Boolean", "String":
 TAGS = {"Output": "Outputs", "ContinuousStateDerivative": "Derivatives", "InitialUnknown": "InitialUnknowns"}
 
 
-def described(component, fmi):
-    return etree.fromstring(write(component, "native", "0123456789abcdef" * 4, fmi=fmi))
+def described(component, fmi, exchange=None):
+    return etree.fromstring(write(component, "native", "0123456789abcdef" * 4, fmi=fmi, exchange=exchange))
 
 
 def array_of(name):
@@ -77,9 +77,7 @@ REST = [pytest.param(name, marks=pytest.mark.campaign) for name in CATALOGUE if 
 def test_it_says_in_arrays_what_fmi_2_says_in_scalars(name, tmp_path):
     component = resolve(name)()
     two, three = described(component, "2"), described(component, "3")
-    etree.XMLSchema(etree.parse(str(SCHEMA))).assertValid(three)
-    (tmp_path / "modelDescription.xml").write_bytes(etree.tostring(three))
-    assert validate_fmu(str(tmp_path)) == []
+    valid(three, tmp_path)
     assert three.get("instantiationToken") == two.get("guid")
     expected, (*variables, time) = scalars(two), three.find("ModelVariables")
     assert (time.tag, time.get("causality")) == ("Float64", "independent")
@@ -117,6 +115,54 @@ def test_what_it_can_is_said_in_the_words_of_fmi_3():
         "canSerializeFMUState": "true",
         "providesDirectionalDerivatives": "true",
     }
+
+
+def valid(root, folder):
+    etree.XMLSchema(etree.parse(str(SCHEMA))).assertValid(root)
+    (folder / "modelDescription.xml").write_bytes(etree.tostring(root))
+    assert validate_fmu(str(folder)) == []
+    return fmpy.read_model_description(str(folder), validate=False)
+
+
+def test_model_exchange_stands_beside_co_simulation(tmp_path):
+    component = resolve("Consist")()
+    root = described(component, "3", ModelExchange(9, ()))
+    assert dict(root.find("ModelExchange").attrib) == {
+        "modelIdentifier": "Consist",
+        "needsExecutionTool": "false",
+        "needsCompletedIntegratorStep": "false",
+        "canGetAndSetFMUState": "true",
+        "canSerializeFMUState": "true",
+        "providesDirectionalDerivatives": "true",
+    }
+    assert dict(root.find("CoSimulation").attrib) == dict(described(component, "3").find("CoSimulation").attrib)
+    assert root.get("numberOfEventIndicators") is None  # that is FMI 2.0
+    told = valid(root, tmp_path)
+    assert (told.numberOfContinuousStates, told.numberOfEventIndicators) == (9, 9)
+    variables = {v.get("name"): v for v in root.find("ModelVariables")}
+    assert [name for name, v in variables.items() if v.get("reinit") == "true"] == ["speed"]  # they can stand still
+    indicators = variables["event.indicators"]
+    assert (indicators.get("causality"), indicators.get("initial")) == ("local", "calculated")
+    (entry,) = root.iterfind("ModelStructure/EventIndicator")
+    assert dict(entry.attrib) == {"valueReference": indicators.get("valueReference")}
+    assert int(entry.get("valueReference")) == int(variables["time"].get("valueReference")) + 1
+    unknown = {entry.get("valueReference") for entry in root.iterfind("ModelStructure/InitialUnknown")}
+    assert entry.get("valueReference") not in unknown
+
+
+def test_without_choices_there_are_no_event_indicators_and_what_samples_put_back_is_told(tmp_path):
+    root = described(resolve(MIXED)(), "3", ModelExchange(0, ("v",)))
+    told = valid(root, tmp_path)
+    assert (told.numberOfContinuousStates, told.numberOfEventIndicators) == (3, 0)
+    assert root.find("ModelStructure/EventIndicator") is None
+    assert [v.get("name") for v in root.find("ModelVariables") if v.get("reinit") == "true"] == ["v"]
+
+
+def test_co_simulation_alone_says_nothing_of_model_exchange():
+    root = described(resolve("Consist")(), "3")
+    assert not [*root.iter("ModelExchange", "EventIndicator")]
+    assert "event.indicators" not in {v.get("name") for v in root.find("ModelVariables")}
+    assert not {key for element in root.iter() for key in element.attrib} & {"reinit", "needsCompletedIntegratorStep"}
 
 
 class Unclear(Component):
