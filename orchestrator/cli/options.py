@@ -226,7 +226,7 @@ def variant_of(scenario: str, variant: str) -> str:
     from ..ssp import is_ssp_name
 
     if not is_ssp_name(scenario):
-        raise ScenarioError(f"--variant {variant}: {scenario} is no .ssp, and has no variants; presets have --preset")
+        raise ScenarioError(f"--variant {variant}: {scenario} is no .ssp, and has no variants")
     if "#" in scenario:
         raise ScenarioError(f"--variant {variant}: {scenario} names a variant already; give one of the two")
     return f"{scenario}#{variant}"

@@ -3,10 +3,12 @@
 import html.parser
 import json
 import re
+from types import SimpleNamespace
 
 import pytest
 from railcosim.orchestrator import run, world
 from railcosim.orchestrator.cli import app as cli
+from railcosim.orchestrator.cli import printing, reports
 from railcosim.orchestrator.comparison.variants import compare
 from railcosim.orchestrator.errors import RailcosimError, ScenarioError
 from railcosim.orchestrator.report import document, write_report
@@ -128,6 +130,38 @@ def test_runs_and_comparisons_make_pages(mine, tmp_path, capsys):
     assert cli.call(["compare", str(scenario), "--preset", "far", "--report", "-o", str(out), "--no-figures"]) == 0
     texts = Read((out / "report.html").read_text(encoding="utf-8")).texts
     assert {"lag", "lag far"} & set(texts)
+
+
+def test_what_a_page_cannot_be_made_of_is_told_before_anything_runs(mine, tmp_path, capsys, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    for folder in ("a", "b"):
+        (tmp_path / folder).mkdir()
+        (tmp_path / folder / "lag.toml").write_text(SCENARIO.format(model=mine("Lag")))
+    for words, said in (
+        (["a/lag.toml", "b/lag.toml"], "a/lag.toml and b/lag.toml would both have their results in results/lag"),
+        (["a/lag.toml", "b", "--live"], "a live page has the models of one run"),
+        (["comfort_cruis"], "there is no directory and no scenario 'comfort_cruis'; did you mean 'comfort_cruise'?"),
+    ):
+        assert cli.call(["report", *words, "--trust"]) == 2
+        assert said in " ".join(capsys.readouterr().err.split())
+    assert not (tmp_path / "results").exists()
+
+
+def test_a_run_is_shown_that_has_no_page(mine, tmp_path, capsys, monkeypatch):
+    """One that is interrupted is the last, and one whose page cannot be written is told first."""
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "lag.toml").write_text(SCENARIO.format(model=mine("Lag")))
+    (tmp_path / "more.toml").write_text(SCENARIO.format(model=mine("Lag")))
+    assert cli.call(["report", "lag.toml", "-o", "none/there.html", "--trust"]) != 0
+    said = capsys.readouterr()
+    assert "results/lag" in said.out
+    assert "there.html cannot be written" in " ".join(said.err.split())
+    outcome = SimpleNamespace(status="interrupted", signal=2, failed=False)
+    ran, shown = [], []
+    monkeypatch.setattr(reports, "_run", lambda system, _: (ran.append(system.provenance.name), outcome)[1])
+    monkeypatch.setattr(printing, "show_run", lambda each, *_: shown.append(each))
+    assert cli.call(["report", "lag.toml", "more.toml", "--trust"]) == 130
+    assert (ran, shown) == (["lag"], [outcome])
 
 
 def test_a_comparison_that_was_made_before(wavy, mine, tmp_path, capsys):

@@ -119,6 +119,8 @@ def test_a_page_of_an_archive(passing, tmp_path, capsys, monkeypatch):
     assert "system-Four" in (tmp_path / "both.html").read_text(encoding="utf-8")
     assert call(["report", str(tmp_path / "results" / "system"), "--variant", "Four"]) == 2
     assert "is of an .ssp that is to be run" in capsys.readouterr().err
+    (tmp_path / "plain.toml").write_text('[simulation]\nstop_time = 1.0\n[instances.target]\ncomponent = "Schedule"\n')
+    assert call(["report", passing, "plain.toml", "--variant", "Four", "-o", "two.html", "-q"]) == 0
 
 
 def test_a_scenario_of_an_archive(passing, tmp_path, capsys):

@@ -139,6 +139,18 @@ def test_with_a_run(scenario, compiled, capsys):
     assert cli.call(["report", "out", "--live", "--trust"]) == 0
 
 
+def test_a_page_whose_run_fails_is_a_page_without_models(scenario, mine, compiled, capsys):
+    """The run is told, and the exit code is its own; what could not be live at all does not begin."""
+    scenario.write_text(SCENARIO.format(lag=mine("Fails")) + "start.until = 0.5\n")
+    assert cli.call(["report", str(scenario), "--live", "--trust"]) == 3
+    page = scenario.parent / "results" / "small" / "report.html"
+    assert 'id="live"' not in page.read_text(encoding="utf-8")
+    page.unlink()
+    scenario.write_text(SCENARIO.format(lag=mine("Lag")).replace("step = 0.1", 'step = 0.1\nalgorithm = "iterative"'))
+    assert cli.call(["report", str(scenario), "--live", "--trust"]) == 2
+    assert not page.exists()
+
+
 def test_a_run_that_could_not_be_live_does_not_begin(scenario, capsys):
     assert cli.call(["run", str(scenario), "--live", "-o", "out"]) == 2
     assert "give both" in capsys.readouterr().err
