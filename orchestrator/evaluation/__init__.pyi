@@ -27,7 +27,7 @@ from .published import (
 from .requirements import Verdict, parse_requirement
 from .robustness import robustness
 from .signals import Part, Signals, filled, parts_of, valued, without_blanks
-from .syntax import Call, Name, Node, Number, Operation, Reference
+from .syntax import Call, Name, Node, Number, Operation, Reference, walk
 from .vocabulary import Names
 
 __all__ = [
@@ -72,5 +72,6 @@ __all__ = [
     "unit_of",
     "value_name",
     "valued",
+    "walk",
     "without_blanks",
 ]

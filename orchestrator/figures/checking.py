@@ -10,6 +10,7 @@ from ..evaluation import FUNCTIONS, Names, parse
 from ..problems import Problem, suggestion
 from .marks import mark_problems, mark_texts
 from .panels import FIGURE_KEYS, FORMATS, PANEL_KEYS, X_KEYS, bands_of, numbers_in, panels_of, texts_of
+from .sparse import sparse_problems
 
 _FUNCTION_KEYS = ("name", "from", "to", "points")
 _SET = ("title", "label", "x_label", "y_label")
@@ -19,11 +20,15 @@ _LEAST_DPI, _MOST_DPI = 20, 1200
 
 
 def check_figures(
-    figures: Sequence[Mapping[str, Any]], names: Collection[str], every_step: bool = True
+    figures: Sequence[Mapping[str, Any]],
+    names: Collection[str],
+    every_step: bool = True,
+    apart: Collection[str] = (),
 ) -> list[Problem]:
     """Every problem of the [[figures]] that can be found before a run.
 
-    `names` are the signals to be recorded and the parameters; `every_step` says whether each step is recorded.
+    `names` are the signals to be recorded and the parameters; `every_step` says whether each step is recorded; `apart`
+    are the signals that have no value in some rows.
     """
     names = Names.of(names)
     problems: list[Problem] = []
@@ -35,7 +40,7 @@ def check_figures(
         problems += [problem.at(place) for problem in _formula_problems(figure)]
         panels = figure.get("panels")
         if panels is None:
-            problems += [problem.at(place) for problem in _panel_problems(figure, names, every_step)]
+            problems += [problem.at(place) for problem in _panel_problems(figure, names, every_step, apart)]
             continue
         if not isinstance(panels, list) or not panels or not all(isinstance(panel, Mapping) for panel in panels):
             problems.append(Problem(place, "panels must be a list of tables, each with y"))
@@ -44,7 +49,7 @@ def check_figures(
         problems += [Problem(place, f"'{key}' belongs into the panels") for key in strange]
         for which, panel in enumerate(panels_of(figure), 1):
             inner = f"{place}, panel {which}"
-            problems += [problem.at(inner) for problem in _panel_problems(panel, names, every_step)]
+            problems += [problem.at(inner) for problem in _panel_problems(panel, names, every_step, apart)]
     return problems
 
 
@@ -87,7 +92,9 @@ def _formula_error(text: str) -> str:
     return ""
 
 
-def _panel_problems(panel: Mapping[str, Any], names: Collection[str], every_step: bool) -> Iterator[Problem]:
+def _panel_problems(
+    panel: Mapping[str, Any], names: Collection[str], every_step: bool, apart: Collection[str]
+) -> Iterator[Problem]:
     valid = (*PANEL_KEYS, "panels", *FIGURE_KEYS)
     for key in panel:
         if key not in valid:
@@ -106,7 +113,10 @@ def _panel_problems(panel: Mapping[str, Any], names: Collection[str], every_step
         except ExpressionError as error:
             yield from error.problems
             continue
-        yield from expression.check(names, variable)
+        problems = expression.check(names, variable)
+        yield from problems
+        if apart and not problems:
+            yield from sparse_problems(expression, names, apart.__contains__)
         if expression.calls("at_sample") and not every_step:
             yield Problem(f"'{text}'", "at_sample needs every communication step recorded", "set record = step")
 

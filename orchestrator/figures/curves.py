@@ -16,6 +16,7 @@ from ..evaluation import FUNCTIONS, Expression, Reference, Signals, parse, unit_
 from ..problems import Problem
 from .outline import MOST_POINTS, outlined
 from .panels import texts_of
+from .sparse import check_sparse
 
 Array = NDArray[np.float64]
 
@@ -63,6 +64,9 @@ def curves_of(panel: Mapping[str, Any], signals: Signals) -> list[Curve]:
 def _entry(x: Any, text: str, label: str, entry: int, signals: Signals) -> list[Curve]:
     """The lines of one entry of `y`: one a row or value of i."""
     expression = parse(text, FUNCTIONS)
+    for drawn_over in [parse(x, FUNCTIONS)] if isinstance(x, str) else []:
+        check_sparse(drawn_over, signals)
+    check_sparse(expression, signals)
     names = [*signals.names(), *signals.parameters]
     constants = _constants(x)
     drawn: list[tuple[Array, Array, str, str, frozenset[str]]] = []

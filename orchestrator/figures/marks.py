@@ -16,6 +16,7 @@ from ..errors import ExpressionError
 from ..evaluation import FUNCTIONS, Signals, parse
 from ..problems import Problem, suggestion
 from .panels import marks_of, numbers_in
+from .sparse import check_sparse
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -87,9 +88,13 @@ def number(value: str | float, signals: Signals) -> float:
     """The number that a level, a mark or a part of a title stands for.
 
     Raises:
-        ExpressionError: it varies over time.
+        ExpressionError: it varies over time, or a signal in it has no value in some rows.
     """
-    found = parse(value, FUNCTIONS).evaluate(signals) if isinstance(value, str) else value
+    found: Any = value
+    if isinstance(value, str):
+        expression = parse(value, FUNCTIONS)
+        check_sparse(expression, signals)
+        found = expression.evaluate(signals)
     if isinstance(found, np.ndarray) and found.ndim:
         raise ExpressionError(Problem("", f"'{value}' varies over time", "draw it as an entry of y"))
     return float(found)

@@ -21,6 +21,7 @@ from ..system import System
 from ..times import count_steps, digits
 from ..wiring import Order, Wiring, derive_order, wire
 from .loop_delay import loop_delays
+from .recording import kept_signals
 from .size import tell_size
 
 _MOST_STEPS = 1e15
@@ -91,7 +92,6 @@ def check(system: System, workspace: Workspace, kind: Kind = "auto", *, trusted:
         system.stepping.record is None
         or abs(system.stepping.record - system.stepping.step) < 1e-9 * system.stepping.step
     )
-    every_step = every_step and not isinstance(system.stepping.record_only, dict)
     system, left_out = _without_the_missing(system, interfaces, names, steady, every_step)
     problems += check_events(system, interfaces, wiring)
     problems += check_coupling(system, interfaces, wiring)
@@ -106,7 +106,7 @@ def check(system: System, workspace: Workspace, kind: Kind = "auto", *, trusted:
     problems += told + check_figures(system.judged.figures, names, every_step)
     if problems:
         raise ScenarioError(problems)
-    system, undrawn = _without_unrecorded(system, [*recorded, *parameters.intersection(names)], every_step)
+    system, undrawn = _without_unrecorded(system, recorded, parameters.intersection(names), every_step)
     order = derive_order(list(system.instances), wiring.every_link, system.stepping.order)
     large = tell_size(system, sum(name not in parameters for name in recorded))
     notes = [*left_out, *undrawn, *([large] if large else []), *_notes(system, models, wiring, order)]
@@ -134,14 +134,26 @@ def _apart(system: System) -> Iterator[Problem]:
             yield Problem("simulation.record_only", message, remedy)
 
 
-def _without_unrecorded(system: System, drawable: Collection[str], every_step: bool) -> tuple[System, list[str]]:
-    """A system without the figures that need more than is recorded, and a note that names them."""
-    figures = system.judged.figures
-    kept = [x for x in figures if not system.stepping.record_only or not check_figures([x], drawable, every_step)]
-    if len(kept) == len(figures):
+def _without_unrecorded(
+    system: System, recorded: Collection[str], parameters: Collection[str], every_step: bool
+) -> tuple[System, list[str]]:
+    """A system without the figures that need more than is recorded, and notes that name them."""
+    figures, drawable = system.judged.figures, [*recorded, *parameters]
+    if not system.stepping.record_only:
         return system, []
-    names = ", ".join(repr(figure.get("title")) for figure in figures if figure not in kept)
-    return system.changed(figures=kept), [f"not drawn, because what they show is not recorded (record_only): {names}"]
+    rows = kept_signals([name for name in recorded if name not in parameters], system.stepping).get("apart", {})
+    apart = {name for name, every in rows.items() if every > 1}
+    unknown = [x for x in figures if check_figures([x], drawable, every_step)]
+    sparse = [x for x in figures if x not in unknown and check_figures([x], drawable, every_step, apart)]
+    notes = [
+        f"not drawn, because {why} (record_only): {', '.join(repr(figure.get('title')) for figure in left)}"
+        for why, left in (
+            ("what they show is not recorded", unknown),
+            ("they look at every row of what is recorded less often", sparse),
+        )
+        if left
+    ]
+    return system.changed(figures=[x for x in figures if x not in [*unknown, *sparse]]) if notes else system, notes
 
 
 def _without_the_missing(

@@ -9,7 +9,8 @@ import pandas
 import pytest
 from railcosim.orchestrator import Results, load, resume, run
 from railcosim.orchestrator.cli.app import call
-from railcosim.orchestrator.errors import ScenarioError
+from railcosim.orchestrator.errors import ExpressionError, ScenarioError
+from railcosim.orchestrator.figures import number
 from railcosim.orchestrator.figures.curves import curves_of
 from railcosim.orchestrator.figures.outline import MOST_POINTS
 from railcosim.orchestrator.report import content
@@ -182,6 +183,39 @@ def test_what_is_drawn_goes_through_the_values_that_there_are(scenario, tmp_path
     (gap,) = curves_of({"y": ["1 / (lag[1].x - lag[1].x)"]}, few.results)
     assert len(gap.x) == 12
     assert len(few.figures) == 1
+
+
+FIGURES = """
+[[figures]]
+title = "fine"
+y = ["lag[1].x - mean(lag[1].x)", "at_sample(lag[1].x)", "lag[3].x", "lag[3].x - max(lag[3].rate)"]
+[[figures]]
+title = "band"
+y = ["lag[1].x"]
+bands = ["max(lag[2].x)"]
+[[figures]]
+title = "ahead"
+y = ["at_sample(lag[i].x)"]
+"""
+
+
+def test_figures_that_look_at_every_row_of_what_is_recorded_less_often(scenario, tmp_path, capsys):
+    """They would be empty: the run says so, and draws the others; what is drawn afterwards is refused."""
+    scenario(GROUPS)
+    (tmp_path / "lags.toml").write_text((tmp_path / "lags.toml").read_text() + FIGURES)
+    few = run(load(str(tmp_path / "lags.toml")), kind="plain", output=tmp_path / "out")
+    why = "they look at every row of what is recorded less often"
+    assert f"not drawn, because {why} (record_only): 'band', 'ahead'" in few.checked.notes
+    assert [path.name for path in few.figures] == ["x.png", "fine.png"]
+    assert all(np.isfinite(curve.y).all() for curve in curves_of({"y": ["lag[1].x - mean(lag[1].x)"]}, few.results))
+    with pytest.raises(ScenarioError, match=r"max looks at every row, and lag\[2\]\.x is recorded less often"):
+        few.results.plot("lag[1].x - max(lag[:].x)")
+    with pytest.raises(ExpressionError, match=r"final looks at every row, and lag\[3\]\.x is recorded less often"):
+        curves_of({"x": "lag[1].x - final(lag[3].x)", "y": ["lag[1].x"]}, few.results)
+    assert call(["plot", str(tmp_path / "out"), "jerk(lag[3].x)"]) != 0
+    assert "jerk looks at every row" in " ".join(capsys.readouterr().err.split())
+    with pytest.raises(ExpressionError, match="mean looks at every row"):
+        number("mean(lag[2].x)", few.results)
 
 
 def test_a_page_has_a_line_or_the_last_value_where_there_is_none(scenario, tmp_path, monkeypatch):
