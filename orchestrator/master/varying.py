@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .. import world
-from ..errors import RunError
+from ..errors import FmuError, RunError
 from ..fmi.binding import LoadedSlave
 from ..fmi.guard import NOTES, own_note, said
 from ..times import slack
@@ -27,7 +27,7 @@ from .coupling import Coupling
 from .observer import Observer
 from .plans import CONTROL, PLACE, Kind, Plan, is_able
 
-_FATAL = 4
+_FATAL, _PENDING = 4, 5
 
 
 @dataclass(frozen=True)
@@ -113,8 +113,9 @@ class VaryingLoop:
 
     def rescue(self) -> None:
         """Tell the observer of the rows that the block under way has written, which does not return any more."""
-        if self._blocks is not None:
-            self._blocks.rescue()
+        under_way = self._blocks.written() if self._blocks is not None else None
+        if under_way is not None:
+            self._tell(*under_way)
 
     def _take_block(
         self, span: Span, end: float, due: float, observe: Observer
@@ -159,7 +160,7 @@ class Blocks:
         self._failure: RunError | None = None
         self._is_left = False
         """Whether the next step is for Python."""
-        self._under_way: tuple[NDArray[np.float64], Observer] | None = None
+        self._under_way: tuple[Span, NDArray[np.float64], Observer] | None = None
         self._note = 0
         self._make()
 
@@ -202,7 +203,7 @@ class Blocks:
         rows = np.empty((count + 1, max(1, min(self._block, compiled.MOST_VALUES // (count + 1)))))
         places, disturbed = np.array([(0, -1, 0)], PLACE), np.zeros(len(plan.operations), np.int64)
         plan.courses.load()
-        self._note, self._under_way = own_note(), (rows, observe)
+        self._note, self._under_way = own_note(), (span, rows, observe)
         begin = world.perf_counter()
         taken, *_ = compiled.run_kernel(
             *(*plan.arrays, compiled.changes_of(plan), np.arange(count), values, np.empty(0), 0, rows, 0, places),
@@ -249,14 +250,14 @@ class Blocks:
             raise slave.lose(said(call, status >> 32, (status & 0x7FFFFFFF) - (status & 0x80000000)))
         if status == _FATAL or kind == Kind.FORGET:
             slave.check(call, status)
+        if status == _PENDING and kind == Kind.STEP:
+            with suppress(FmuError):  # it is cancelled: no state may be restored before
+                slave.check(call, status)
 
-    def rescue(self) -> None:
-        """Tell of the rows that the block under way has written."""
+    def written(self) -> tuple[Span, NDArray[np.float64], Observer] | None:
+        """The rows that the block under way has written, of which run, and for whom; None where there are none."""
         if self._under_way is None:
-            return
-        rows, observe = self._under_way
-        written = int(NOTES.note(self._note)[3])
-        if written:
-            self._coupling.steps += written
-            self._coupling.time, *self._exchange.values[:] = rows[:, written - 1].tolist()
-            observe(self._coupling.steps, rows[:, :written].T)
+            return None
+        span, rows, observe = self._under_way
+        count = int(NOTES.note(self._note)[3])
+        return (span, rows[:, :count].T, observe) if count else None

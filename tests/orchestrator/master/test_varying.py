@@ -42,7 +42,7 @@ def test_steps_are_as_long_as_in_python(both, used, species, on):
 
 
 GOES_ON = 40, 43, 44, 83, 91
-MODES = 2, 3, 4, 9, 10, 23, 30 + 3, 40, 42, 43, 44, 63, 73, 83, 84, 91, 102, 103, 104, 113, 114, 123, 124
+MODES = 2, 3, 4, 5, 9, 10, 23, 30 + 3, 40, 42, 43, 44, 63, 73, 83, 84, 91, 102, 103, 104, 113, 114, 123, 124
 
 
 @pytest.mark.parametrize("mode", MODES)
@@ -187,8 +187,9 @@ def test_of_fmi_3(both, by_hand, mode):
     assert result["b.o64"][-1] == 2.0**60
 
 
-def test_rows_of_a_block_that_does_not_return(species, instantiated, monkeypatch):
-    """They are told from another thread; here each block's are, before it returns."""
+@pytest.mark.parametrize("record", [0.0, 0.5])
+def test_rows_of_a_block_that_does_not_return(species, instantiated, monkeypatch, record):
+    """They are told from another thread, but those that are not due; here each block's are, before it returns."""
     master, seen = instantiated(couple(species(["u"]))), []
     master._stop_time = 4.0
     run = compiled.kernel.run
@@ -205,9 +206,13 @@ def test_rows_of_a_block_that_does_not_return(species, instantiated, monkeypatch
 
     master.rescue()
     monkeypatch.setattr(compiled, "kernel", SimpleNamespace(run=while_it_runs))
-    assert master.run(0.0, 1.0, 4, 0.0, lambda steps, rows: seen.append((steps, np.array(rows))) or True)
+    assert master.run(0.0, 1.0, 4, record, lambda steps, rows: seen.append((steps, np.array(rows))) or True)
     master.rescue()
     steps = [count for count, _ in seen]
     assert len(seen) > 3
-    assert steps[-1] == steps[-2] == master.steps
-    assert np.array_equal(seen[-1][1], seen[-2][1])
+    assert steps[-1] == master.steps
+    if record:
+        assert {row[0] for _, rows in seen for row in rows} == {0.5 * k for k in range(1, 9)}
+    else:
+        assert steps[-1] == steps[-2]
+        assert np.array_equal(seen[-1][1], seen[-2][1])
