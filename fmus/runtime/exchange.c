@@ -93,17 +93,29 @@ static void frozen_rates(Instance *s, double *result)
 }
 #endif
 
+/* What is looked at in the course of an event: modes, and where a sample is due its outputs and random numbers. */
+static Status look(Instance *s)
+{
+#if IS_SAMPLED
+    if (sample_is_due(s) && evaluate(s, 0.0, false) != STATUS_OK) {
+        return STATUS_ERROR;
+    }
+#endif
+    settle(s);
+    return STATUS_OK;
+}
+
 /* Outputs in the present modes; those that are held are the last sample's. */
 static Status evaluate_frozen(Instance *s)
 {
+    if (s->regime == REGIME_EVENT && look(s) != STATUS_OK) {
+        return STATUS_ERROR;
+    }
 #if IS_SAMPLED
     if (s->regime == REGIME_EVENT && sample_is_due(s)) {
-        return evaluate(s, 0.0, false);
+        return STATUS_OK;
     }
 #endif
-    if (s->regime == REGIME_EVENT) {
-        settle(s);
-    }
 #if N_OUTPUTS > 0
 #if N_MODES > 0
     const double clock[2] = {s->time, s->step};
@@ -191,10 +203,15 @@ static void begin_exchange(Instance *s)
 /* The samples that are due, each at its own time. */
 static Status take_samples(Instance *s)
 {
-    double time = s->time;
+    double time = s->time, period = s->values[SAMPLE_TIME];
+    /* Where they are nearer to one another than times are told apart, the time itself is a number of them. */
+    double overdue = (time - sample_due(s, s->taken) + DBL_EPSILON * fabs(time)) / period;
+    if (!(overdue < 2147483647.0)) {
+        return fail(s, "sample_time = %g s is too short for an event at t = %.17g s", period, time);
+    }
     for (; sample_is_due(s); s->taken += 1.0) {
         s->time = sample_due(s, s->taken);
-        if (sample(s, s->values[SAMPLE_TIME], 0.0) != STATUS_OK) {
+        if (sample(s, period, 0.0) != STATUS_OK) {
             return STATUS_ERROR;
         }
         s->time = time;
@@ -254,8 +271,8 @@ static Status update_discrete(Instance *s, bool *states_changed, double *next)
     return STATUS_OK;
 }
 
-/* The event indicators: of modes that have one, then of standstills. */
-static void find_indicators(Instance *s, double *result)
+/* The event indicators: of modes that have one, then of standstills; discarded where one has no value. */
+static Status find_indicators(Instance *s, double *result)
 {
     int n = 0;
 #if N_STANDSTILL > 0
@@ -281,7 +298,13 @@ static void find_indicators(Instance *s, double *result)
         result[n++] = s->sides[k] != 0 ? x : HYSTERESIS - fabs(x);
     }
 #endif
-    (void)n;
+    for (int k = 0; k < n; k++) {
+        if (!isfinite(result[k])) {
+            fail(s, "event indicator %d is %g at t = %.17g s", k + 1, result[k], s->time);
+            return STATUS_DISCARD;
+        }
+    }
     (void)result;
+    return STATUS_OK;
 }
 #endif

@@ -20,9 +20,9 @@ static Instance *enter_regime(void *c, unsigned regimes, const char *call)
     return s;
 }
 
-static Status enter_event_mode(void *c, const char *call)
+static Status enter_event_mode(void *c, unsigned regimes, const char *call)
 {
-    Instance *s = enter_regime(c, REGIME_CONTINUOUS, call);
+    Instance *s = enter_regime(c, regimes, call);
     if (s == NULL) {
         return STATUS_ERROR;
     }
@@ -106,10 +106,10 @@ static Status set_continuous_states(void *c, const double x[], size_t nx, const 
 
 /* ---------------------------------------------------------------------------------------------------------- reading */
 
-/* NULL unless something of an instance for model exchange may be read, of which there are `count` numbers. */
-static Instance *enter_to_read(void *c, const double *numbers, size_t given, int count, const char *call)
+/* NULL unless something of an instance for model exchange may be read in these phases, of which there are `count` numbers. */
+static Instance *enter_to_read(void *c, unsigned phases, const double *numbers, size_t given, int count, const char *call)
 {
-    Instance *s = enter(c, READABLE, call);
+    Instance *s = enter(c, phases, call);
     if (s == NULL) {
         return NULL;
     }
@@ -121,14 +121,24 @@ static Instance *enter_to_read(void *c, const double *numbers, size_t given, int
         fail(s, "%s: there are %d numbers, not %lu", call, count, (unsigned long)given);
         return NULL;
     }
-    return refresh(s) == STATUS_OK ? s : NULL;
+    /* Outputs are not asked for, and one without a value is in the way of nothing else. */
+    Status status = STATUS_OK;
+    if (s->phase == PHASE_INITIALIZATION) {
+        status = prepare(s);
+    } else if (s->phase == PHASE_RUNNING && s->regime == REGIME_EVENT) {
+        status = look(s);
+    }
+    return status == STATUS_OK ? s : NULL;
 }
 
 static Status read_rates(void *c, double derivatives[], size_t nx, const char *call)
 {
-    Instance *s = enter_to_read(c, derivatives, nx, N_STATES, call);
-    if (s == NULL || rates(s) != STATUS_OK) {
+    Instance *s = enter_to_read(c, READABLE, derivatives, nx, N_STATES, call);
+    if (s == NULL) {
         return STATUS_ERROR;
+    }
+    if (rates(s) != STATUS_OK) {
+        return STATUS_DISCARD; /* a solver may try a shorter step */
     }
     for (size_t k = 0; k < nx; k++) {
         derivatives[k] = s->slopes[0][k];
@@ -138,17 +148,16 @@ static Status read_rates(void *c, double derivatives[], size_t nx, const char *c
 
 static Status read_indicators(void *c, double indicators[], size_t ni, const char *call)
 {
-    Instance *s = enter_to_read(c, indicators, ni, N_INDICATORS, call);
+    Instance *s = enter_to_read(c, READABLE, indicators, ni, N_INDICATORS, call);
     if (s == NULL) {
         return STATUS_ERROR;
     }
-    find_indicators(s, indicators);
-    return STATUS_OK;
+    return find_indicators(s, indicators);
 }
 
 static Status read_continuous_states(void *c, double x[], size_t nx, const char *call)
 {
-    Instance *s = enter_to_read(c, x, nx, N_STATES, call);
+    Instance *s = enter_to_read(c, READABLE, x, nx, N_STATES, call);
     if (s == NULL) {
         return STATUS_ERROR;
     }
@@ -158,9 +167,9 @@ static Status read_continuous_states(void *c, double x[], size_t nx, const char 
     return STATUS_OK;
 }
 
-static Status read_nominals(void *c, double nominals[], size_t nx, const char *call)
+static Status read_nominals(void *c, unsigned phases, double nominals[], size_t nx, const char *call)
 {
-    Instance *s = enter_to_read(c, nominals, nx, N_STATES, call);
+    Instance *s = enter_to_read(c, phases, nominals, nx, N_STATES, call);
     if (s == NULL) {
         return STATUS_ERROR;
     }

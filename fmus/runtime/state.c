@@ -81,6 +81,7 @@ typedef struct {
     double reached;
     double base_time;
 #if MODEL_EXCHANGE
+    bool exchanges;
     Regime regime;
     double modes[AT_LEAST_ONE(N_MODES)];
     int sides[AT_LEAST_ONE(N_STANDSTILL)];
@@ -134,6 +135,7 @@ static void save_state(const Instance *s, State *state)
     state->tape_first = s->tape.first;
     state->tape_last = s->tape.last;
 #if MODEL_EXCHANGE
+    state->exchanges = s->exchanges;
     state->regime = s->regime;
     memcpy(state->modes, s->modes, sizeof state->modes);
     memcpy(state->sides, s->sides, sizeof state->sides);
@@ -156,6 +158,9 @@ static Status restore_state(Instance *s, const State *state)
         return fail(s, "the saved state belongs to another model");
     }
 #if MODEL_EXCHANGE
+    if (state->exchanges != s->exchanges) {
+        return fail(s, "the saved state is of an instance for %s", s->exchanges ? "co-simulation" : "model exchange");
+    }
     s->regime = state->regime;
     memcpy(s->modes, state->modes, sizeof s->modes);
     memcpy(s->sides, state->sides, sizeof s->sides);

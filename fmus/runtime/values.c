@@ -102,7 +102,9 @@ ALWAYS_INLINE const double *numbers_of(Instance *s, Reference reference, Type ty
     }
 #if HAS_INDICATORS && MODEL_EXCHANGE && N_INDICATORS > 0
     if (type == TYPE_REAL && reference == N_VARIABLES + N_STATES + 1) {
-        find_indicators(s, s->scratch);
+        if (find_indicators(s, s->scratch) != STATUS_OK) {
+            return NULL;
+        }
         *count = N_INDICATORS;
         return s->scratch;
     }

@@ -3,7 +3,7 @@
 #if MODEL_EXCHANGE
 fmi2Status fmi2EnterEventMode(fmi2Component c)
 {
-    return enter_event_mode(c, "fmi2EnterEventMode");
+    return enter_event_mode(c, REGIME_EVENT | REGIME_CONTINUOUS, "fmi2EnterEventMode");
 }
 
 fmi2Status fmi2NewDiscreteStates(fmi2Component c, fmi2EventInfo *info)
@@ -61,6 +61,6 @@ fmi2Status fmi2GetContinuousStates(fmi2Component c, fmi2Real x[], size_t nx)
 
 fmi2Status fmi2GetNominalsOfContinuousStates(fmi2Component c, fmi2Real x_nominal[], size_t nx)
 {
-    return read_nominals(c, x_nominal, nx, "fmi2GetNominalsOfContinuousStates");
+    return read_nominals(c, PHASE_INSTANTIATED | READABLE, x_nominal, nx, "fmi2GetNominalsOfContinuousStates");
 }
 #endif

@@ -17,7 +17,7 @@ fmi3Instance fmi3InstantiateModelExchange(fmi3String instanceName, fmi3String in
 
 fmi3Status fmi3EnterEventMode(fmi3Instance instance)
 {
-    return enter_event_mode(instance, "fmi3EnterEventMode");
+    return enter_event_mode(instance, REGIME_CONTINUOUS, "fmi3EnterEventMode");
 }
 
 fmi3Status fmi3UpdateDiscreteStates(fmi3Instance instance, fmi3Boolean *discreteStatesNeedUpdate,
@@ -81,7 +81,7 @@ fmi3Status fmi3GetContinuousStates(fmi3Instance instance, fmi3Float64 continuous
 
 fmi3Status fmi3GetNominalsOfContinuousStates(fmi3Instance instance, fmi3Float64 nominals[], size_t nContinuousStates)
 {
-    return read_nominals(instance, nominals, nContinuousStates, "fmi3GetNominalsOfContinuousStates");
+    return read_nominals(instance, READABLE, nominals, nContinuousStates, "fmi3GetNominalsOfContinuousStates");
 }
 
 /* How many numbers there are of a kind: as there are no structural parameters, always as many. */

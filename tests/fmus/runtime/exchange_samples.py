@@ -101,3 +101,22 @@ class Stairs(Component):
             "whole": floor(self.time - self.after),
             "begun": self.time >= 2.1,
         }
+
+
+class Inverse(Component):
+    """A sampled block whose output, or comparison, has no value where its state or input is zero; its rate has one."""
+
+    u = Input("1", 1.0)
+    w = Input("1", 1.0)
+    x = State("1", 1.0)
+    n = Memory("1", 0, type=int)
+    y = Output("1")
+
+    def derivatives(self):
+        return {"x": where(self.x > self.u, 1.0, -1.0) * where(1.0 / self.w > 0.5, 1.0, 0.5)}
+
+    def outputs(self):
+        return {"y": 1.0 / self.x}
+
+    def update(self):
+        return {"n": self.n + 1}

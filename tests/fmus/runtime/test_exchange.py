@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 from fmpy.fmi2 import fmi2EventInfo
 
-OK, ERROR = 0, 3
+OK, DISCARD, ERROR = 0, 2, 3
 HERE = Path(__file__).parent
 NULL = None
 
@@ -148,11 +148,11 @@ def test_in_initialization_mode_all_is_as_it_stands(exchanged):
     assert fmu.numbers("NominalsOfContinuousStates") == [1.0]
 
 
-def test_what_has_no_value_is_an_error(exchanged):
+def test_a_rate_without_a_value_is_discarded_and_an_output_without_one_is_an_error(exchanged):
     fmu = exchanged("Breaks").initialize()
     fmu.event()
     assert fmu.put(1e200) == OK
-    assert fmu.numbers("Derivatives") == ERROR
+    assert fmu.numbers("Derivatives") == DISCARD
     assert "der(x)" in fmu.said
     assert fmu.set("u", 0.0) == OK
     assert fmu.numbers("ContinuousStates") == [1e200]  # what is held is held
@@ -162,12 +162,35 @@ def test_what_has_no_value_is_an_error(exchanged):
     assert "'y' is inf" in fmu.said
 
 
-def test_an_output_without_a_value_between_events_is_an_error(exchanged):
-    fmu = exchanged("Begins").initialize()
+def test_an_output_without_a_value_stops_no_integration(exchanged):
+    fmu = exchanged("Inverse").initialize()
     fmu.event()
-    assert fmu.put(1e308) == OK
-    assert fmu.numbers("EventIndicators") == ERROR
+    assert fmu.put(0.0) == OK
+    assert fmu.status_of_get("y") == ERROR
     assert "'y' is inf" in fmu.said
+    assert fmu.numbers("Derivatives") == [-1.0]
+    assert fmu.numbers("ContinuousStates") == [0.0]
+    assert fmu.set("w", 0.0) == OK
+    assert fmu.numbers("EventIndicators") == DISCARD
+    assert "event indicator 2 is" in fmu.said
+
+
+def test_when_a_sample_is_due_modes_are_of_the_inputs_that_it_sees(exchanged):
+    fmu = exchanged("Inverse").initialize(u=2.0)
+    assert fmu.numbers("Derivatives") == [-1.0]
+    assert fmu.set("u", 0.5) == OK
+    assert fmu.numbers("Derivatives") == [1.0]
+    assert fmu.set("u", 2.0) == OK
+    assert fmu.get("der(x)") == -1.0
+
+
+def test_before_the_initial_state_has_a_value_none_is_read(exchanged):
+    fmu = exchanged("Begins").enter()
+    assert fmu.set("u", 0.0) == OK
+    assert fmu.numbers("ContinuousStates") == ERROR
+    assert "'x' is inf" in fmu.said
+    assert fmu.set("u", 0.25) == OK
+    assert fmu.numbers("ContinuousStates") == [4.0]
 
 
 # ---------------------------------------------------------------- samples
@@ -190,6 +213,17 @@ def test_samples_are_taken_when_they_are_due_and_held_between(exchanged):
     assert (fmu.get("n"), fmu.get("y")) == (2, 7.0)
     assert fmu.event(2.0)[1] == 2.5  # those that were passed by are made up for
     assert fmu.get("n") == 5
+
+
+@pytest.mark.parametrize(("start", "period", "time"), [(0.0, 0.5, 1e18), (0.0, 1e-300, 1.0), (1.0, 1e-300, 1.0)])
+def test_samples_without_end_are_refused(exchanged, start, period, time):
+    fmu = exchanged("Sampler").initialize(start=start, sample_time=period)
+    if time > start:
+        fmu.event()
+        assert fmu.SetTime(c_double(time)) == OK
+        assert fmu.EnterEventMode() == OK
+    assert fmu.NewDiscreteStates(byref(fmi2EventInfo())) == ERROR
+    assert f"sample_time = {period:g} s is too short for an event at t = {time:.17g} s" in fmu.said
 
 
 def test_without_communication_steps_the_period_is_the_default_step(exchanged):
@@ -299,6 +333,16 @@ def test_a_reset_begins_anew_and_is_still_for_model_exchange(exchanged):
     assert fmu.numbers("Derivatives") == [-1.0]
 
 
+def test_a_saved_state_of_the_other_kind_is_refused(exchanged):
+    slave, one = exchanged("Choices", kind=1).initialize(), exchanged("Choices").initialize()
+    for taker, giver, kind in ((one, slave, "co-simulation"), (slave, one, "model exchange")):
+        before, state = taker.everything(), taker.from_bytes(giver.to_bytes(giver.save()))
+        assert taker.SetFMUstate(state) == ERROR
+        assert taker.said == f"Choices: the saved state is of an instance for {kind}"
+        assert taker.everything() == before
+        assert taker.FreeFMUstate(byref(state)) == OK
+
+
 @pytest.mark.parametrize("name", ["Choices", "Sampler", "Nothing"])
 def test_after_a_reset_all_is_as_in_a_new_instance(exchanged, name):
     fmu = exchanged(name)
@@ -335,7 +379,7 @@ def one_state(*states):
 
 
 CALLS = {
-    "EnterEventMode": (lambda f: f.EnterEventMode(), ("integrating",)),
+    "EnterEventMode": (lambda f: f.EnterEventMode(), ("event", "integrating")),
     "EnterContinuousTimeMode": (lambda f: f.EnterContinuousTimeMode(), ("event",)),
     "NewDiscreteStates": (lambda f: f.NewDiscreteStates(byref(fmi2EventInfo())), ("event",)),
     "NewDiscreteStates of nothing": (lambda f: f.NewDiscreteStates(NULL), ()),
@@ -356,8 +400,12 @@ CALLS = {
             lambda f, name=name: ERROR if f.numbers(name) == ERROR else OK,
             ("entered", "event", "integrating", "terminated"),
         )
-        for name in ("Derivatives", "EventIndicators", "ContinuousStates", "NominalsOfContinuousStates")
+        for name in ("Derivatives", "EventIndicators", "ContinuousStates")
     },
+    "GetNominalsOfContinuousStates": (
+        lambda f: ERROR if f.numbers("NominalsOfContinuousStates") == ERROR else OK,
+        ("instantiated", "entered", "event", "integrating", "terminated"),
+    ),
     "GetDerivatives of too many": (lambda f: f.numbers("Derivatives", 2), ()),
     "GetDerivatives of none": (lambda f: f.GetDerivatives(NULL, c_size_t(1)), ()),
     "DoStep": (lambda f: f.step(), ()),

@@ -108,6 +108,15 @@ def test_the_event_indicators_are_a_variable_to_be_read(exchanged):
     assert "no variable with value reference" in fmu.said
 
 
+def test_an_event_indicator_without_a_value_is_none(exchanged):
+    fmu = exchanged("Inverse").initialize()
+    fmu.event()
+    assert fmu.set("w", 0.0) == OK
+    assert fmu.numbers("EventIndicators") == 2  # discarded
+    fmu.get("event.indicators", count=2, status=ERROR)
+    assert "event indicator 2 is" in fmu.said
+
+
 def test_in_co_simulation_they_are_read_as_well(exchanged):
     fmu = exchanged(exchanges=False).initialize()
     assert fmu.get("event.indicators")[0] == pytest.approx(2.0 - fmu.get("x")[0])
