@@ -20,7 +20,7 @@ from typing import Any
 import platformdirs
 from filelock import FileLock
 
-from ..components import Component, Simulation
+from ..components import Component, ComponentError, Simulation
 from ..components.tracing import TracingError
 from . import native_fmu, python_fmu, toolchain
 from .description import write
@@ -89,6 +89,8 @@ def build_component(
     fmi: FmiVersion = "2",
 ) -> Path:
     """The same for a component at hand; its values become the FMU's start values."""
+    if kind == "python" and profile != "standard":
+        raise ComponentError(f"the profile {profile} is for native FMUs; Python FMUs have none")
     name, digest = type(component).__name__, source_digest(component, kind, profile, fmi)
     if kind == "python":
         return _keep(digest, name, lambda: python_fmu.contents(component, digest))

@@ -179,7 +179,7 @@ class _Freezer:
         if table is None or not moves:
             return _Value(_flat(function, read), moves)
         for axis, starts in enumerate(table[:-1]):
-            if self.values[step.read[axis][0]].moves:
+            if len(starts) > 1 and self.values[step.read[axis][0]].moves:
                 read[axis] = self._piece(step.read[axis], read[axis], _bounds(starts.tolist()))
         return _Value(_flat(function, read))
 

@@ -262,10 +262,11 @@ static Status update_discrete(Instance *s, bool *states_changed, double *next)
         settle(s);
     }
 #endif
-    *states_changed = false;
+    int changed = 0;
     for (int k = 0; k < N_STATES; k++) {
-        *states_changed = *states_changed || s->values[FIRST_STATE + k] != s->states[k];
+        changed += s->values[FIRST_STATE + k] != s->states[k];
     }
+    *states_changed = changed > 0;
     s->fresh = false;
     *next = next_time_event(s);
     return STATUS_OK;
@@ -287,8 +288,8 @@ static Status find_indicators(Instance *s, double *result)
     relate(s);
     for (int k = 0; k < N_MODES; k++) {
         if (model_indicated[k]) {
-            double first = s->relations[2 * k], hair = HYSTERESIS * (1.0 + fabs(s->relations[2 * k + 1]));
-            result[n++] = model_modes[k] == MODE_PIECE || s->modes[k] != 0.0 ? first + hair : first - hair;
+            double first = s->relations[2 * k] / (1.0 + fabs(s->relations[2 * k + 1]));
+            result[n++] = first + (model_modes[k] == MODE_PIECE || s->modes[k] != 0.0 ? HYSTERESIS : -HYSTERESIS);
         }
     }
 #endif

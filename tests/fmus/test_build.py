@@ -111,6 +111,12 @@ def test_unusable_arguments(sample, name, arguments, complaint):
         build(sample(name), arguments)
 
 
+@pytest.mark.parametrize("profile", ["model-exchange", "real-time"])
+def test_python_fmus_have_no_profiles(component_class, profile):
+    with pytest.raises(ComponentError, match=f"^the profile {profile} is for native FMUs; Python FMUs have none"):
+        build_component(component_class("ComfortCruise")(), "python", profile=profile)
+
+
 @pytest.mark.parametrize(
     ("equation", "said"),
     [

@@ -11,7 +11,10 @@ from railcosim.fmus.native.trace import trace
 class Law(Component):
     """The tests replace its outputs."""
 
-    table = Data({"breakpoints": [[-1, 0, 2], [0, 1]], "values": [[1, 2], [0, -1], [4, 9]]}, convert=Lookup.read)
+    table = Data(
+        {"breakpoints": [[-1, 0, 2], [0, 1, 3]], "values": [[1, 2, 2], [0, -1, 3], [4, 9, 5]]}, convert=Lookup.read
+    )
+    flat = Data({"breakpoints": [[0, 1]], "values": [3, 4]}, convert=Lookup.read)
     gain = Parameter("1", 2.0)
     u = Input("1", 1.0)
     w = Input("1", 1.0)
@@ -75,6 +78,7 @@ def modes(expression, base=Law):
         (lambda s: s.table(s.x, s.u), ["PIECE", "PIECE"]),
         (lambda s: s.table(s.gain, s.time), ["TIME_PIECE"]),
         (lambda s: s.table(s.gain, 0.5), []),
+        (lambda s: s.flat(s.x), []),
         (lambda s: maths.minimum(s.u, s.x) + maths.clip(s.w, -1.0, 1.0) + abs(s.x), []),
         (lambda s: maths.where(s.x < s.u, s.w, s.u), ["LESS"]),
         (lambda s: maths.where(s.x < s.u, s.x, s.u) + maths.where(s.x < s.u, s.x, 0.0), ["LESS"]),

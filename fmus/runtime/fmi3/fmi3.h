@@ -13,6 +13,7 @@
 
 #define TOKEN_NAME "instantiation token"
 #define STATUS_OK fmi3OK
+#define STATUS_DISCARD fmi3Discard
 #define STATUS_ERROR fmi3Error
 
 /* Whether a value reference may mean a whole array, and whether the time and the event indicators have one. */

@@ -47,6 +47,19 @@ class Choices(Component):
         return where(beyond, log(where(beyond, self.x - 3.0, 1.0)), 0.0)
 
 
+class Close(Component):
+    """One comparison, and nothing else."""
+
+    x = State("1", 0.0)
+    up_to = Output("1", bool)
+
+    def derivatives(self):
+        return {"x": 1.0}
+
+    def outputs(self):
+        return {"up_to": self.x <= 1.0}
+
+
 class Sampler(Component):
     """A block that stops, and counts and holds at samples; at one where it is told to it is put back."""
 

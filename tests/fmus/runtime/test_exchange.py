@@ -63,14 +63,20 @@ def test_each_indicator_is_of_one_choice(choices):
     assert [choices.get(name) for name in ("up_to", "whole", "stair", "either")] == [0, 4, 3.0, -1.0]
 
 
-def test_at_rest_of_a_comparison_its_indicator_is_a_hair_away_on_the_side_where_it_holds(choices):
+def test_at_rest_of_a_comparison_its_indicator_is_a_hair_away_on_the_side_where_it_holds(exchanged):
+    fmu = exchanged("Close").initialize()
+    fmu.event()
     for x, sign in ((1.0, 1), (1.0 + 1e-9, -1)):  # x <= 1
-        choices.put(x)
-        choices.event(0.1)
-        near = [z for z in choices.numbers("EventIndicators") if abs(z) < 1e-8]
-        assert near
-        assert any(math.copysign(1, z) == sign for z in near)
-        assert 0.0 not in near
+        fmu.put(x)
+        fmu.event(0.1)
+        (indicator,) = fmu.numbers("EventIndicators")
+        assert math.copysign(1, indicator) == sign
+        assert 0.0 < abs(indicator) < 1e-8
+
+
+def test_indicators_are_in_the_order_of_one(choices):
+    choices.event(0.1, level=1e9)
+    assert 0.9 < max(map(abs, choices.numbers("EventIndicators"))) < 2.0
 
 
 def test_time_events_are_told_ahead_and_are_exact(exchanged):
@@ -182,6 +188,13 @@ def test_when_a_sample_is_due_modes_are_of_the_inputs_that_it_sees(exchanged):
     assert fmu.numbers("Derivatives") == [1.0]
     assert fmu.set("u", 2.0) == OK
     assert fmu.get("der(x)") == -1.0
+
+
+def test_when_a_sample_is_due_nothing_is_read_that_it_cannot_be_taken_with(exchanged):
+    fmu = exchanged("Inverse").initialize(x=0.0)
+    assert fmu.status_of_get("y") == ERROR
+    assert fmu.numbers("Derivatives") == ERROR
+    assert "'y' is inf" in fmu.said
 
 
 def test_before_the_initial_state_has_a_value_none_is_read(exchanged):
@@ -372,10 +385,6 @@ def test_in_initialization_mode_indicators_are_of_the_present_states(exchanged):
     assert moving.numbers("EventIndicators") == [-7.5]
     assert moving.set("v_start", 7.5) == OK
     assert moving.numbers("EventIndicators") == [7.5]
-
-
-def one_state(*states):
-    return (c_double * 1)(*states)
 
 
 CALLS = {
