@@ -38,8 +38,8 @@ Scenarios = Annotated[
     list[str],
     typer.Argument(
         metavar="SCENARIO...",
-        help="Shipped scenarios (see 'orchestrate list'), or .toml files; or results: directories of runs, and "
-        "files of any tool (.csv, .parquet, .h5, .mat), the first of which is the reference.",
+        help="Shipped scenarios (see 'orchestrate list'), or .toml, .ssp or .ssd files; or results: directories of "
+        "runs, and files of any tool (.csv, .parquet, .h5, .mat), the first of which is the reference.",
         autocompletion=completing.comparable,
     ),
 ]

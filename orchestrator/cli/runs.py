@@ -50,7 +50,7 @@ def run(
         str | None,
         typer.Argument(
             metavar="SCENARIO",
-            help="A shipped scenario (see 'orchestrate list'), or a .toml file.",
+            help="A shipped scenario (see 'orchestrate list'), or a .toml, .ssp or .ssd file.",
             autocompletion=completing.scenarios,
         ),
     ] = None,

@@ -96,7 +96,9 @@ class Actions:
         if f"{SignalName(self._names[component,], name)}" in self._fed:
             return "it is connected, and what it receives next takes the place of what is set"
         if found.causality != "input" and (found.causality, found.variability) != ("parameter", "tunable"):
-            return f"only inputs and tunable parameters can be set in a run; its causality is {found.causality}"
+            return (
+                f"only inputs and tunable parameters can be set in a run; it is a {found.variability} {found.causality}"
+            )
         return ""
 
     def _value(self, typed: Any, kind: str) -> float | int | bool | str:

@@ -52,8 +52,8 @@ def test_an_action_sets_an_input_or_a_tunable_parameter(read):
     ("variable", "why"),
     [
         (("b b::u", "real", 1), "it is connected, and what it receives next takes the place of what is set"),
-        (("a::y", "real", 1), "only inputs and tunable parameters can be set in a run; its causality is output"),
-        (("a::top.v", "real", 1), "only inputs and tunable parameters can be set in a run; its causality is parameter"),
+        (("a::y", "real", 1), "only inputs and tunable parameters can be set in a run; it is a continuous output"),
+        (("a::top.v", "real", 1), "only inputs and tunable parameters can be set in a run; it is a fixed parameter"),
         (("a::n", "real", 1), "it is of type Integer, not real"),
         (("a::u", "complex", 1), "it is of type Real, not complex"),
         (("a::w", "real", 1), "a has no variable 'w'"),
