@@ -114,25 +114,40 @@ def _tested(name: str, reference: Results, other: Results, limits: Mapping[str, 
         raise ScenarioError(
             f"{name} has {what} of {len(limits)} signals from {begin:.6g} to {end:.6g} s to compare with"
         )
+    parts = {
+        signal: _within(begin, end, *without_blanks(other.time, other[signal].astype(float))) for signal in numbers
+    }
+    without = [signal for signal in numbers if not len(parts[signal][0])]
+    numbers = [signal for signal in numbers if signal not in without]
+    if not numbers:
+        raise ScenarioError(f"{name} has no value of {', '.join(without)} from {begin:.6g} to {end:.6g} s")
     deviations = [
         Deviation(
             signal,
             reference.units.get(signal, ""),
             limits[signal],
-            departure(
-                *without_blanks(reference.time, reference[signal].astype(float)),
-                *_within(begin, end, *without_blanks(other.time, other[signal].astype(float))),
-                limits[signal],
-            ),
+            departure(*without_blanks(reference.time, reference[signal].astype(float)), *parts[signal], limits[signal]),
         )
         for signal in numbers
     ]
-    notes = [
+    notes = [f"{signal} has no value in {name} from {begin:.6g} to {end:.6g} s" for signal in without]
+    for called, results in (("the reference", reference), (name, other)):
+        few = {signal: len(without_blanks(results.time, results[signal])[0]) for signal in numbers}
+        notes += [
+            f"{signal} has values at 2 of {results.points} points of {called}"
+            for signal, count in few.items()
+            if count == 2 < results.points
+        ]
+    notes += [
         f"{signal} is in {mine} in the reference and in {theirs} in {name}: compared as plain numbers"
         for signal in numbers
         if (mine := reference.units.get(signal)) and (theirs := other.units.get(signal)) and mine != theirs
     ]
-    notes += [f"{signal} holds texts, which are not compared" for signal in common if signal not in numbers]
+    notes += [
+        f"{signal} holds texts, which are not compared"
+        for signal in common
+        if not _is_number(reference, signal) or not _is_number(other, signal)
+    ]
     beyond = int(np.count_nonzero(~within))
     if beyond:
         notes.append(f"{beyond} points of {name} are outside the time of the reference, and not compared")

@@ -72,6 +72,21 @@ def test_time_that_is_covered_and_time_that_is_not(files):
     assert found.short == "it has the time from 0 to 10 s alone, the reference 0 to 20"
 
 
+def test_signals_that_are_recorded_less_often(files):
+    """One that has no value within the time of the reference is left out and told, as is one with its ends alone."""
+    ends = np.where(np.isin(TIME, (0.0, 10.0)), TIME, np.nan)
+    files("few.csv", train_speed=ends, train_force=np.full(101, 7.0))
+    (found,) = compare_recorded(["a.csv", "few.csv"]).tested
+    assert found.same
+    assert found.notes == ["train.speed has values at 2 of 101 points of few.csv"]
+    files("middle.csv", TIME[40:60], train_speed=TIME[40:60], train_force=np.full(20, 7.0))
+    (found,) = compare_recorded(["middle.csv", "few.csv"]).tested
+    assert "train.speed has no value in few.csv from 4 to 5.9 s" in found.notes
+    assert [row.signal for row in found.deviations] == ["train.force"]
+    with pytest.raises(ScenarioError, match=r"few\.csv has no value of train\.speed from 4 to 5\.9 s"):
+        compare_recorded(["middle.csv", "few.csv"], signals=["train.speed"])
+
+
 def test_units_that_differ_are_told(files, tmp_path):
     import pyarrow as pa
     from pyarrow import parquet
