@@ -32,7 +32,7 @@ def check_threads(system: System, models: Mapping[str, Model], wiring: Wiring, t
     """Why several threads, where they are asked for, could not step anything in parallel."""
     if threads <= 1:
         return []
-    remedy = "leave threads out, or run it as FMI 2.0 FMUs under an algorithm that takes them"
+    remedy = "leave threads out, or run it as FMUs under an algorithm that takes them"
     why = dict.fromkeys(_against_threads(system, models, wiring))
     return [Problem(f"threads = {threads}", f"they cannot act: {'; '.join(why)}", remedy)] if why else []
 
@@ -67,7 +67,6 @@ def _without_threads(system: System, models: Mapping[str, Model]) -> dict[str, l
         "these run Python, one thread at a time": python if len(files) - len(python) < 2 else [],
         "these run in processes of their own": [name for name in files if system.instances[name].isolate],
         "these give texts": [n for n, face in files.items() if any(v.type == "String" for v in face.of("output"))],
-        "these are FMUs of FMI 1.0": [n for n, face in files.items() if face.version == "1.0"],
     }
 
 

@@ -101,3 +101,12 @@ def test_what_is_left_to_python(by_hand, used, what):
     kept = {"word": ("minus_x", "neither"), "minus_x": ("word", "said")}[what]
     assert run(two_of(str(by_hand(1, *without(*kept))))).status == "completed"
     assert not used
+
+
+@pytest.mark.skipif(not compiled.HAS_THREADS, reason="no threads")
+def test_threads_give_the_same_bits(both, used, first, contents):
+    system = two_of(first, algorithm="jacobi")
+    alone = contents(run(system))
+    used.clear()
+    assert contents(both(system, threads=2)) == alone
+    assert {len(arguments[1]) for arguments in used} == {4}
