@@ -331,7 +331,7 @@ const Call *take_steps_3(const Hand *hand, const Group *group, double time, doub
 const Call *set_3(const Hand *hand, const Group *group, double time, int *status);
 const Call *get_3(const Hand *hand, const Group *group, int *status);
 
-/* The same for what else there is to do (courses.c, states.c); values that are looked at, stamped or extended. */
+/* The same for what else there is to do (courses.c, loops.c); values that are looked at, stamped or extended. */
 const Call *look_at(const Plan *plan, const Group *group, int *status);
 void stamp(const Plan *plan, const Group *group, const Advance *it);
 const Call *extend(const Hand *hand, const Group *group, const Advance *it, int *status);
