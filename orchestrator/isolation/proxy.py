@@ -357,6 +357,9 @@ class IsolatedSlave:
 
     def mourn(self, lost: HostLostError) -> FmuError:
         """The error that tells that it was lost, with its process."""
+        begin, length = (0.0, 0.0) if self._ride is None or not self._process.is_riding else self._ride.last_step
+        if length:  # the time that the master has for it may be that of a step of another's
+            self.time = begin
         end = self.end if self._ride is None or self.end is not None else self._ride.last_end
         if end is not None and self._process.last_call()[0] == "get":
             self.time = end

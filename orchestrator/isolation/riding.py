@@ -105,9 +105,15 @@ class Ride:
         self._process.leave_lane()
 
     @property
+    def last_step(self) -> tuple[float, float]:
+        """Time and length in s of the last step; of length 0 if there was none."""
+        begin, length = self._rider.last_step()
+        return float(begin), float(length)
+
+    @property
     def last_end(self) -> float | None:
         """The end in s of the last step, if there was one."""
-        begin, length = self._rider.last_step()
+        begin, length = self.last_step
         return begin + length if length else None
 
     def recover(self, call: str, status: int, time: float) -> bool:

@@ -1,5 +1,6 @@
 """Instances that share a process: the same numbers as ever, answers find whom they are for, and who is to blame."""
 
+import ctypes
 import os
 import re
 import shutil
@@ -202,6 +203,23 @@ def test_whoever_was_called_is_named(hostile, deed, mute, algorithm):
     kept = error.run["c.x"]
     assert len(kept) >= 2
     assert kept.tobytes() == whole["c.x"][: len(kept)].tobytes()
+
+
+def test_a_crash_is_at_the_begin_of_a_step_of_its_own(shared):
+    """In the lane, where it is seen when others have gone on, and the master with them."""
+    a, b = shared("a", "b", deeds={"b": "step null 5"})
+    rides = [one.ride() for one in (a, b)]
+    calls = [ride.add_step() for ride in rides]
+    for ride in rides:
+        ride.board()
+    for ride in rides:
+        ride.begin()
+    for (function, rider), length in zip(calls, (0.25, 1.0), strict=True):
+        step = ctypes.CFUNCTYPE(ctypes.c_int, ctypes.c_void_p, ctypes.c_double, ctypes.c_double, ctypes.c_int)
+        step(function)(rider, 5.0, length, 1)
+    b.time = 5.25
+    with pytest.raises(LostError, match=r"^b, t = 5 s: its process crashed in fmi2DoStep"):
+        a.await_lane(5.25)
 
 
 @pytest.mark.parametrize("what", ["discard", "error"])
