@@ -169,7 +169,7 @@ def constant(name, fmi, rng):
     """Inputs that are constant and move what there is to move, by names of scalars or of arrays."""
     found = {}
     for slot in CATALOGUE[name]().of(Input):
-        if slot.type is not float or slot.name == "trip_time":
+        if slot.type is not float or slot.name == "trip_time" or not slot.scalars:
             continue
         low, high = slot.declaration.minimum, slot.declaration.maximum
         swing = AMPLITUDES.get(slot.unit, 1.0) * rng.uniform(-1.0, 1.0, len(slot.scalars))
