@@ -129,7 +129,8 @@ class Judge:
             ExpressionError: for what was told before the run.
         """
         run = self.prepared(signals)
-        return [_known(requirement).evaluate(run, scaled=scaled) for requirement in self._requirements.values()]
+        with np.errstate(all="ignore"):
+            return [_known(requirement).evaluate(run, scaled=scaled) for requirement in self._requirements.values()]
 
     def values(self, signals: Signals) -> dict[str, float]:
         """The values of the metrics of a run by `value_names`; NaN where one cannot be evaluated."""

@@ -43,6 +43,12 @@ def test_one_judge_judges_many_runs():
     assert verdict.margin == -0.5
 
 
+def test_the_culprit_of_what_is_infinite_is_found_without_a_warning():
+    judge = Judge({}, {"equal": "always (0 < s.x <= s.x)"}, NAMES)
+    (verdict,) = judge.verdicts(run([math.inf]))  # inf - inf is no number
+    assert (verdict.verdict, verdict.blame) == ("pass", ("s.x",))
+
+
 def test_a_run_that_lacks_a_value_has_nan_by_its_name():
     judge = Judge({"late": "max(s.x, until = 9)", **METRICS}, {}, NAMES)
     values = judge.values(run([1.0, 2.0, 3.0]))
