@@ -1,7 +1,7 @@
 """How time advances: initialization, then communication steps by one of the `algorithms`.
 
 `loop` is the loop over communication points, `exchange` the values between instances; `events`, `extrapolation` and
-`algebraic_loops` are what may happen at a point, in a step and within an instant. `compiled` hands steps to the C
+`algebraic` loops are what may happen at a point, in a step and within an instant. `compiled` hands steps to the C
 kernel.
 """
 

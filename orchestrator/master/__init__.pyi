@@ -1,4 +1,4 @@
-from .algebraic_loops import find_loops
+from .algebraic import find_loops
 from .algorithms import ALGORITHMS, Explicit, Operation
 from .checking import check_coupling, check_threads, describe_coupling
 from .compiled import HAS_KERNEL, note_swings

@@ -10,7 +10,7 @@ from ..problems import Problem, suggestion
 from ..system import System
 from ..times import count_steps, digits
 from ..wiring import Wiring
-from .algebraic_loops import find_loops
+from .algebraic import find_loops
 from .algorithms import ALGORITHMS
 from .algorithms.refusals import listed
 from .compiled import HAS_KERNEL, HAS_THREADS

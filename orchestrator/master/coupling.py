@@ -8,7 +8,7 @@ from ..errors import CouplingError
 from ..fmi import Slave
 from ..times import digits
 from ..wiring import Link
-from .algebraic_loops import LoopSolver
+from .algebraic import LoopSolver
 from .exchange import Exchange
 from .extrapolation import Extrapolator
 from .refresh import Refresher

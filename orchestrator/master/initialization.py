@@ -8,7 +8,7 @@ from typing import Any
 
 from ..errors import FmuError, LostError, ScenarioError
 from ..fmi import Slave
-from .algebraic_loops import LoopSolver
+from .algebraic import LoopSolver
 from .exchange import Exchange
 
 _SWEEPS = 100

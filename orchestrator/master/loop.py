@@ -16,7 +16,7 @@ from ..fmi import Slave
 from ..fmi.binding import Watch
 from ..times import slack
 from ..wiring import Link
-from .algebraic_loops import LoopSolver, find_feeders, find_loops
+from .algebraic import LoopSolver, find_feeders, find_loops
 from .algorithms import ALGORITHMS, Explicit, FixedStep, Programmed, VariableStep
 from .compiled import CompiledLoop
 from .coupling import Coupling

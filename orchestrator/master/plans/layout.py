@@ -37,6 +37,8 @@ AT_STAMP, AT_END, AS_NOTED = 0, 1, 2
 """What time the values of inputs that go on belong to."""
 METHODS = {"none": 0, "aitken": 1, "anderson": 2}
 """Ways to the next guess of an iteration."""
+NOBODY = None, ""
+"""Whom an operation calls that calls nobody, and by which function."""
 NONE = 2**32 - 1
 """What stands where there is no value reference, so that lists of other lengths are others."""
 

@@ -11,10 +11,9 @@ from numpy.typing import NDArray
 from ...fmi import Channel
 from ...fmi.binding import ElementsChannel, Fmi3Slave, FmuSlave, LoadedSlave, is_watched
 from ...isolation import IsolatedChannel, Ride
-from ..algorithms import HEAD, Batch, Iteration, Operation, Repeated
+from ..algorithms import Batch, Iteration, Operation, Repeated
 from ..coupling import Coupling
 from ..exchange import Change, Yield
-from ..refresh import Refresher
 from .ability import Called, called, slopes_call
 from .courses import Courses
 from .flattening import Entry, Wide, noted, parts_of, type_of
@@ -23,12 +22,12 @@ from .layout import (
     AS_NOTED,
     AT_END,
     CHANNEL,
-    CIRCLE,
     ENTRY,
     INSTANCE,
     ITERATION,
     LOOP,
     METHODS,
+    NOBODY,
     NONE,
     NOTING,
     OPERATION,
@@ -37,8 +36,8 @@ from .layout import (
     TRUE_ABOVE,
     Kind,
 )
+from .points import add_refresh
 
-_NOBODY = None, ""
 _STATES = {Operation.SAVE + n: (Kind(Kind.SAVE + n % 3), n // 3) for n in range(6)}
 """What is done to a state, and to which of an instance's."""
 
@@ -62,6 +61,7 @@ class Plan:
         channels: arrays that are set as a whole.
         courses: the inputs that go on during a step.
         rounds: by operation, what it is repeated for. iterations: by the operation that ends a round.
+        slaves: whom it calls. loops: what is repeated. room: how many numbers there is room for so far.
         states: by instance, and by which of its states, its number.
         threads: how many threads there is work for.
         width: how many numbers there are, the values first.
@@ -78,33 +78,33 @@ class Plan:
         watched: Sequence[int] = (),
     ) -> None:
         self._coupling = coupling
-        self._exchange = coupling.exchange
+        self.exchange = coupling.exchange
         self.wide = Wide(coupling.exchange)
         self.courses = Courses(coupling.extrapolator, coupling.exchange, in_every_way=len(sections) > 1)
         self._channels: list[tuple[int, ...]] = []
         self.channels: list[ElementsChannel] = []
         self._entries: list[Entry] = []
         self._feeds: list[tuple[str, int, list[int], bool, int]] = []
-        self._changed_links = self._exchange.changed_links
+        self._changed_links = self.exchange.changed_links
         self._references: list[int] = []
         self.operations: list[tuple[int, int, int, int]] = []
         self.late: list[bool] = []
         self.culprits: list[tuple[Called | None, str]] = []
         self._instances: list[tuple[int, int, int]] = []
         self.changes: list[tuple[Change, int, bool]] = []
-        self._slaves = {name: called(slave) for name, slave in coupling.slaves.items()}
-        self.rides = [slave for slave in self._slaves.values() if isinstance(slave, Ride)]
+        self.slaves = {name: called(slave) for name, slave in coupling.slaves.items()}
+        self.rides = [slave for slave in self.slaves.values() if isinstance(slave, Ride)]
         self.rounds: dict[int, Iteration] = {}
         self.iterations: dict[int, Iteration] = {}
-        self._loops: list[tuple[float, ...]] = []
+        self.loops: list[tuple[float, ...]] = []
         self._passed: list[int] = [*watched]
         self._work: list[tuple[int, Iteration]] = []
-        self._room = 0
+        self.room = 0
         self.states: dict[tuple[str, int], int] = {}
         self._notes: list[tuple[int, int, int, int]] = []
         self._sets: dict[str, list[tuple[int, str]]] = {}
         self._shown: dict[str, list[tuple[int, int, str]]] = {}
-        self.width = len(self._exchange.values)
+        self.width = len(self.exchange.values)
         self.threads = threads
         ends: list[int] = []
         for n, section in enumerate(sections):
@@ -117,14 +117,14 @@ class Plan:
                     self._add(list(share), part.operations, final=len(sections) == 1)
                     ends += [len(self.operations)] * (threads > 1)
             if n == refreshing and coupling.refresher is not None:
-                self._refresh(coupling.refresher)
+                add_refresh(self, coupling.refresher)
             ends += [len(self.operations)] * (threads == 1)
-        self.spare = self._room
+        self.spare = self.room
         if len(sections) > 1:
-            self._room += 2 * len(watched) + 7 * self.width + 2 * self.courses.count * POINTS.itemsize // 8
+            self.room += 2 * len(watched) + 7 * self.width + 2 * self.courses.count * POINTS.itemsize // 8
         self.work = self._made_work()
-        self.wide.widen(self.width - len(self._exchange.values))
-        self.courses.widen(self.width - len(self._exchange.values))
+        self.wide.widen(self.width - len(self.exchange.values))
+        self.courses.widen(self.width - len(self.exchange.values))
         self.arrays = (
             np.array(
                 [
@@ -141,7 +141,7 @@ class Plan:
             self.wide.forms,
             self.courses.courses,
             np.array(self._notes, dtype=NOTING),
-            np.array(self._loops, dtype=LOOP),
+            np.array(self.loops, dtype=LOOP),
             np.array(self._passed, dtype=np.int64),
             self.courses.points,
             self._made_states(),
@@ -152,7 +152,7 @@ class Plan:
     def forget(self, time: float) -> None:
         """Give back the states that have been saved at a time in s and not been given back."""
         for (name, _), n in self.states.items():
-            handle, slave = int(self._handles[n]), self._slaves[name]
+            handle, slave = int(self._handles[n]), self.slaves[name]
             self._handles[n] = 0
             if handle:
                 assert isinstance(slave, LoadedSlave)
@@ -171,7 +171,7 @@ class Plan:
     def come_back(self, time: float) -> None:
         """Restore the first states of those that have one saved, which was at a time in s, and give all back."""
         for (name, which), n in self.states.items():
-            handle, slave = int(self._handles[n]), self._slaves[name]
+            handle, slave = int(self._handles[n]), self.slaves[name]
             if handle and not which:
                 assert isinstance(slave, LoadedSlave)
                 slave.restore((time, c_void_p(handle)))
@@ -183,11 +183,11 @@ class Plan:
 
     def follow(self) -> None:
         """Let inputs follow what they are connected to now."""
-        if self._changed_links == self._exchange.changed_links:
+        if self._changed_links == self.exchange.changed_links:
             return
-        self._changed_links, entries = self._exchange.changed_links, self.arrays[4]
+        self._changed_links, entries = self.exchange.changed_links, self.arrays[4]
         for name, n, changes, late, begin in self._feeds:
-            feed = self._exchange.feeds[name][n]
+            feed = self.exchange.feeds[name][n]
             places = [k for _, places in parts_of(feed.channel) or () for k in places]
             made = self.wide.entries(feed, changes, late=late)
             entries[begin : begin + len(places)] = [made[k] for k in places]
@@ -195,9 +195,9 @@ class Plan:
     def _add(self, names: Sequence[str], operations: Sequence[Operation], *, final: bool = True) -> None:
         for operation in operations:
             for name in names:
-                slave, rate = self._slaves[name], self._coupling.settings.rates.get(name, 1)
+                slave, rate = self.slaves[name], self._coupling.settings.rates.get(name, 1)
                 if operation in (Operation.SET, Operation.SET_OF_END):
-                    self._add_sets(slave, rate, way=AT_END if operation == Operation.SET_OF_END else None)
+                    self.add_sets(slave, rate, way=AT_END if operation == Operation.SET_OF_END else None)
                 elif operation == Operation.STEP:
                     self._add_step(slave, rate, final=final)
                 elif operation == Operation.NOTE:
@@ -207,7 +207,7 @@ class Plan:
                 elif operation in _STATES:
                     self._add_state([name], *_STATES[operation])
                 else:
-                    self._add_gets(slave, rate, {Operation.GET_DIRECT: True, Operation.GET_REST: False}.get(operation))
+                    self.add_gets(slave, rate, {Operation.GET_DIRECT: True, Operation.GET_REST: False}.get(operation))
 
     def _repeat(self, part: Repeated) -> None:
         """Add what is repeated from saved states: see ``native/kernel.h``."""
@@ -215,37 +215,35 @@ class Plan:
         passed, real_count = [*iteration.reals, *iteration.others], len(iteration.reals)
         method, relaxation = METHODS[iteration.stepping.acceleration], iteration.stepping.relaxation
         counts = real_count, iteration.guess_count, len(iteration.others)
-        number, begin = len(self._loops), len(self._passed)
-        self._loops.append(
-            (ITERATION, iteration.stepping.max_iterations, self._room, begin, *counts, method, relaxation)
-        )
+        number, begin = len(self.loops), len(self._passed)
+        self.loops.append((ITERATION, iteration.stepping.max_iterations, self.room, begin, *counts, method, relaxation))
         self._passed += passed
-        self._work.append((self._room, iteration))
+        self._work.append((self.room, iteration))
         u = iteration.guess_count
-        self._room += len(iteration.numbers) + 2 * u + (0, 1 + u, 1 + 24 * u)[method]
+        self.room += len(iteration.numbers) + 2 * u + (0, 1 + u, 1 + 24 * u)[method]
         self._add_state(names, Kind.SAVE)
-        self._add_operation(Kind.BEGIN, number, _NOBODY, (1, 0))
+        self.add_operation(Kind.BEGIN, number, NOBODY, (1, 0))
         self._add_state(names, Kind.RESTORE)
-        self._add_operation(Kind.MARK, number, _NOBODY, (1, 0))
+        self.add_operation(Kind.MARK, number, NOBODY, (1, 0))
         first = len(self.operations)
         for name in names:
             self._add([name], part.batch.operations, final=False)
         self.rounds.update(dict.fromkeys(range(first, len(self.operations)), iteration))
         self.iterations[len(self.operations)] = iteration
-        self._add_operation(Kind.END, number, _NOBODY, (1, 0))
+        self.add_operation(Kind.END, number, NOBODY, (1, 0))
         self._add_state(names, Kind.FORGET)
 
     def _add_state(self, names: Sequence[str], kind: Kind, which: int = 0) -> None:
         for name in names:
-            slave = self._slaves[name]
+            slave = self.slaves[name]
             assert isinstance(slave, LoadedSlave)
             index = self.states.setdefault((name, which), len(self.states))
-            self._add_operation(kind, index, (slave, slave.STATE[kind - Kind.SAVE]), (1, 0))
+            self.add_operation(kind, index, (slave, slave.STATE[kind - Kind.SAVE]), (1, 0))
 
     def _made_states(self) -> NDArray[np.void]:
         made = np.zeros(len(self.states), STATE)
         for (name, _), n in self.states.items():
-            slave = self._slaves[name]
+            slave = self.slaves[name]
             assert isinstance(slave, LoadedSlave)
             functions = [slave.addresses(call)[0] for call in slave.STATE[:3]]
             made[n] = (*functions, slave.pointer, 0)
@@ -254,46 +252,27 @@ class Plan:
 
     def _made_work(self) -> NDArray[np.float64]:
         """Room for the numbers of what is repeated; those of iterations stand there from now on."""
-        work = np.zeros(self._room)
+        work = np.zeros(self.room)
         for begin, iteration in self._work:
             own = work[begin : begin + len(iteration.numbers)]
             own[:] = iteration.numbers
             iteration.use(own)
         return work
 
-    def _refresh(self, refresher: Refresher) -> None:
-        """Add what brings feed-through up to date."""
-        for stage, is_circle in refresher.stages:
-            names = [name for name in stage if name not in refresher.refused]
-            number = len(self._loops)
-            if is_circle:
-                self._loops.append((CIRCLE, len(stage) + 1, self._room, *[0] * 5, 0.0))
-                self._room += HEAD + 2 * self.width
-                self._add_operation(Kind.BEGIN, number, _NOBODY, (1, 0))
-                self._add_operation(Kind.MARK, number, _NOBODY, (1, 0))
-            for name in names:
-                self._add_sets(self._slaves[name], 1, late=True)
-                self._add_gets(self._slaves[name], 1, None, kind=Kind.READ)
-            if is_circle:
-                self._add_operation(Kind.END, number, _NOBODY, (1, 0))
-            for name in names:
-                for part in self._exchange.yields[name]:
-                    if part.is_real:
-                        self._add_reads(Kind.LOOK, self._slaves[name], part, (1, 0))
-
-    def _add_operation(
+    def add_operation(
         self, kind: int, index: int, culprit: tuple[Called | None, str], due: tuple[int, int], *, late: bool = False
     ) -> None:
+        """Add an operation: whom it calls, and in which steps it is due."""
         self.operations.append((kind, index, *due))
         self.late.append(late)
         self.culprits.append(culprit)
 
-    def _add_sets(self, slave: Called, rate: int, *, late: bool = False, way: int | None = None) -> None:
+    def add_sets(self, slave: Called, rate: int, *, late: bool = False, way: int | None = None) -> None:
         """Set inputs: for a step, continued if they are to be, in one of several ways, or ``late``, as it has ended."""
         extrapolator = self._coupling.extrapolator
         course = None if extrapolator is None or late else extrapolator.courses.get(slave.name)
         made = self._sets[slave.name] = []
-        for n, feed in enumerate(self._exchange.feeds[slave.name]):
+        for n, feed in enumerate(self.exchange.feeds[slave.name]):
             slots = feed.changes or [None] * len(feed.targets)
             changes = [-1 if slot is None else self._add_change(slot, -1, feed.is_real) for slot in slots]
             self._feeds.append((slave.name, n, changes, late, len(self._entries)))
@@ -308,7 +287,7 @@ class Plan:
             made += self._add_channels(
                 Kind.EXTEND, slave, feed.channel, entries, feed.is_real, due=(rate, 0), index=number
             )
-            self._add_operation(Kind.SLOPES, number, (slave, slopes_call(slave)), (rate, 0))
+            self.add_operation(Kind.SLOPES, number, (slave, slopes_call(slave)), (rate, 0))
 
     def _add_notes(self, slave: Called) -> None:
         """Note the inputs that have just been set, behind the values."""
@@ -321,7 +300,7 @@ class Plan:
                 courses = int(continued[0]), self.courses.number(slave.name, AS_NOTED)
                 self.courses.courses["channel"][courses[1]] = len(self._channels)
             shown.append((len(self._channels), courses[1], call))
-            self._add_operation(Kind.NOTE, len(self._notes), _NOBODY, (1, 0))
+            self.add_operation(Kind.NOTE, len(self._notes), NOBODY, (1, 0))
             self._notes.append((source, len(self._channels), *courses))
             self._channels.append((function, component, len(self._entries), count, *what))
             self._references += self._references[begin : begin + count]
@@ -332,30 +311,31 @@ class Plan:
         """Set inputs as they were noted."""
         for channel, course, call in self._shown[slave.name]:
             if course < 0:
-                self._add_operation(Kind.SET, channel, (slave, call), (1, 0))
+                self.add_operation(Kind.SET, channel, (slave, call), (1, 0))
                 continue
-            self._add_operation(Kind.EXTEND, course, (slave, call), (1, 0))
-            self._add_operation(Kind.SLOPES, course, (slave, slopes_call(slave)), (1, 0))
+            self.add_operation(Kind.EXTEND, course, (slave, call), (1, 0))
+            self.add_operation(Kind.SLOPES, course, (slave, slopes_call(slave)), (1, 0))
 
-    def _add_gets(self, slave: Called, rate: int, direct: bool | None, kind: Kind = Kind.GET) -> None:
+    def add_gets(self, slave: Called, rate: int, direct: bool | None, kind: Kind = Kind.GET) -> None:
         """Read outputs, all or those that are ``direct`` or not; with what events make of them."""
-        for part in self._exchange.yields[slave.name]:
+        for part in self.exchange.yields[slave.name]:
             if direct is not None and part.direct != direct:
                 continue
             due = (rate, 0 if part.direct else rate - 1)
-            self._add_reads(kind, slave, part, due)
-            for place, change in self._exchange.output_changes.items():
+            self.add_reads(kind, slave, part, due)
+            for place, change in self.exchange.output_changes.items():
                 if part.begin <= place < part.end:
                     index = self._add_change(change, place, part.is_real)
-                    self._add_operation(Kind.CHANGE, index, (None, "an event"), due)
+                    self.add_operation(Kind.CHANGE, index, (None, "an event"), due)
 
-    def _add_reads(self, kind: Kind, slave: Called, part: Yield, due: tuple[int, int]) -> None:
+    def add_reads(self, kind: Kind, slave: Called, part: Yield, due: tuple[int, int]) -> None:
+        """Read outputs of one type, or look at them."""
         whole = TRUE_ABOVE if part.kind == "Boolean" else AS_IT_IS
         entries = [(place, -1, -1, 1.0, 0.0, whole, 0.0, 0) for place in range(part.begin, part.end)]
         first = len(self._channels)
         self._add_channels(kind, slave, part.channel, entries, part.is_real, due=due)
-        for channel in range(first, len(self._channels)) if self._exchange.stamps and kind != Kind.LOOK else ():
-            self._add_operation(Kind.STAMP, channel, _NOBODY, due)
+        for channel in range(first, len(self._channels)) if self.exchange.stamps and kind != Kind.LOOK else ():
+            self.add_operation(Kind.STAMP, channel, NOBODY, due)
 
     def _add_change(self, change: Change, place: int, is_real: bool) -> int:
         self.changes.append((change, place, is_real))
@@ -380,7 +360,7 @@ class Plan:
         for own, places in parts_of(channel) or ():
             call = own.calls[kind not in (Kind.SET, Kind.EXTEND)]
             made.append((len(self._channels), call))
-            self._add_operation(kind, len(self._channels) if index is None else index, (slave, call), due, late=late)
+            self.add_operation(kind, len(self._channels) if index is None else index, (slave, call), due, late=late)
             if isinstance(slave, Ride):
                 assert isinstance(own, IsolatedChannel)
                 addresses = slave.add(own, is_get=kind == Kind.GET)
@@ -394,6 +374,6 @@ class Plan:
 
     def _add_step(self, slave: Called, rate: int, *, final: bool) -> None:
         call = FmuSlave.DO_STEP if isinstance(slave, Ride) else slave.DO_STEP
-        self._add_operation(Kind.STEP, len(self._instances), (slave, call), (rate, 0), late=not final)
+        self.add_operation(Kind.STEP, len(self._instances), (slave, call), (rate, 0), late=not final)
         addresses = slave.add_step() if isinstance(slave, Ride) else slave.addresses(call)
         self._instances.append((*addresses, addressof(slave.told) if isinstance(slave, Fmi3Slave) else 0))
