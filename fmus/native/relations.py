@@ -19,7 +19,7 @@ from ...components.lookup.cells import Cells
 from ..variables import scalar_variables
 from . import calls
 from .ccode import called_in, function
-from .trace import Expressions, Traced, expressions, simplification
+from .trace import Expressions, Traced, directional, expressions, simplification
 
 Kind = Literal["LESS", "NOT_ABOVE", "BEFORE", "AFTER", "PIECE", "TIME_PIECE"]
 """Of modes: ``a < b``, ``a <= b``; time before or after something that does not move; the piece that a place is in."""
@@ -42,10 +42,11 @@ class Exchange:
     """What model exchange adds to a traced component.
 
     Attributes:
-        code: the C functions ``<prefix>_frozen_outputs`` and ``_frozen_derivatives``, of modes too, and ``_relations``:
-            two numbers for each mode, of a comparison how far it is from changing and the size of what is compared; of
-            one with time when it changes; of a piece how far it is to its end (of a piece of time, its end), and the
-            place. Those that would compute nothing are left out; without modes there are none.
+        code: the C functions ``<prefix>_frozen_outputs`` and ``_frozen_derivatives``, of modes too, their derivatives
+            along a direction, ``_frozen_directional``, and ``_relations``: two numbers for each mode, of a comparison
+            how far it is from changing and the size of what is compared; of one with time when it changes; of a piece
+            how far it is to its end (of a piece of time, its end), and the place. Those that would compute nothing are
+            left out; without modes there are none.
         modes: what each is.
     """
 
@@ -83,6 +84,8 @@ def exchange(component: Component, prefix: str, traced: Traced, held: Sequence[b
         for name, results in functions.items():
             if freezer.modes and results:
                 code |= dict.fromkeys(function(f"{prefix}_{name}", arguments, results, calls.KNOWN))
+        if freezer.modes:
+            code |= dict.fromkeys(directional(f"{prefix}_frozen_directional", arguments, frozen))
     parts = [*calls.tables("".join(code)), *code]
     return Exchange("\n".join(part for part in parts if part not in traced.code), tuple(freezer.kinds))
 

@@ -31,7 +31,7 @@ _RUNTIME_VARIABLES = (
     "trip_time",
 )
 _EQUATIONS = ("outputs", "derivatives", "initial", "update", "keep", "directional", "initial_directional")
-_FROZEN = ("frozen_outputs", "frozen_derivatives", "relations")
+_FROZEN = ("frozen_outputs", "frozen_derivatives", "frozen_directional", "relations")
 _MAX_TEXT = 1024
 """Bytes of a text with its end, as in ``instance.h``."""
 

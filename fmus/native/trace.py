@@ -143,12 +143,18 @@ def _code(found: Expressions, prefix: str) -> Traced:
     along = {"directional": [*found.outputs, *found.derivatives], "initial_directional": found.initial}
     for name, column in along.items():
         if column:
-            code |= dict.fromkeys(_directional(f"{prefix}_{name}", arguments, column))
+            code |= dict.fromkeys(directional(f"{prefix}_{name}", arguments, column))
     return Traced("\n".join([*calls.tables("".join(code)), *code]), found.layout, found.started, found.reinitialised)
 
 
-def _directional(name: str, arguments: list[tuple[str, Any]], column: list[Any]) -> list[str]:
-    """The derivative of expressions along a direction in the space of the values, ``seed``."""
+def directional(name: str, arguments: list[tuple[str, Any]], column: list[Any]) -> list[str]:
+    """C of the derivative of expressions along a direction in the space of the values, ``seed``.
+
+    Args:
+        name: of the function.
+        arguments: name and CasADi vector of each, the values second; ``seed`` comes last.
+        column: the expressions.
+    """
     values = arguments[1][1]
     seed = ca.SX.sym("seed", values.shape[0])
     # Simplified, or x**2 at a negative x gives NaN: its rule adds 0 * log(x) for an exponent that does not vary.

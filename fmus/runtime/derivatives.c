@@ -64,6 +64,21 @@ static Status take_direction(Instance *s, const Reference knowns[], size_t n_kno
     return HAS_ARRAYS && used != n_seed ? miscounted(s, n_seed, call) : STATUS_OK;
 }
 
+#if N_OUTPUTS + N_STATES > 0
+/* How outputs and rates move along the direction, into the scratch space. */
+static void move_results(Instance *s)
+{
+#if MODEL_EXCHANGE
+    if (s->exchanges && s->phase != PHASE_INITIALIZATION) {
+        move_frozen_results(s);
+        return;
+    }
+#endif
+    const double clock[2] = {s->time, s->step};
+    MODEL_DIRECTIONAL(clock, s->values, s->direction, s->scratch);
+}
+#endif
+
 /* How the unknowns move when the knowns move along the seed. */
 static Status directional_derivative(void *c, const Reference unknowns[], size_t n_unknowns, const Reference knowns[],
                                      size_t n_knowns, const double seed[], size_t n_seed, double sensitivity[],
@@ -83,8 +98,7 @@ static Status directional_derivative(void *c, const Reference unknowns[], size_t
     }
     complete_direction(s);
 #if N_OUTPUTS + N_STATES > 0
-    const double clock[2] = {s->time, s->step};
-    MODEL_DIRECTIONAL(clock, s->values, s->direction, s->scratch);
+    move_results(s);
 #endif
     for (size_t k = 0; k < n_unknowns; k++) {
         int place = unknown_place(unknowns[k]);

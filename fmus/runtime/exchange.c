@@ -139,6 +139,47 @@ static Status evaluate_frozen(Instance *s)
     return STATUS_OK;
 }
 
+#if N_OUTPUTS + N_STATES > 0
+/* How outputs and rates move along the direction, into the scratch space: each as its value is found, in the present modes,
+   as it stands, or held and therefore not at all. */
+static void move_frozen_results(Instance *s)
+{
+    const double clock[2] = {s->time, s->step};
+    bool samples = false;
+#if IS_SAMPLED
+    samples = s->regime == REGIME_EVENT && sample_is_due(s);
+#endif
+#if N_MODES > 0
+    bool outputs = !samples, rates = true;
+#if N_OUTPUTS > 0
+    MODEL_FROZEN_OUTPUTS(clock, s->values, s->modes, s->looked);
+    outputs = outputs && all_finite(s->looked, N_OUTPUTS);
+#endif
+#if N_STATES > 0
+    MODEL_FROZEN_DERIVATIVES(clock, s->values, s->modes, s->looked);
+    rates = all_finite(s->looked, N_STATES);
+#endif
+    MODEL_FROZEN_DIRECTIONAL(clock, s->values, s->modes, s->direction, s->scratch);
+    if (!outputs || !rates) {
+        MODEL_DIRECTIONAL(clock, s->values, s->direction, s->looked);
+        for (int k = 0; k < N_OUTPUTS + N_STATES; k++) {
+            bool kept = k < N_OUTPUTS ? outputs : rates;
+            s->scratch[k] = kept ? s->scratch[k] : s->looked[k];
+        }
+    }
+#else
+    MODEL_DIRECTIONAL(clock, s->values, s->direction, s->scratch);
+#endif
+#if HAS_HELD
+    for (int k = 0; k < N_OUTPUTS; k++) {
+        s->scratch[k] = model_held[k] && !samples ? 0.0 : s->scratch[k];
+    }
+#else
+    (void)samples;
+#endif
+}
+#endif
+
 /* ----------------------------------------------------------------------------------------------------------- events */
 
 #if N_STANDSTILL > 0

@@ -143,6 +143,7 @@ typedef struct {
     double modes[AT_LEAST_ONE(N_MODES)];
     double relations[AT_LEAST_ONE(2 * N_MODES)]; /* what the modes follow from */
     int sides[AT_LEAST_ONE(N_STANDSTILL)];       /* on which side of its standstill a state is */
+    double looked[AT_LEAST_ONE(N_OUTPUTS + N_STATES)]; /* outputs and rates that are looked at, and not kept */
 #endif
     double slopes[4][AT_LEAST_ONE(N_STATES)];
     double states[AT_LEAST_ONE(N_STATES)];

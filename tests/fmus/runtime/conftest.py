@@ -6,7 +6,8 @@ from pathlib import Path
 
 import pytest
 
-SAMPLES = Path(__file__).parent / "samples.py"
+HERE = Path(__file__).parent
+SAMPLES = HERE / "samples.py"
 BARE = Path(__file__).parents[1] / "bare.py"
 MODULES = """
 import importlib.util, sys
@@ -43,3 +44,17 @@ def integrators(load):
 def near():
     """A value up to a few roundings of the sub-steps."""
     return lambda value: pytest.approx(value, rel=1e-14)
+
+
+@pytest.fixture
+def exchanged(load):
+    """Instances for model exchange; those for co-simulation of the same FMU are made by ``kind=1``."""
+
+    def make(reference, kind=0):
+        place = next(
+            (f for f in ("exchange_samples", "samples") if f"class {reference}(" in (HERE / f"{f}.py").read_text()),
+            None,
+        )
+        return load(f"{HERE / place}.py:{reference}" if place else reference, profile="model-exchange", kind=kind)
+
+    return make

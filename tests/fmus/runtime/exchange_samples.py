@@ -133,3 +133,36 @@ class Inverse(Component):
 
     def update(self):
         return {"n": self.n + 1}
+
+
+class Kinds(Component):
+    """Branches of other slopes, by a state, an input, a place in a table and the time; one has no value below 2."""
+
+    u = Input("1", 0.5)
+    x = State("1", 0.25, output=True)
+    branch = Output("1")
+    piece = Output("1")
+    timed = Output("1")
+    root = Output("1")
+
+    def derivatives(self):
+        return {"x": where(self.x < 1.0, self.u * self.x, -self.x * self.x * self.x)}
+
+    def outputs(self):
+        beyond = self.x > 2.0
+        return {
+            "branch": where(self.x < 1.0, self.u * self.x, 3.0 * self.x * self.x - self.u),
+            "piece": self.x * piecewise_constant(self.x, [0.0, 1.0, 3.0], [1.0, 2.0, -1.0]),
+            "timed": where(self.time < 1.0, self.x, self.u * self.u),
+            "root": self.x + where(beyond, log(where(beyond, self.x - 2.0, 1.0)), 0.0),
+        }
+
+
+class Rooted(Component):
+    """A rate with a branch that has no value below its end, and no output."""
+
+    x = State("1", 2.0)
+
+    def derivatives(self):
+        beyond = self.x > 1.0
+        return {"x": where(beyond, log(where(beyond, self.x - 1.0, 1.0)), -self.x)}

@@ -3,28 +3,12 @@
 import itertools
 import math
 from ctypes import byref, c_double, c_int, c_size_t
-from pathlib import Path
 
 import pytest
 from fmpy.fmi2 import fmi2EventInfo
 
 OK, DISCARD, ERROR = 0, 2, 3
-HERE = Path(__file__).parent
 NULL = None
-
-
-@pytest.fixture
-def exchanged(load):
-    """Instances for model exchange; those for co-simulation of the same FMU are made by ``kind=1``."""
-
-    def make(reference, kind=0):
-        place = next(
-            (f for f in ("exchange_samples", "samples") if f"class {reference}(" in (HERE / f"{f}.py").read_text()),
-            None,
-        )
-        return load(f"{HERE / place}.py:{reference}" if place else reference, profile="model-exchange", kind=kind)
-
-    return make
 
 
 @pytest.fixture
