@@ -2,6 +2,7 @@
 
 import os
 import sys
+from collections import defaultdict
 from pathlib import Path
 
 import pytest
@@ -12,6 +13,8 @@ from hypothesis import settings
 settings.register_profile("repeatable", derandomize=True, database=None, deadline=None)
 settings.load_profile("repeatable")
 
+_LATER = {"long", "campaign"}
+"""Tests of other tiers than the quick one."""
 _TESTS = Path(__file__).parent
 _HEAD = """from railcosim.components import Component, Data, Input, Memory, Noise, Output, Parameter, Size, State, maths
 
@@ -21,6 +24,22 @@ class Base(Component):
 
 
 """
+
+
+@pytest.hookimpl(tryfirst=True)
+def pytest_collection_modifyitems(items):
+    """Of a test with very many cases a sample is in the quick tier, its first and last among them, the rest in the long
+    one. Where only some of the cases are asked for, it is a sample of these."""
+    families = defaultdict(list)
+    for item in items:
+        if item.get_closest_marker("sample") and not (_LATER & {mark.name for mark in item.iter_markers()}):
+            families[item.path, item.originalname].append(item)
+    for family in families.values():
+        (size,) = family[0].get_closest_marker("sample").args
+        quick = {round(k * (len(family) - 1) / max(1, size - 1)) for k in range(min(size, len(family)))}
+        for number, item in enumerate(family):
+            if number not in quick:
+                item.add_marker(pytest.mark.long)
 
 
 @pytest.fixture(scope="session")

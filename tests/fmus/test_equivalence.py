@@ -293,6 +293,7 @@ def checked(examples, **rest):
     )
 
 
+@pytest.mark.sample(10)
 @pytest.mark.parametrize(("path", "arguments"), [case for case in CASES if ":" in case.values[0] or case.id in FEW])
 def test_plain_python_and_both_kinds_of_fmu_agree_to_the_last_bit(path, arguments):
     @checked(5, derandomize=True)

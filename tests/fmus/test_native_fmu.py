@@ -266,6 +266,7 @@ def test_every_component_compiles_without_a_warning(tmp_path, reference):
     strictly_compiled(reference, tmp_path, "gcc", "-fsyntax-only")
 
 
+@pytest.mark.sample(2)
 @pytest.mark.parametrize("profile", ["standard", "model-exchange"])
 @pytest.mark.parametrize("compiler", COMPILERS)
 def test_the_optimizer_of_either_compiler_finds_nothing_to_warn_of(tmp_path, compiler, profile):
@@ -333,6 +334,7 @@ def _prefixing(folder):
     return place
 
 
+@pytest.mark.sample(2)
 @pytest.mark.skipif(shutil.which("g++") is None, reason="needs g++")
 @pytest.mark.parametrize(
     ("name", "fmi", "profile"),

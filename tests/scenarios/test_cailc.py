@@ -55,6 +55,7 @@ def metric(result, name, index=None):
     return next(m for m in result.metrics if m.name == name).values[index]
 
 
+@pytest.mark.sample(1)
 @pytest.mark.parametrize(("scenario", "preset"), CASES)
 def test_known_values_and_requirements(scenario, preset):
     result = run(load(scenario, preset=preset), figures=False)
@@ -77,6 +78,7 @@ def test_comparison(comparison):
     assert judged(comparison) == set()
 
 
+@pytest.mark.long
 def test_orderings(comparison):
     """Section 8: what a correct build must show, whatever the last digits are."""
     speed = {
@@ -108,6 +110,7 @@ def test_the_protection_brakes_pd_ilc_and_never_cailc():
     assert np.abs(speed[standing]).max() < 0.01
 
 
+@pytest.mark.sample(1)
 @pytest.mark.parametrize("controller", ["Ailc", "PdIlc", "AdaptiveAto", "PidAto"])
 def test_another_controller_takes_the_place_by_one_line(controller):
     """Every connection of the scenario stays; the trip is driven to its end."""

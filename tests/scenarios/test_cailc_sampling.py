@@ -218,6 +218,7 @@ def test_the_train_is_held_until_the_drive_is_stronger_than_what_resists():
     assert force[position == 0.0].max() > 5e3
 
 
+@pytest.mark.long
 @fast
 def test_spring_damper_couplers_and_where_the_speed_is_measured():
     """Section 6: fed back from the leading trailer the corrected gains are unstable, from all cars they are not."""

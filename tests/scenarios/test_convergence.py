@@ -34,6 +34,7 @@ def test_first_order_and_jacobi_three_times_gauss_seidel(deviation, law):
             assert 2.8 < jacobi / gauss_seidel < 3.2
 
 
+@pytest.mark.long
 def test_it_is_the_reference_that_it_converges_to(reference):
     """Twice the fine run less the coarse one (Richardson) leaves an error of second order, far below either's."""
     ends = {}

@@ -39,6 +39,7 @@ def metric(result, name):
     return max(next(m for m in result.metrics if m.name == name).values.values())
 
 
+@pytest.mark.long
 @fast
 def test_nominal(nominal):
     all_well(nominal)
@@ -78,6 +79,7 @@ def test_the_fault_estimate_converges(nominal):
             assert np.abs(error[judged] / size).max() < 5e-4
 
 
+@pytest.mark.long
 @fast
 def test_the_ablation_violates_r3():
     """Plain backstepping for the heads: speed differences of -40 to 50 m/s, R3 and the barrier fail, R1 and R2 hold."""
@@ -136,6 +138,7 @@ def test_eight_trains_of_eight_carriages():
 # A step of Python FMUs costs 4 ms, so that 1000 s at 0.01 s would take 400 s. The closed loop runs its whole length,
 # with every fault, at 0.1 s instead, in a campaign; and at 0.01 s the same faults come and go, overlap and heal twenty
 # times as fast.
+@pytest.mark.long
 @pytest.mark.parametrize(
     ("step", "seconds", "haste"),
     [
@@ -169,6 +172,7 @@ def hastened(system, factor):
     return system
 
 
+@pytest.mark.long
 def test_an_observer_beside_the_controller_sees_the_same():
     """`StateFaultObserver`, given the command one point older, repeats the controller's own estimates bit for bit."""
     system = load(

@@ -15,6 +15,7 @@ def hit(*settings, stop=60.0, builds=()):
     return result, failed
 
 
+@pytest.mark.long
 def test_a_fault_larger_than_the_actuator():
     """Train 1 is pushed back by 150 kN on every carriage for 30 s, and no actuator gives more than 60 kN.
 
@@ -34,6 +35,7 @@ def test_a_fault_larger_than_the_actuator():
     assert not any(result[f"cruise[{i}].barrier_violated"][-1] for i in (1, 2, 3))
 
 
+@pytest.mark.sample(1)
 @pytest.mark.parametrize(
     ("start", "bound"),
     [([4124.9, 4100.1, 4074.9], 5810.0), ([7434.9, 7410.1, 7384.9], 2500.0), ([6114.9, 6090.1, 6064.9], 3820.0)],

@@ -99,6 +99,7 @@ def test_the_bottom_layer_has_the_known_speeds_of_decay(reference):
     assert sorted(found) == pytest.approx(sorted([*expected, 0.0, 0.0, 0.0, 0.0]), abs=1e-12)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("comfort", [pytest.param(False, marks=pytest.mark.long), True], ids=["bottom", "tanh"])
 def test_the_model_of_a_step_is_the_jacobian_of_the_sampled_map(reference, comfort):
     """Against runs of one step of the plain components from starts that differ."""

@@ -113,6 +113,7 @@ def test_gaps_follow_the_target_speed_for_the_tunable_law_and_not_for_its_rivals
         assert np.abs(tunable.gaps[k] - tunable.desired[k]).max() <= 0.05 + 1e-6
 
 
+@pytest.mark.sample(1)
 @pytest.mark.parametrize(
     ("rate", "excess", "settled"), [(0.5, 5.0, 1282.0), (1.0, 6.0, 684.0), (2.0, 11.1, 406.0), (1e9, 48.8, 272.0)]
 )
@@ -215,6 +216,7 @@ def test_with_a_hard_limit_it_does_rise(platoon):
     assert np.diff(platoon.lyapunov(law, platoon.march(law, stop=300.0))).max() > 1.0
 
 
+@pytest.mark.sample(2)
 @pytest.mark.parametrize(
     ("name", "limit", "expected"),
     [

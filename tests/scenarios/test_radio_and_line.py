@@ -103,6 +103,7 @@ def test_braking_wave(preset, dies_out):
         assert metrics(result)["string_ratio"][None] > 1.0
 
 
+@pytest.mark.sample(2)
 @pytest.mark.parametrize(
     ("preset", "bounded"),
     [

@@ -65,6 +65,7 @@ def test_five_telling_runs(script):
         assert min(found[variant]) > 0.0
 
 
+@pytest.mark.long
 def test_the_radio_is_what_was_drawn(script):
     drawn = script.draw(SEED, TELLING[0])
     system = script.system_of(drawn)

@@ -57,8 +57,8 @@ def exact(platoon):
     [
         ("tunable_potential", None),
         ("tunable_potential", "tunable-comfort"),
-        ("cruise_comparison", None),
-        ("gap_range", None),
+        pytest.param("cruise_comparison", None, marks=pytest.mark.long),
+        pytest.param("gap_range", None, marks=pytest.mark.long),
     ],
 )
 def test_no_known_value_is_missed(scenario, preset):

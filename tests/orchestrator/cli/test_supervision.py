@@ -38,6 +38,7 @@ def end_of(process):
     return process.returncode, err
 
 
+@pytest.mark.sample(4)
 @pytest.mark.parametrize(
     ("work", "code", "said"),
     [

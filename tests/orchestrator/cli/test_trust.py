@@ -89,6 +89,7 @@ def ways(command: str, scenario: Path, out: Path) -> list[list[str]]:
     return [[command, *NEEDED.get(command, []), *way] for way in (*arguments, [str(out)], *options)]
 
 
+@pytest.mark.sample(14)
 @pytest.mark.parametrize("command", COMMANDS)
 def test_no_command_that_looks_executes_what_is_elsewhere(strange, interrupted, capsys, command):
     for arguments in ways(command, strange.scenario(), interrupted):

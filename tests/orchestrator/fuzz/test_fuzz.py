@@ -363,6 +363,7 @@ MONSTERS = {
 }
 
 
+@pytest.mark.sample(4)
 @pytest.mark.usefixtures("in_time")
 @pytest.mark.parametrize("name", MONSTERS)
 def test_a_monster_takes_neither_time_nor_memory(try_text, name):

@@ -239,6 +239,7 @@ BOMBS = {
 }
 
 
+@pytest.mark.sample(6)
 @pytest.mark.unmeasured
 @pytest.mark.usefixtures("in_time")
 @pytest.mark.parametrize("name", BOMBS)

@@ -58,6 +58,7 @@ def contents(result):
 # -------------------------------------------------------------------- the same numbers
 
 
+@pytest.mark.sample(2)
 @pytest.mark.parametrize(
     ("algorithm", "extrapolation"),
     [
@@ -133,6 +134,7 @@ def test_components_in_this_process_stay_there_with_a_note():
 # -------------------------------------------------------------------- a run that ends early
 
 
+@pytest.mark.sample(3)
 @pytest.mark.parametrize("algorithm", ["gauss-seidel", pytest.param("jacobi", marks=pytest.mark.long)])
 @pytest.mark.parametrize(
     ("deed", "end"),

@@ -55,6 +55,7 @@ def live(it, *deeds):
 # -------------------------------------------------------------------- what it may do
 
 
+@pytest.mark.sample(3)
 @pytest.mark.parametrize(
     ("how", "content"),
     [
@@ -100,6 +101,7 @@ def test_the_last_of_what_it_printed_is_told_however_much_that_was(apart, log):
 NO_LINE = "its process lost its line to the master in fmi2DoStep or before: the FMU closes descriptors that are not its"
 
 
+@pytest.mark.sample(5)
 @pytest.mark.parametrize(
     ("deed", "told"),
     [

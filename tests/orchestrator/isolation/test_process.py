@@ -32,6 +32,7 @@ pytestmark = [
 CALLED = ("step", "get", "set", "enter", "exit", "terminate")
 
 
+@pytest.mark.sample(5)
 @pytest.mark.parametrize(
     ("where", "status"),
     [
@@ -81,6 +82,7 @@ CALLS = {
 }
 
 
+@pytest.mark.sample(7)
 @pytest.mark.parametrize(
     ("where", "what"),
     [*((where, "null") for where in CALLS), *(("step", what) for what in ENDS), ("terminate", "hang")],
@@ -99,6 +101,7 @@ def test_a_process_that_is_lost(apart, where, what, live):
     it.forget(None)
 
 
+@pytest.mark.sample(4)
 @pytest.mark.parametrize("what", ["abort", "exit", "hang"])
 @pytest.mark.parametrize("where", ["instantiate", "setup"])
 def test_a_process_that_is_lost_before_it_can_be_told_anything(apart, hostile, where, what):
@@ -124,6 +127,7 @@ def test_a_library_that_does_not_load(apart, workspace, hostile):
         apart(path=path, begun=True)
 
 
+@pytest.mark.sample(3)
 @pytest.mark.parametrize("what", ENDS)
 def test_a_process_that_is_lost_when_it_is_freed(apart, caplog, what):
     it = apart(f"free {what}", step_timeout=1.0, begun=True)

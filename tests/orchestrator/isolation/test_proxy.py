@@ -129,6 +129,7 @@ class Pair:
                 self.same(lambda one: [*one.channel("Real", ["x"]).get(), one.time])
 
 
+@pytest.mark.sample(4)
 @pytest.mark.parametrize("seed", range(6))
 def test_whatever_it_is_asked_its_answers_are_those_without_isolation(
     apart, alone, hostile, begin, monkeypatch, *, seed

@@ -184,6 +184,7 @@ ENDS = {
 }
 
 
+@pytest.mark.sample(6)
 @pytest.mark.parametrize("algorithm", ["gauss-seidel", "jacobi"])
 @pytest.mark.parametrize("mute", [True, False])
 @pytest.mark.parametrize("deed", ENDS)

@@ -91,6 +91,7 @@ def test_isolated_neighbours_that_hand_nothing_on_step_at_once(apart, odd, insta
     assert names == [("a",), ("b",), ("c",), ("d",)] if isolated == ["a", "c"] else [("a", "b"), ("c",), ("d",)]
 
 
+@pytest.mark.sample(4)
 @pytest.mark.parametrize("isolated", ["all", "together"])
 @pytest.mark.parametrize("modes", [(41, 41), (3, 0), (0, 23), (3, 33), (10, 3)])
 def test_of_isolated_neighbours_the_first_that_fails_is_named(apart, odd_fmu, tmp_path, *, modes, isolated):
@@ -158,6 +159,7 @@ def test_without_room_for_its_values_it_is_called_by_messages(used, odd, ring, m
 # -------------------------------------------------------------------- failures
 
 
+@pytest.mark.sample(3)
 @pytest.mark.parametrize(
     ("mode", "algorithm"),
     [
@@ -178,6 +180,7 @@ def test_whatever_it_does_is_told_as_without_isolation(apart, odd_fmu, ring, tmp
     assert len(apart(system, "odd[1]").time) == (41 if mode in (1, 40, 41, 44) else 20 if mode in (10, 23, 63) else 21)
 
 
+@pytest.mark.sample(4)
 @ALGORITHMS
 @pytest.mark.parametrize("modes", [(41, 41), (40, 3), (41, 23), (10, 41)])
 def test_in_a_process_that_they_share_each_fails_for_itself(apart, odd_fmu, ring, tmp_path, *, modes, algorithm):
@@ -209,6 +212,7 @@ ENDS = {
 }
 
 
+@pytest.mark.sample(5)
 @pytest.mark.parametrize(
     ("where", "what"),
     [("step", what) for what in ENDS] + [("get", "null"), ("set", "null"), ("get", "hang"), ("set", "hang")],

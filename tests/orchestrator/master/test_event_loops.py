@@ -151,6 +151,7 @@ def some_event(draw, system, names, fed):
     return event
 
 
+@pytest.mark.sample(12)
 @pytest.mark.unmeasured
 @pytest.mark.parametrize("seed", range(40))
 def test_the_same_bits(both, odd, seed):
@@ -217,6 +218,7 @@ def test_events_are_seen_by_a_run_that_is_stopped_at_them(odd):
 # -------------------------------------------------------------------- ways to couple
 
 
+@pytest.mark.sample(8)
 @pytest.mark.parametrize(
     "seed",
     [

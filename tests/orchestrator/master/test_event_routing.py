@@ -65,6 +65,7 @@ CASES = {
 }
 
 
+@pytest.mark.sample(14)
 @ALGORITHMS
 @pytest.mark.parametrize("name", CASES)
 def test_an_input_follows_another_output(go, switched, algorithm, name):

@@ -66,6 +66,7 @@ ACTIONS = {
 }
 
 
+@pytest.mark.sample(8)
 @ALGORITHMS
 @pytest.mark.parametrize("name", ACTIONS)
 def test_on_an_output_everyone_sees_it_and_so_does_the_record(go, chain, algorithm, name):
@@ -79,6 +80,7 @@ def test_on_an_output_everyone_sees_it_and_so_does_the_record(go, chain, algorit
     assert seen == [-1, *(y[1:] if algorithm == "gauss-seidel" else y[:-1])]
 
 
+@pytest.mark.sample(8)
 @ALGORITHMS
 @pytest.mark.parametrize("name", ACTIONS)
 def test_on_an_input_that_receiver_alone_sees_it(go, chain, mine, algorithm, name):

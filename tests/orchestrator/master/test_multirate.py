@@ -162,6 +162,7 @@ SLOW = {
 }  # fmt: skip
 
 
+@pytest.mark.sample(5)
 @ALGORITHMS
 @pytest.mark.parametrize("name", SLOW)
 def test_a_slow_output_is_changed_at_once_and_its_own_value_comes_back(go, system, algorithm, name):

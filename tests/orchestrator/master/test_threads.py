@@ -141,6 +141,7 @@ def test_discarded_steps_are_taken_in_parts(agree):
         assert (status, len(time[1])) == ("completed", 31 * 8)
 
 
+@pytest.mark.sample(4)
 @pytest.mark.parametrize(
     ("deeds", "culprit", "what"),
     [

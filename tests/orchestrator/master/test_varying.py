@@ -45,6 +45,7 @@ GOES_ON = 40, 43, 44, 83, 91
 MODES = 2, 3, 4, 5, 9, 10, 23, 30 + 3, 40, 42, 43, 44, 63, 73, 83, 84, 91, 102, 103, 104, 113, 114, 123, 124
 
 
+@pytest.mark.sample(16)
 @pytest.mark.parametrize("mode", MODES)
 def test_an_fmu_that_does_as_it_is_told(both, able, mode):
     """From 5 s on it fails in one way or another: it may be tried again in a shorter step, or not."""

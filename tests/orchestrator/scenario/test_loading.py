@@ -175,6 +175,7 @@ def test_what_is_said_when_there_is_no_such_scenario(monkeypatch, tmp_path):
     assert preset_names(tmp_path / "mine.toml") == ("nominal", "gentle", "mixed")
 
 
+@pytest.mark.sample(8)
 @pytest.mark.unmeasured
 @pytest.mark.parametrize("name", [name for name, _ in shipped()])
 def test_shipped_scenarios_open_with_source_and_expectation_and_load_under_every_preset(name):

@@ -9,6 +9,7 @@ from railcosim.orchestrator.study import Runner
 from .test_batch import agree
 
 
+@pytest.mark.sample(2)
 @pytest.mark.parametrize(
     ("changes", "loaded"),
     [

@@ -55,6 +55,7 @@ def test_a_good_fmu_of_another_maker_passes(lag):
     assert "rules of railcosim" not in verdicts(report)
 
 
+@pytest.mark.sample(5)
 @needs_compiler
 @pytest.mark.parametrize(
     ("code", "probe", "part"),

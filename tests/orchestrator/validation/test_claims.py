@@ -11,6 +11,7 @@ FEED_THROUGH = "if (vr[i] == 0) { v[i] = Y + M->u; continue; }"
 STRICT = "if (M->phase == 2 && vr[i] == 0 && M->u != 0) abort();"
 
 
+@pytest.mark.sample(4)
 @pytest.mark.parametrize(
     ("depends", "code", "verdict", "part"),
     [
@@ -62,6 +63,7 @@ def test_derivatives_are_tried_where_they_are_offered(found, claims, verdict, pa
     assert part in told[1]
 
 
+@pytest.mark.sample(2)
 @pytest.mark.parametrize(
     ("code", "verdict", "part"),
     [
@@ -78,6 +80,7 @@ def test_a_restored_run_is_compared_with_a_restored_run(found, code, verdict, pa
     assert part in told[1]
 
 
+@pytest.mark.sample(3)
 @pytest.mark.parametrize(
     ("start", "value", "verdict"),
     [

@@ -59,6 +59,7 @@ def check_numbers(outcome):
     assert not are_floats_changed()
 
 
+@pytest.mark.sample(8)
 @pytest.mark.usefixtures("loop")
 @pytest.mark.parametrize("algorithm", ["jacobi", "gauss-seidel"])
 @pytest.mark.parametrize(
@@ -95,6 +96,7 @@ def test_threads_and_processes_of_their_own_do_not_change_it(pair, place):
     assert outcome.notes == []
 
 
+@pytest.mark.sample(16)
 @pytest.mark.usefixtures("loop", "own_place")
 @pytest.mark.parametrize("place", ["on_instantiate", "on_step", "on_free"])
 @pytest.mark.parametrize(
