@@ -232,7 +232,6 @@ def test_the_command_prints_files_and_tells_progress_apart(tmp_path):
     assert orchestrate("build", "Gust", "--kind", "python", "-q", "-o", "out", folder=tmp_path).stderr == ""
 
 
-@pytest.mark.sample(3)
 @pytest.mark.parametrize(
     ("arguments", "message"),
     [

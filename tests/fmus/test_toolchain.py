@@ -434,16 +434,11 @@ def test_a_native_build_is_reproducible(fresh_cache, sample, monkeypatch, tmp_pa
 
 @needs_native
 @pytest.mark.parametrize("kind", ["native", "python"])
-def test_a_cache_hit_makes_nothing_and_costs_milliseconds(fresh_cache, monkeypatch, kind):
+def test_a_cache_hit_makes_nothing(fresh_cache, monkeypatch, kind):
     path = build("ComfortCruise", kind=kind)
     for module, made in ((native_fmu, "contents"), (build_module.python_fmu, "contents"), (build_module, "write")):
         monkeypatch.setattr(module, made, lambda *_: pytest.fail("a cache hit made something"))
-    times = []
-    for _ in range(20):
-        begin = time.perf_counter()
-        assert build("ComfortCruise", kind=kind) == path
-        times.append(time.perf_counter() - begin)
-    assert min(times) < 0.005
+    assert build("ComfortCruise", kind=kind) == path
 
 
 @needs_native

@@ -113,6 +113,13 @@ def test_an_fmu_that_fails_with_a_later_guess(both, able):
     assert re.search(r"with the next guess an FMU fails \([ab], t = 0.25 s: output 'x' is inf\)", str(result.error))
 
 
+def test_an_fmu_that_fails_of_what_it_begins_with_is_to_blame(both, able):
+    system = system_of(able, [("a.x", "b.u", 0.5), ("b.x", "a.u", 0.5)], 6.0, algorithm="iterative")
+    system.instances["b"].start["mode"] = 3
+    error = both(system).error
+    assert (error.instance, error.time, error.status) == ("b", 5.0, "error")
+
+
 def test_sampled_ones_step_first(both, mine):
     """They act on what the step begins with."""
     system = System(stop_time=2.0, step=0.25, algorithm="iterative")
