@@ -12,10 +12,10 @@ from pathlib import Path
 from .. import world
 from ..errors import FmuError
 from ..fmi.guard import stand_aside
-from . import claims, probes, probes_fmi2
+from . import claims, misuse, probes
 from .probes import DoubtfulError, NotedError, Task
 
-PROBES = {**probes.PROBES, **claims.PROBES, **probes_fmi2.PROBES}
+PROBES = {**probes.PROBES, **claims.PROBES, **misuse.PROBES}
 _KEPT = 5
 """Lines of what an FMU said that stand under what it did."""
 

@@ -236,6 +236,17 @@ def _printing_error(value: float) -> float:
     return max(last_bits, 0.5 * 10.0**shown.exponent)
 
 
+def reset(task: Task) -> str:
+    """Reset and run again: the same numbers."""
+    with instances(task) as (it,):
+        first = it.initialize().run()
+        it.trying("reset")
+        it.slave.reset()
+        call = call_name(task.interface, "reset", "Real", ())
+        off = compare(first, it.initialize().run(), f"after {call}")
+    return f"a run after {call} repeats the first, {'but for rounding' if off else 'bit for bit'}"
+
+
 def second_instance(task: Task) -> str:
     """Two instances, stepped in turn, do not disturb one another."""
     if task.interface.single_instance:
@@ -312,6 +323,7 @@ PROBES: dict[str, Probe] = {
     "simulate": simulate,
     "surroundings": surroundings,
     "starts": starts,
+    "reset": reset,
     "instances": second_instance,
     "state": state,
 }

@@ -15,7 +15,6 @@ from ..errors import FmuFileError
 from ..fmi import Interface
 from ..fmi.binding import library, names_of_platform
 from ..isolation import end_process, signal_name, starting
-from . import probes_fmi2
 from .findings import Finding, Verdict, listed
 from .probes import Task
 
@@ -39,7 +38,7 @@ _DEFAULT_STEP = 0.1
 _SAID = "output.txt"
 _RESUMED = ("dependencies", "order")
 """Probes that do what importers must not: what takes their process down is left out by the next one."""
-_MOST_LIVES = 10
+_MOST_LIVES = 20
 _MOMENT = 0.25
 """How often a probe that takes long is asked whether it is still wanted, in s."""
 _HANGS = "not finished after"
@@ -87,8 +86,6 @@ def try_out(
 def _probe(
     probe: str, interface: Interface, folder: Path, timeout: float, stopped: threading.Event
 ) -> tuple[Verdict, str]:
-    if probe in probes_fmi2.PROBES and interface.version != "2.0":
-        return "skipped", "tried with FMI 2.0 only"
     place = Path(world.mkdtemp(prefix=f"{probe}_", dir=folder.parent))
     step = interface.default_step or interface.recommended_step or _DEFAULT_STEP
     task = Task(probe, interface, folder, step, answer=place / "answer.jsonl")

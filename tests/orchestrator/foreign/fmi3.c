@@ -6,7 +6,7 @@
    initialization fails. Value references are ten times the place of a type below plus 0 for its input and 1 for its output;
    Float64: 0 time, 1 u, 2 x, 3 y = x + gain * u, 4 gain, 5 der(x); Int32: 62 mode; Int64: 82 gear, 83 shown.
    With -DEVENTS=1 it insists on its event mode: a step ends early at each third of a second, where an event waits whose
-   discrete states are updated twice. */
+   discrete states are updated twice. With -DANY_ORDER it enters and leaves that mode whenever it is told to. */
 
 #include <fenv.h>
 #include <math.h>
@@ -114,12 +114,18 @@ int fmi3ExitInitializationMode(void *c)
     return 0;
 }
 
-#if EVENTS
+#ifdef ANY_ORDER
+#define REFUSED 0
+#else
+#define REFUSED 3
+#endif
+
+#if EVENTS || defined ANY_ORDER
 int fmi3EnterEventMode(void *c)
 {
     Third *s = c;
     s->in_events = true;
-    return tell(s, s->waits ? 0 : 3, "no event waits");
+    return tell(s, s->waits ? 0 : REFUSED, "no event waits");
 }
 
 int fmi3UpdateDiscreteStates(void *c, bool *needed, bool *ends, bool *nominals, bool *states, bool *timed, double *next)
@@ -127,13 +133,13 @@ int fmi3UpdateDiscreteStates(void *c, bool *needed, bool *ends, bool *nominals, 
     Third *s = c;
     *needed = ++s->updates % 2;
     *ends = *nominals = *states = *timed = false;
-    return tell(s, s->in_events ? 0 : 3, "no event mode");
+    return tell(s, s->in_events ? 0 : REFUSED, "no event mode");
 }
 
 int fmi3EnterStepMode(void *c)
 {
     Third *s = c;
-    int status = tell(s, s->in_events && s->updates % 2 == 0 ? 0 : 3, "no settled event mode");
+    int status = tell(s, s->in_events && s->updates % 2 == 0 ? 0 : REFUSED, "no settled event mode");
     s->in_events = s->waits = false;
     return status;
 }

@@ -33,8 +33,9 @@ def detail(report, check):
 
 
 @needs_native
-def test_our_native_fmus_pass_everything():
-    report = validate(build("PointMassTrain", kind="native"))
+@pytest.mark.parametrize("fmi", ["2", pytest.param("3", marks=pytest.mark.long)])
+def test_our_native_fmus_pass_everything(fmi):
+    report = validate(build("PointMassTrain", kind="native", fmi=fmi))
     assert set(verdicts(report).values()) <= {"pass", "skipped", "note"}
     assert set(PROBES.values()) < set(verdicts(report))
     assert report.passed
