@@ -44,12 +44,15 @@ KERNEL = [
             "plan.c",
             "resolving.c",
         ),
-        *("stepping.c", "team.c"),
+        *("stepping.c", "team.c", "texts.c"),
     )
 ]
 RUNTIME = sorted((ROOT / "fmus" / "runtime").rglob("*.c"))
 LOOP_TESTS = [
-    *(f"tests/orchestrator/master/test_compiled{name}.py" for name in ("", "_blocks", "_coupling", "_fmi1", "_fmi3")),
+    *(
+        f"tests/orchestrator/master/test_compiled{name}.py"
+        for name in ("", "_blocks", "_coupling", "_fmi1", "_fmi3", "_texts")
+    ),
     *("tests/orchestrator/master/test_kernel.py", "tests/orchestrator/master/test_threads.py"),
     "tests/orchestrator/master/test_varying.py",
     *("tests/orchestrator/master/test_event_loops.py", "tests/orchestrator/fmi/test_foreign.py"),

@@ -1,7 +1,7 @@
 """The bridge to the compiled step loop: blocks of steps by an algorithm's plan, and what happens when an FMU fails.
 
-The kernel is an optional extension: without it, or for what it does not do (components as Python objects, text
-signals), steps are taken in Python with identical results.
+The kernel is an optional extension: without it, or for what it does not do (components as Python objects), steps are
+taken in Python with identical results.
 """
 
 from __future__ import annotations
@@ -59,11 +59,14 @@ if HAS_KERNEL:
 
 
 def changes_of(plan: Plan) -> NDArray[np.void]:
-    """What events make of values now."""
-    rows = [
-        (slot.active, place, is_real, slot.scale, slot.offset, slot.slope, slot.since)
-        for slot, place, is_real in plan.changes
-    ]
+    """What events make of values now: another number, or of a text another one."""
+    rows = []
+    for slot, place, kind in plan.changes:
+        what = slot.scale, slot.offset, slot.slope, slot.since
+        if kind == "String":
+            assert plan.wide.texts is not None
+            what = 0.0, plan.wide.texts.number(slot.text), 0.0, 0.0
+        rows.append((slot.active, place, kind == "Real", *what))
     return np.array(rows, dtype=CHANGES)
 
 
@@ -81,6 +84,7 @@ class CompiledLoop:
         self._coupling, self._algorithm = coupling, algorithm
         self._exchange = coupling.exchange
         is_shared = kernel.HAS_THREADS and algorithm.takes_threads and coupling.refresher is None
+        is_shared = is_shared and "String" not in self._exchange.kinds  # they are numbered one by one
         threads = max(1, min(coupling.settings.threads, len(coupling.slaves))) if is_shared else 1
         self.plan = Plan(coupling, [algorithm.program()], threads=threads)
         self._under_way: tuple[Table, Observer, float, float] | None = None
@@ -104,19 +108,19 @@ class CompiledLoop:
             points: numbers of the communication points to begin at, to stop at, and of the run's last.
             every: a row is due after every so many steps, and after the last.
             observe: given the rows.
-            table: where they are kept; without one they may go when they were observed.
+            table: where they are kept, if there is no text among them; without one they may go when they were observed.
 
         Raises:
             FmuError: a model failed, or a value is not finite.
         """
-        coupling, exchange = self._coupling, self._exchange
+        coupling, exchange, wide = self._coupling, self._exchange, self.plan.wide
         done, stop, count = points
         self._note = own_note()
         self.plan.follow()
         places = np.zeros(self.plan.threads, PLACE)
         places["failed"] = -1
         disturbed = np.zeros(len(self.plan.operations), np.int64)
-        values = self.plan.wide.packed(exchange.values)
+        values = wide.packed(exchange.values)
         history, newest = self._unrolled(len(values))
         changes = changes_of(self.plan)
         self.plan.courses.load()
@@ -146,6 +150,7 @@ class CompiledLoop:
                     places,
                     disturbed,
                     _FIXED,
+                    wide.texts and wide.texts.table,
                 ),
                 *(every, start_time, step, done, block, count),
             )
@@ -156,15 +161,19 @@ class CompiledLoop:
             coupling.steps, coupling.time = done, start_time + done * step
             for slave in coupling.slaves.values():  # at events they are called in Python
                 slave.time = coupling.time
-            exchange.values[:] = self.plan.wide.unpacked(values)
+            exchange.values[:] = wide.unpacked(values)
             self.plan.courses.store()
             self._algorithm.note_steps(taken)
             if taken:
                 self._roll(history, newest)
-                goes_on = observe(done, into.filled(written))
+                goes_on = observe(done, wide.told(into.filled(written)))
             if goes_on:
                 self._go_on(places, start_time + done * step, step)
             block = longer(taken, seconds)
+            if wide.texts is not None and wide.texts.are_many and not places["begin"].any():
+                wide.texts.begin_anew()
+                values, changes = wide.packed(exchange.values), changes_of(self.plan)
+                history, newest = self._unrolled(len(values))
         self.plan.forget_arrays()
         return goes_on
 
@@ -175,8 +184,8 @@ class CompiledLoop:
         table, observe, start_time, step = self._under_way
         written = int(NOTES.note(self._note)[3])
         if written:
-            rows = table.filled(written)
-            time, *values = rows[-1].tolist()
+            rows = self.plan.wide.told(table.filled(written))
+            time, *values = np.asarray(rows[-1], dtype=object).tolist()
             self._coupling.steps, self._coupling.time = round((time - start_time) / step), time
             for place, value in zip(table.kept.tolist(), values, strict=True):
                 self._exchange.values[place] = value

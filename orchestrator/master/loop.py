@@ -211,6 +211,7 @@ class Master:
         table: Table | None,
     ) -> bool:
         first, end, count = points
+        table = None if "String" in self.kinds else table
         if isinstance(self.algorithm, VariableStep):
             return self._run_variably(start_time, step, (end, count), every, observe)
         self.coupling.steps = first
@@ -220,7 +221,7 @@ class Master:
                 stop = int(min(end, self._schedule.next_point(start_time, step, self.steps)))
             refresher, into = self.coupling.refresher, None if self._compiled is None else table
             if refresher is not None and not refresher.is_decided:  # who refuses shows in the first step
-                stop, into = self.steps + 1, None if "String" in self.kinds else table
+                stop, into = self.steps + 1, table
             take = self._run_in_python if self._compiled is None else partial(self._compiled.run, table=table)
             observed = self._eventful(step, stop, observe, None if into is None else into.kept.tolist())
             if into is not None and self._compiled is None:

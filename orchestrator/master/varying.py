@@ -24,7 +24,7 @@ from . import compiled
 from .algorithms import VariableStep
 from .algorithms.adaptive import Adaptive
 from .coupling import Coupling
-from .observer import Observer
+from .observer import Observer, Rows
 from .plans import CONTROL, PLACE, Kind, Plan, is_able
 
 _FATAL, _PENDING = 4, 5
@@ -130,9 +130,10 @@ class VaryingLoop:
         coupling = self._coupling
         for part in [rows] if not span.every else rows[:, None]:
             is_due = not span.every or part[0, 0] == span.next_row(coupling.time)
+            told = part if self._blocks is None else self._blocks.told(part)
             coupling.steps += len(part)
-            coupling.time, *coupling.exchange.values[:] = part[-1].tolist()
-            if not observe(coupling.steps, part if is_due else ()):
+            coupling.time, *coupling.exchange.values[:] = np.asarray(told[-1], dtype=object).tolist()
+            if not observe(coupling.steps, told if is_due else ()):
                 return False
         return True
 
@@ -193,6 +194,9 @@ class Blocks:
         if self._changed_links != self._exchange.changed_links:
             self._make()
         coupling, plan, control = self._coupling, self._plan, self._control[0]
+        texts = plan.wide.texts
+        if texts is not None and texts.are_many:
+            texts.begin_anew()
         values = plan.wide.packed(self._exchange.values)
         for name, value in (("time", coupling.time), ("end", end), ("due", due), ("late", span.late), ("jump", -1)):
             control[name] = value
@@ -207,7 +211,7 @@ class Blocks:
         begin = world.perf_counter()
         taken, *_ = compiled.run_kernel(
             *(*plan.arrays, compiled.changes_of(plan), np.arange(count), values, np.empty(0), 0, rows, 0, places),
-            *(disturbed, self._control, 1, 0.0, 0.0, 0, 0, 0),
+            *(disturbed, self._control, texts and texts.table, 1, 0.0, 0.0, 0, 0, 0),
         )
         self._block = compiled.longer(max(taken, 1), world.perf_counter() - begin)
         self._under_way = None
@@ -253,6 +257,10 @@ class Blocks:
         if status == _PENDING and kind == Kind.STEP:
             with suppress(FmuError):  # it is cancelled: no state may be restored before
                 slave.check(call, status)
+
+    def told(self, rows: NDArray[np.float64]) -> Rows:
+        """Rows as an observer takes them."""
+        return self._plan.wide.told(rows)
 
     def written(self) -> tuple[Span, NDArray[np.float64], Observer] | None:
         """The rows that the block under way has written, of which run, and for whom; None where there are none."""

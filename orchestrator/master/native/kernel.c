@@ -2,7 +2,8 @@
 
    A plan is a list of operations on channels and instances, exactly those of the loop in master.py, in the same order. A
    channel is some variables of one type of one instance: where their value references stand, and where their values come
-   from or go to. All values are real numbers here; integers and truth values are exact in them. Python builds the plan,
+   from or go to. All values are real numbers here; integers and truth values are exact in them, and texts have numbers
+   (texts.c). Python builds the plan,
    and takes over between blocks for progress, flushing and interruption.
 
    This file is what Python sees of it; plan.c makes a plan of Python's arrays, stepping.c takes the steps, team.c with
@@ -75,39 +76,43 @@ static int take(Plan *plan, const Block *block, Control *control, Outcome *outco
 
 PyDoc_STRVAR(run_doc,
     "run(operations, parts, channels, instances, entries, references, forms, courses, notes, loops, passed, points, states,\n"
-    "    work, stamps, changes, kept, values, history, newest, table, row, places, disturbed, control, every, start, step,\n"
-    "    first, count, last) -> (done, written, newest)\n\n"
+    "    work, stamps, changes, kept, values, history, newest, table, row, places, disturbed, control, texts, every, start,\n"
+    "    step, first, count, last) -> (done, written, newest)\n\n"
     "Take up to `count` communication steps from number `first`. Of every `every`-th step and of step number `last` the\n"
     "time and the values that are `kept`, by place, become the next elements of the columns of `table`, one after the\n"
     "other, from element `row` on; the block ends before one for which there is no room, and where an operation\n"
     "fails. `places` say for each thread with which operation its part of the first step begins, and whether it waits\n"
     "because one has failed; then how far the step that was left has got. In `disturbed` an operation after which\n"
     "numbers were rounded in another way, which was put back, has the number of the first step that ended so. With a\n"
-    "`control` steps vary: that says how long they may be, and each leads to a row.");
+    "`control` steps vary: that says how long they may be, and each leads to a row. Values that are texts are numbers of\n"
+    "`texts`, or None.");
 
 static PyObject *run(PyObject *module, PyObject *arguments)
 {
     Py_buffer b[N_BUFFERS];
     Block block;
     Py_ssize_t newest, row;
-    PyObject *result = NULL;
+    PyObject *result = NULL, *texts;
     (void)module;
-    if (!PyArg_ParseTuple(arguments, "y*y*y*y*y*y*y*y*y*y*y*w*w*w*w*y*y*w*w*nw*nw*w*w*LddLLL:run", &b[OPERATIONS], &b[PARTS], &b[CHANNELS],
+    if (!PyArg_ParseTuple(arguments, "y*y*y*y*y*y*y*y*y*y*y*w*w*w*w*y*y*w*w*nw*nw*w*w*OLddLLL:run", &b[OPERATIONS], &b[PARTS], &b[CHANNELS],
                           &b[INSTANCES], &b[ENTRIES], &b[REFERENCES], &b[FORMS], &b[COURSES], &b[NOTES], &b[LOOPS], &b[PASSED],
                           &b[POINTS], &b[STATES], &b[WORK], &b[STAMPS], &b[CHANGES], &b[KEPT], &b[VALUES], &b[HISTORY],
-                          &newest, &b[TABLE], &row, &b[PLACES], &b[DISTURBED], &b[CONTROL], &block.every, &block.start, &block.step,
+                          &newest, &b[TABLE], &row, &b[PLACES], &b[DISTURBED], &b[CONTROL], &texts, &block.every, &block.start, &block.step,
                           &block.first, &block.count, &block.last)) {
         return NULL;
     }
     Plan plan = {0};
-    if (make_plan(&plan, b, newest) && make_room(&block, &plan, b, row)) {
+    if (find_texts(texts, &plan.texts) && make_plan(&plan, b, newest) && make_room(&block, &plan, b, row)) {
         if (block.every < 1 || block.first < 0 || block.count < 0 || block.count > INT64_MAX - block.first ||
             newest < 0 || (plan.depth > 0 && plan.newest >= plan.depth)) {
             PyErr_SetString(PyExc_ValueError, "kernel: every, first, count and newest must fit the plan");
         } else {
             Outcome outcome;
             block.places = b[PLACES].buf;
-            if (take(&plan, &block, length(b, CONTROL) > 0 ? b[CONTROL].buf : NULL, &outcome)) {
+            int is_taken = take(&plan, &block, length(b, CONTROL) > 0 ? b[CONTROL].buf : NULL, &outcome);
+            if (is_taken && texts_are_full(plan.texts)) {
+                PyErr_NoMemory();
+            } else if (is_taken) {
                 result = Py_BuildValue("(Lnn)", outcome.done, (Py_ssize_t)outcome.written, (Py_ssize_t)plan.newest);
             }
         }
@@ -159,6 +164,10 @@ static PyObject *watch(PyObject *module, PyObject *arguments)
 static PyMethodDef methods[] = {
     {"run", run, METH_VARARGS, run_doc},
     {"look", look, METH_VARARGS, look_doc},
+    {"texts", make_texts, METH_NOARGS, "texts(): none but the empty one, of the number 0."},
+    {"number", number_of_text, METH_VARARGS, "number(texts, text): that of a text in UTF-8, which may be a new one."},
+    {"text", text_of_number, METH_VARARGS, "text(texts, number): the text of a number."},
+    {"count", count_texts, METH_O, "count(texts): how many there are."},
     {"watch", watch, METH_VARARGS, "watch(address): call FMUs with the guard that stands there."},
     {NULL, NULL, 0, NULL},
 };

@@ -29,8 +29,8 @@ enum {
 
 enum { AS_IT_IS = 0, TRUE_ABOVE = 1, ROUNDED_UP = 2 };
 
-/* What a value is among the others: a number, or the bits of a whole number of 64 bits. */
-enum { NUMBER = 0, SIGNED_BITS = 1, UNSIGNED_BITS = 2 };
+/* What a value is among the others: a number, or the bits of a whole number of 64 bits, or the number of a text. */
+enum { NUMBER = 0, SIGNED_BITS = 1, UNSIGNED_BITS = 2, TEXT = 3 };
 
 typedef union {
     double number;
@@ -38,10 +38,12 @@ typedef union {
     uint64_t natural;
 } Cell;
 
-/* The types of FMI 3.0, and one of FMI 1.0; 0 is that of any other channel of FMI 1.0 or 2.0. */
+/* The types of FMI 3.0, and some of FMI 1.0 and 2.0; 0 is that of any other channel of theirs. */
 enum {
     TYPE_FLOAT64 = 1, TYPE_FLOAT32 = 2, TYPE_INT8 = 3, TYPE_UINT8 = 4, TYPE_INT16 = 5, TYPE_UINT16 = 6, TYPE_INT32 = 7, TYPE_UINT32 = 8, TYPE_INT64 = 9, TYPE_UINT64 = 10,
     TYPE_BOOLEAN = 11, TYPE_BYTE = 12, /* a truth value of FMI 1.0 */
+    TYPE_TEXT = 13, /* of FMI 1.0 or 2.0 */
+    TYPE_TEXT_3 = 14,
 };
 
 /* How a step of FMI 3.0 went, beside its status; Python reads it (`Told` in fmi3.py). */
@@ -172,9 +174,12 @@ typedef struct {
 /* ------------------------------------------------------------------------------------------------ the plan, as it runs */
 
 typedef enum {
-    STEP, SET_REALS_IN_PLACE, SET_REALS, SET_INTEGERS, GET_REALS, GET_INTEGERS, CHANGE, STEP_3, SET_3, GET_3, LOOK, STAMP, EXTEND,
+    STEP, SET_REALS_IN_PLACE, SET_REALS, SET_INTEGERS, GET_REALS, GET_INTEGERS, CHANGE, STEP_3, SET_3, GET_3, SET_TEXTS, GET_TEXTS, LOOK, STAMP, EXTEND,
     SLOPES, SAVE, RESTORE, FORGET, NOTE, BEGIN, MARK, END,
 } Kind;
+
+/* Texts by number (texts.c). */
+typedef struct Texts Texts;
 
 /* One operation. */
 typedef struct {
@@ -232,6 +237,7 @@ typedef struct {
     const int64_t *passed; /* places of the values that loops compare */
     double *work;
     const int64_t *forms; /* of the values; NULL where all of them are numbers */
+    Texts *texts;         /* NULL where none of them is one */
     int64_t *disturbed; /* by operation, after which of its steps numbers were first rounded in another way, from 1 */
     unsigned control; /* how numbers are rounded when the block begins, as `float_control` has it, */
     fenv_t floats;    /* and all that belongs to it */
@@ -330,6 +336,12 @@ double number_of(double value, int64_t form);
 const Call *take_steps_3(const Hand *hand, const Group *group, double time, double step, int *status);
 const Call *set_3(const Hand *hand, const Group *group, double time, int *status);
 const Call *get_3(const Hand *hand, const Group *group, int *status);
+
+const Call *set_texts(const Hand *hand, const Group *group, double time, int *status);
+const Call *get_texts(const Hand *hand, const Group *group, int *status);
+
+/* Whether there was no memory for one. */
+int texts_are_full(const Texts *texts);
 
 /* The same for what else there is to do (courses.c, loops.c); values that are looked at, stamped or extended. */
 const Call *look_at(const Plan *plan, const Group *group, int *status);

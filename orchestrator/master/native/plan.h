@@ -49,6 +49,15 @@ int resolve_loop(Plan *plan, const Py_buffer *buffers, const Operation *operatio
 /* Whether each loop's operations come one after the other. */
 int are_loops_closed(const Plan *plan, const Py_buffer *buffers);
 
+/* The texts that an object of Python's stands for, NULL for None; 0 with an exception if it is none. */
+int find_texts(PyObject *object, Texts **texts);
+
+/* Functions of the module about them: see the docstrings. */
+PyObject *make_texts(PyObject *module, PyObject *nothing);
+PyObject *number_of_text(PyObject *module, PyObject *arguments);
+PyObject *text_of_number(PyObject *module, PyObject *arguments);
+PyObject *count_texts(PyObject *module, PyObject *capsule);
+
 /* The sizes of what the buffers hold in one number, by which Python knows a kernel that other sources were compiled to. */
 uint32_t layout(void);
 

@@ -39,7 +39,7 @@ int resolve_channel(const Plan *plan, const Py_buffer *buffers, const Operation 
     }
     const Channel *channel = (const Channel *)buffers[CHANNELS].buf + index;
     if (channel->count < 1 || !is_within(channel->begin, channel->count, length(buffers, ENTRIES)) ||
-        channel->type < 0 || channel->type > TYPE_BYTE || channel->reference_count < 1 ||
+        channel->type < 0 || channel->type > TYPE_TEXT_3 || (channel->type >= TYPE_TEXT && plan->texts == NULL) || channel->reference_count < 1 ||
         channel->reference_count > channel->count) {
         return 0;
     }
@@ -48,7 +48,8 @@ int resolve_channel(const Plan *plan, const Py_buffer *buffers, const Operation 
         return 0;
     }
     int in_place = channel->type == 0 && channel->is_real && (is_get || are_in_place(entries, channel->count));
-    group->kind = channel->type ? (is_get ? GET_3 : SET_3)
+    group->kind = channel->type >= TYPE_TEXT ? (is_get ? GET_TEXTS : SET_TEXTS)
+                  : channel->type            ? (is_get ? GET_3 : SET_3)
                   : in_place ? (is_get ? GET_REALS : SET_REALS_IN_PLACE)
                            : (is_get ? GET_INTEGERS : channel->is_real ? SET_REALS : SET_INTEGERS);
     group->is_unseen = operation->kind == OPERATION_READ;

@@ -187,6 +187,8 @@ static const Call *take_group(const Hand *hand, const Group *group, const Advanc
     case STEP_3: return take_steps_3(hand, group, time, (double)group->period * step, status);
     case SET_3: return set_3(hand, group, when, status);
     case GET_3: return get_3(hand, group, status);
+    case SET_TEXTS: return set_texts(hand, group, when, status);
+    case GET_TEXTS: return get_texts(hand, group, status);
     case LOOK: return look_at(hand->plan, group, status);
     case STAMP: stamp(hand->plan, group, it); return group->end;
     case EXTEND: return extend(hand, group, it, status);

@@ -1,6 +1,6 @@
 """What the compiled loop makes of channels and values: single calls, and doubles.
 
-Of whole numbers of 64 bits, which doubles do not hold, its values are the bits.
+Of whole numbers of 64 bits, which doubles do not hold, its values are the bits; of texts, their numbers.
 """
 
 from __future__ import annotations
@@ -15,14 +15,18 @@ from ...fmi import Channel
 from ...fmi.binding import ElementsChannel, Fmi1Slave, Fmi3Slave, FmuChannel, MixedChannel
 from ...isolation import IsolatedChannel
 from ..exchange import Exchange, Feed
+from ..observer import Rows
 from .layout import AS_IT_IS, ROUNDED_UP, TRUE_ABOVE
+from .texts import Texts
 
 _NUMBERS = "Float64", "Float32", "Int8", "UInt8", "Int16", "UInt16", "Int32", "UInt32", "Int64", "UInt64", "Boolean"
 TYPES = {name: number for number, name in enumerate(_NUMBERS, 1)} | {"Enumeration": 9}
 """The kernel's numbers for the types of FMI 3.0."""
 _BYTE = 12
 """That of truth values of FMI 1.0."""
-NUMBER, SIGNED_BITS, UNSIGNED_BITS = 0, 1, 2
+_TEXT, _TEXT_3 = 13, 14
+"""Those of texts of FMI 1.0 and 2.0, and of FMI 3.0."""
+NUMBER, SIGNED_BITS, UNSIGNED_BITS, TEXT = 0, 1, 2, 3
 """The kernel's numbers for what a value is."""
 _FORMS = {"Int64": SIGNED_BITS, "Enumeration": SIGNED_BITS, "UInt64": UNSIGNED_BITS}
 _WIDEST = 2.0**53
@@ -40,6 +44,7 @@ class Wide:
 
     Attributes:
         forms: by place, for the kernel; empty where all of them are numbers.
+        texts: those that are texts; None where there are none.
     """
 
     def __init__(self, exchange: Exchange) -> None:
@@ -47,10 +52,12 @@ class Wide:
             exchange.slaves[owner].interface.variables[signal.removeprefix(f"{owner}.")]
             for owner, signal in zip(exchange.owners, exchange.signals, strict=True)
         )
-        forms = [_FORMS.get(v.fmi_type, NUMBER) for v in variables]
+        forms = [TEXT if v.type == "String" else _FORMS.get(v.fmi_type, NUMBER) for v in variables]
         self.forms = np.array(forms if any(forms) else [], dtype=np.int64)
-        self._whole = [place for place, kind in enumerate(exchange.kinds) if kind != "Real"]
-        self._wide = [(place, _BITS[form]) for place, form in enumerate(forms) if form]
+        self._whole = [place for place, kind in enumerate(exchange.kinds) if kind not in ("Real", "String")]
+        self._wide = [(place, _BITS[form]) for place, form in enumerate(forms) if form in _BITS]
+        self._worded = [place for place, form in enumerate(forms) if form == TEXT]
+        self.texts = Texts() if self._worded else None
         self._more = 0
 
     def widen(self, cells: int) -> None:
@@ -61,7 +68,7 @@ class Wide:
 
     def form(self, place: int) -> int:
         """What the value at a place is."""
-        return int(self.forms[place]) if self._wide else NUMBER
+        return int(self.forms[place]) if len(self.forms) else NUMBER
 
     def entries(self, feed: Feed, changes: Sequence[int], *, late: bool) -> list[Entry]:
         """Where the inputs of a feed come from.
@@ -81,7 +88,11 @@ class Wide:
 
     def packed(self, values: Sequence[Any]) -> NDArray[np.float64]:
         """Values as the kernel takes them."""
-        cells = np.array([*values, *[0.0] * self._more], dtype=np.float64)
+        numbers = [*values, *[0.0] * self._more]
+        if self.texts is not None:
+            for place in self._worded:
+                numbers[place] = self.texts.number(values[place])
+        cells = np.array(numbers, dtype=np.float64)
         for place, bits in self._wide:
             cells.view(bits)[place] = int(values[place])
         return cells
@@ -93,14 +104,29 @@ class Wide:
             values[place] = 0 if values[place] != values[place] else int(values[place])
         for place, bits in self._wide:
             values[place] = int(cells.view(bits)[place])
+        self._word(values)
         return values
+
+    def told(self, rows: NDArray[np.float64]) -> Rows:
+        """Rows that the kernel has left, a time before all the values, as an observer takes them."""
+        if self.texts is None:
+            return rows
+        found: list[list[Any]] = rows.tolist()
+        for row in found:
+            self._word(row, 1)
+        return found
+
+    def _word(self, values: list[Any], before: int = 0) -> None:
+        if self.texts is not None:
+            for place in self._worded:
+                values[place + before] = self.texts.text(values[place + before])
 
 
 def noted(entry: Entry, place: int) -> Entry:
     """What shows again what an entry has made of a value, once that stands at another place."""
     *value, form = entry
     plain = value[2:] == [-1, 1.0, 0.0, AS_IT_IS, 0.0]
-    return place, -1, -1, 1.0, 0.0, AS_IT_IS, 0.0, form if plain else NUMBER
+    return place, -1, -1, 1.0, 0.0, AS_IT_IS, 0.0, form if plain or form == TEXT else NUMBER
 
 
 def parts_of(channel: Channel) -> Parts | None:
@@ -122,22 +148,24 @@ def parts_of(channel: Channel) -> Parts | None:
 
 def type_of(slave: object, kind: str) -> int:
     """The kernel's number for a type of an instance's; 0 where it is called as FMI 2.0 has it."""
+    if kind == "String":
+        return _TEXT_3 if isinstance(slave, Fmi3Slave) else _TEXT
     if isinstance(slave, Fmi3Slave):
         return TYPES[kind]
     return _BYTE if isinstance(slave, Fmi1Slave) and kind == "Boolean" else 0
 
 
 def can_exchange(exchange: Exchange) -> bool:
-    """Whether the kernel can: numbers and truth values, whole arrays, wide numbers that no event changes."""
-    if "String" in exchange.kinds:
-        return False
+    """Whether the kernel can: all but Binary, whole arrays, wide numbers that no event changes."""
     channels = [feed.channel for feeds in exchange.feeds.values() for feed in feeds]
     channels += [part.channel for parts in exchange.yields.values() for part in parts]
     wide = Wide(exchange)
     compared = (
-        abs(link.threshold or 0.0) >= _WIDEST and wide.form(exchange.places[link.source])
+        abs(link.threshold or 0.0) >= _WIDEST and wide.form(exchange.places[link.source]) in _BITS
         for link in exchange.every_link
     )
     return (
-        None not in map(parts_of, channels) and not any(map(wide.form, exchange.output_changes)) and not any(compared)
+        None not in map(parts_of, channels)
+        and not any(wide.form(place) in _BITS for place in exchange.output_changes)
+        and not any(compared)
     )

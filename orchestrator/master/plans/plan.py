@@ -8,7 +8,7 @@ from ctypes import addressof, c_void_p
 import numpy as np
 from numpy.typing import NDArray
 
-from ...fmi import Channel
+from ...fmi import Channel, Type
 from ...fmi.binding import ElementsChannel, Fmi3Slave, FmuSlave, LoadedSlave, is_watched
 from ...isolation import IsolatedChannel, Ride
 from ..algorithms import Batch, Iteration, Operation, Repeated
@@ -57,7 +57,7 @@ class Plan:
         operations: kind, index, period and phase of each.
         late: of each, whether what it sets is of the step's end, or its step is not the last word.
         culprits: whom each of them calls, and by which function.
-        changes: what events do, with the place among the values and whether it is a real number.
+        changes: what events do, with the place among the values and of which type.
         channels: arrays that are set as a whole.
         courses: the inputs that go on during a step.
         rounds: by operation, what it is repeated for. iterations: by the operation that ends a round.
@@ -91,7 +91,7 @@ class Plan:
         self.late: list[bool] = []
         self.culprits: list[tuple[Called | None, str]] = []
         self._instances: list[tuple[int, int, int]] = []
-        self.changes: list[tuple[Change, int, bool]] = []
+        self.changes: list[tuple[Change, int, Type]] = []
         self.slaves = {name: called(slave) for name, slave in coupling.slaves.items()}
         self.rides = [slave for slave in self.slaves.values() if isinstance(slave, Ride)]
         self.rounds: dict[int, Iteration] = {}
@@ -274,7 +274,7 @@ class Plan:
         made = self._sets[slave.name] = []
         for n, feed in enumerate(self.exchange.feeds[slave.name]):
             slots = feed.changes or [None] * len(feed.targets)
-            changes = [-1 if slot is None else self._add_change(slot, -1, feed.is_real) for slot in slots]
+            changes = [-1 if slot is None else self._add_change(slot, -1, feed.kind) for slot in slots]
             self._feeds.append((slave.name, n, changes, late, len(self._entries)))
             entries = self.wide.entries(feed, changes, late=late)
             if course is None or n != course.feed:
@@ -325,7 +325,7 @@ class Plan:
             self.add_reads(kind, slave, part, due)
             for place, change in self.exchange.output_changes.items():
                 if part.begin <= place < part.end:
-                    index = self._add_change(change, place, part.is_real)
+                    index = self._add_change(change, place, part.kind)
                     self.add_operation(Kind.CHANGE, index, (None, "an event"), due)
 
     def add_reads(self, kind: Kind, slave: Called, part: Yield, due: tuple[int, int]) -> None:
@@ -337,8 +337,8 @@ class Plan:
         for channel in range(first, len(self._channels)) if self.exchange.stamps and kind != Kind.LOOK else ():
             self.add_operation(Kind.STAMP, channel, NOBODY, due)
 
-    def _add_change(self, change: Change, place: int, is_real: bool) -> int:
-        self.changes.append((change, place, is_real))
+    def _add_change(self, change: Change, place: int, kind: Type) -> int:
+        self.changes.append((change, place, kind))
         return len(self.changes) - 1
 
     def _add_channels(

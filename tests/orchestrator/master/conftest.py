@@ -1,5 +1,11 @@
 """What the tests of the compiled loop share: how often it was used, its results and those of Python, a ring."""
 
+import ctypes
+import importlib.util
+import shutil
+import subprocess
+import sysconfig
+from pathlib import Path
 from types import SimpleNamespace
 
 import fmpy
@@ -11,6 +17,39 @@ from railcosim.orchestrator.master.loop import Master
 from railcosim.orchestrator.run.checking import check
 from railcosim.orchestrator.run.execution import run
 from railcosim.orchestrator.system import System
+
+_NATIVE = Path(__file__).parents[3] / "orchestrator" / "master" / "native"
+_SCARCE = Path(__file__).parents[2] / "scarce.h"
+
+
+@pytest.fixture(scope="session")
+def compile_kernel():
+    """Compile the step loop to a file, without a warning."""
+
+    def make(target, *flags):
+        command = [
+            shutil.which("gcc"),
+            *["-Wall", "-Wextra", "-Wconversion", "-Wshadow", "-Werror", "-ffp-contract=off"],
+        ]
+        command += ["-shared", "-fPIC", f"-I{sysconfig.get_paths()['include']}", *flags, *sorted(_NATIVE.glob("*.c"))]
+        subprocess.run([*command, "-o", target], check=True)
+        return target
+
+    return make
+
+
+@pytest.fixture(scope="session")
+def scarce_kernel(compile_kernel, tmp_path_factory):
+    """A kernel that can be refused what it asks for, and the number of times that it is granted."""
+    if not hasattr(ctypes.CDLL(compiled.kernel.__file__), "scarce_left"):
+        target = tmp_path_factory.mktemp("scarce") / "kernel.so"
+        library = compile_kernel(target, "-O0", "-pthread", "-include", _SCARCE)
+    else:  # the one in use can, in measure_coverage.py
+        library = compiled.kernel.__file__
+    spec = importlib.util.spec_from_file_location("railcosim.orchestrator.master.kernel", library)
+    module = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(module)
+    return module, ctypes.c_int.in_dll(ctypes.CDLL(library), "scarce_left")
 
 
 @pytest.fixture
@@ -66,7 +105,8 @@ def contents():
 
 
 def _contents(result):
-    return [("time", result.time.tobytes()), *((name, result[name].tobytes()) for name in result.names())]
+    columns = [("time", result.time), *((name, result[name]) for name in result.names())]
+    return [(name, column.tolist() if column.dtype == object else column.tobytes()) for name, column in columns]
 
 
 @pytest.fixture(scope="session")

@@ -181,13 +181,6 @@ def test_an_fmu_without_variables(both, compile_c, xml, tmp_path):
 # -------------------------------------------------------------------- who takes which loop
 
 
-def test_texts_are_for_python(used, mine):
-    system = System(stop_time=1.0, step=0.1)
-    system.add("worded", mine("EveryType"))
-    assert run(system, kind="python")["worded.said"][-1] == "b"
-    assert not used
-
-
 def test_components_in_this_process_are_for_python(used, mine):
     system = System(stop_time=1.0, step=0.1)
     system.add("lag", mine("Lag"))

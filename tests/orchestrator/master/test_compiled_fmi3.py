@@ -257,11 +257,11 @@ def test_part_of_an_array_after_all_of_it(plain, instantiated):
         slave.free()
 
 
-@pytest.mark.parametrize("what", ["part", "event", "threshold", "text"])
+@pytest.mark.parametrize("what", ["part", "event", "threshold", "binary"])
 def test_what_is_left_to_python(third, plain, by_hand, used, what):
-    """A part of an array, an event that changes a number of 64 bits, one that is compared beyond doubles, texts."""
+    """A part of an array, an event that changes a number of 64 bits, one that is compared beyond doubles, Binary."""
     system = System(stop_time=1.0, step=0.25)
-    model = {"part": plain, "text": str(by_hand(3, name="texts.fmu"))}.get(what, third)
+    model = {"part": plain, "binary": str(by_hand(3, name="binary.fmu"))}.get(what, third)
     system.add("a", model)
     system.add("b", model)
     if what == "part":

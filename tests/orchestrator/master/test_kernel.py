@@ -1,12 +1,9 @@
 """The kernel's C: what it is given is checked, and the compiler and its sanitizers find nothing."""
 
-import ctypes
-import importlib.util
 import os
 import shutil
 import subprocess
 import sys
-import sysconfig
 from functools import partial
 from pathlib import Path
 
@@ -18,9 +15,7 @@ from railcosim.orchestrator.master.plans import CHANGES, CONTROL, PLACE, SWING
 from railcosim.orchestrator.master.plans.layout import COURSE, LOOP, NOTING, POINTS
 from railcosim.orchestrator.master.settings import Settings
 
-MASTER = Path(__file__).parents[3] / "orchestrator" / "master"
 FOREIGN = Path(__file__).parents[1] / "foreign"
-SCARCE = Path(__file__).parents[2] / "scarce.h"
 GCC = shutil.which("gcc")
 pytestmark = [
     pytest.mark.skipif(compiled.kernel is None, reason="installed without the compiled step loop"),
@@ -42,7 +37,7 @@ FIXED = np.zeros(0, CONTROL)
 NAMES = (
     "operations parts channels instances entries references forms courses notes loops passed points states work stamps "
     "changes kept values history newest table row places "
-    "disturbed control every start step first count last"
+    "disturbed control texts every start step first count last"
 )
 
 
@@ -57,7 +52,7 @@ def arguments(workspace, odd, ring, instantiated):
     places = np.array([(0, -1, 0)], PLACE)
     disturbed = np.zeros(len(plan[0]), np.int64)
     state = values, np.tile(values, (2, 1)), 1, table, 0, places, disturbed
-    given = [*plan, changes, kept, *state, FIXED, 1, 0.0, 0.25, 0, 4, 4]
+    given = [*plan, changes, kept, *state, FIXED, None, 1, 0.0, 0.25, 0, 4, 4]
     yield dict(zip(NAMES.split(), given, strict=True))
     for slave in master.slaves.values():
         slave.free()
@@ -245,6 +240,8 @@ WRONG = {
             "channels": changed(a["channels"], "type", 1),
         }
     ),
+    "a channel of texts, of which there are none": lambda a: {"channels": changed(a["channels"], "type", 13)},
+    "a channel of no type that there is": lambda a: {"channels": changed(a["channels"], "type", 15)},
     "fewer points than none": lambda a: going_on(a, "points", "count", -1),
     "more points than there is room for": lambda a: going_on(a, "points", "count", 4),
     "a continued input that is not there": lambda a: going_on(a, "points", "place", 10**6),
@@ -366,22 +363,10 @@ def test_swings_that_are_not_there_are_refused(swings, number, values):
         compiled.kernel.look("swings", number, values)
 
 
-def scarce_kernel(folder):
-    """A kernel that can be refused what it asks for, and the number of times that it is granted."""
-    if not hasattr(ctypes.CDLL(compiled.kernel.__file__), "scarce_left"):
-        library = compile_kernel(folder / "kernel.so", "-O0", "-pthread", "-include", SCARCE)
-    else:  # the one in use can, in measure_coverage.py
-        library = compiled.kernel.__file__
-    spec = importlib.util.spec_from_file_location("railcosim.orchestrator.master.kernel", library)
-    module = importlib.util.module_from_spec(spec)
-    spec.loader.exec_module(module)
-    return module, ctypes.c_int.in_dll(ctypes.CDLL(library), "scarce_left")
-
-
 @pytest.mark.skipif(not getattr(compiled.kernel, "HAS_THREADS", 0), reason="no threads here")
-def test_memory_and_threads_that_cannot_be_had(tmp_path, odd, ring, instantiated):
+def test_memory_and_threads_that_cannot_be_had(scarce_kernel, odd, ring, instantiated):
     """Each request in turn is refused; then nothing is left behind, and the same call succeeds."""
-    kernel, left = scarce_kernel(tmp_path)
+    kernel, left = scarce_kernel
     said = []
     for threads in (1, 3):
         master = instantiated(ring(odd, 3))
@@ -393,7 +378,7 @@ def test_memory_and_threads_that_cannot_be_had(tmp_path, odd, ring, instantiated
         state = np.zeros(0, CHANGES), kept, values, history, 1, table, 0, places
         for left.value in range(20):
             try:
-                found = kernel.run(*plan, *state, np.zeros(len(plan[0]), np.int64), FIXED, 1, 0.0, 0.25, 0, 4, 4)
+                found = kernel.run(*plan, *state, np.zeros(len(plan[0]), np.int64), FIXED, None, 1, 0.0, 0.25, 0, 4, 4)
             except (MemoryError, RuntimeError) as error:
                 said.append(f"{type(error).__name__} {error}")
             else:
@@ -415,22 +400,15 @@ def test_a_kernel_of_another_version_is_refused():
 # -------------------------------------------------------------------- the compiler's and the sanitizers' word
 
 
-def compile_kernel(target, *flags):
-    command = [GCC, "-Wall", "-Wextra", "-Wconversion", "-Wshadow", "-Werror", "-ffp-contract=off", "-shared", "-fPIC"]
-    sources = sorted((MASTER / "native").glob("*.c"))
-    command += [f"-I{sysconfig.get_paths()['include']}", *flags, *sources, "-o", target]
-    subprocess.run(command, check=True)
-    return target
-
-
 @pytest.mark.parametrize("flags", [["-O2"], ["-O3", "-std=c11"]])
-def test_the_compiler_has_nothing_to_say(tmp_path, flags):
+def test_the_compiler_has_nothing_to_say(compile_kernel, tmp_path, flags):
     compile_kernel(tmp_path / "kernel.so", *flags)
 
 
 PARTS = (
     "test_varying.py",
     *("test_compiled.py", "test_compiled_blocks.py", "test_compiled_coupling.py", "test_compiled_fmi3.py"),
+    "test_compiled_texts.py",
     *("test_kernel.py", "test_threads.py"),
 )
 SANITIZERS = {
@@ -444,7 +422,7 @@ SANITIZERS = {
 
 @pytest.mark.long
 @pytest.mark.parametrize("sanitizers", SANITIZERS, ids="+".join)
-def test_sanitized(tmp_path, sanitizers):
+def test_sanitized(compile_kernel, tmp_path, sanitizers):
     """The tests of the compiled loop under the compiler's sanitizers."""
     flags = "-g", "-O1", f"-fsanitize={','.join(sanitizers)}", "-fno-sanitize-recover"
     library = compile_kernel(tmp_path / "kernel.so", *flags)
