@@ -30,23 +30,7 @@ from pathlib import Path
 ROOT = Path(__file__).parents[1]
 DATA = ROOT / "build" / "coverage"
 GRANTED = ROOT / "tests" / "uncovered.txt"
-KERNEL = [
-    ROOT / "orchestrator" / "master" / "native" / name
-    for name in (
-        *(
-            "acceleration.c",
-            "adaptive.c",
-            "courses.c",
-            "fmi3.c",
-            "growth.c",
-            "kernel.c",
-            "loops.c",
-            "plan.c",
-            "resolving.c",
-        ),
-        *("stepping.c", "team.c", "texts.c"),
-    )
-]
+KERNEL = sorted((ROOT / "orchestrator" / "master" / "native").rglob("*.c"))
 RUNTIME = sorted((ROOT / "fmus" / "runtime").rglob("*.c"))
 LOOP_TESTS = [
     *(

@@ -3,7 +3,7 @@
    A plan is a list of operations on channels and instances, exactly those of the loop in master.py, in the same order. A
    channel is some variables of one type of one instance: where their value references stand, and where their values come
    from or go to. All values are real numbers here; integers and truth values are exact in them, and texts have numbers
-   (texts.c). Python builds the plan,
+   (types/texts.c). Python builds the plan,
    and takes over between blocks for progress, flushing and interruption.
 
    This file is what Python sees of it; plan.c makes a plan of Python's arrays, stepping.c takes the steps, team.c with

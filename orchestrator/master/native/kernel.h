@@ -178,7 +178,7 @@ typedef enum {
     SLOPES, SAVE, RESTORE, FORGET, NOTE, BEGIN, MARK, END,
 } Kind;
 
-/* Texts by number (texts.c). */
+/* Texts by number (types/texts.c). */
 typedef struct Texts Texts;
 
 /* One operation. */

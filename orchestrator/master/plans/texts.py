@@ -14,7 +14,7 @@ _MANY = 50_000
 
 
 class Texts:
-    """The texts of a run by number, as ``native/texts.c`` has them.
+    """The texts of a run by number, as ``native/types/texts.c`` has them.
 
     Attributes:
         table: what the kernel takes.

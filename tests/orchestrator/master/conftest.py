@@ -31,7 +31,7 @@ def compile_kernel():
             shutil.which("gcc"),
             *["-Wall", "-Wextra", "-Wconversion", "-Wshadow", "-Werror", "-ffp-contract=off"],
         ]
-        command += ["-shared", "-fPIC", f"-I{sysconfig.get_paths()['include']}", *flags, *sorted(_NATIVE.glob("*.c"))]
+        command += ["-shared", "-fPIC", f"-I{sysconfig.get_paths()['include']}", *flags, *sorted(_NATIVE.rglob("*.c"))]
         subprocess.run([*command, "-o", target], check=True)
         return target
 

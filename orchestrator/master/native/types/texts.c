@@ -4,7 +4,7 @@
    What an FMU gives is what Python would make of it: no UTF-8 is replaced as it is there. Others than ASCII go to Python,
    where it is not known yet. */
 
-#include "plan.h"
+#include "../plan.h"
 
 #include <stdlib.h>
 #include <string.h>

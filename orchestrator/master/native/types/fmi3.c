@@ -4,7 +4,7 @@
    Values pass as the doubles that they are everywhere here; whole numbers of 64 bits, which doubles do not hold, as their
    bits (`Form`). Truth values of FMI 1.0, a byte each, pass here as well, by functions that do not count values. */
 
-#include "kernel.h"
+#include "../kernel.h"
 
 #include <math.h>
 #include <stdbool.h>
