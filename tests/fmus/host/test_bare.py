@@ -146,3 +146,7 @@ def test_cmake_makes_the_bare_host(unpacked, tmp_path, run):
     subprocess.run(["cmake", "--build", made], check=True, capture_output=True)
     expected = table((folder / "documentation" / f"{name}_ref.csv").read_text())
     assert table(run(made / "host", bare._rows(folder, name))) == expected
+    command[4:] = [tmp_path / "again", f"-DFMI_HEADERS={tmp_path}"]
+    refused = subprocess.run(command, check=False, capture_output=True, text=True)
+    assert refused.returncode
+    assert "where no fmi2Functions.h is" in " ".join(refused.stderr.split())
