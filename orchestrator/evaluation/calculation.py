@@ -210,6 +210,8 @@ def _operation(plan: Plan, operator: str, terms: list[Term]) -> Term:
 
 def _stacked(values: list[Value]) -> Value:
     """The rows of a slice, (n, T); parameters alone make one column."""
+    if all(value.ndim for value in values):
+        return np.concatenate(values).reshape(len(values), -1)
     rows = np.empty((len(values), max(value.size for value in values)), np.result_type(*values))
     for row, value in zip(rows, values, strict=True):
         row[...] = value
@@ -245,6 +247,11 @@ class Scope:
 def names_of(signals: Signals) -> Names:
     """The signals and parameters of a run."""
     return signals.plan.names if isinstance(signals, Prepared) else Names([*signals.names(), *signals.parameters])
+
+
+def prepared(signals: Signals) -> Prepared:
+    """A run to be looked at through a plan, if it is not yet."""
+    return signals if isinstance(signals, Prepared) else Prepared(Plan(names_of(signals)), signals)
 
 
 def evaluate(node: Node, scope: Scope) -> Value:

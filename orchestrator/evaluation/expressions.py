@@ -13,7 +13,7 @@ import numpy as np
 from ..errors import ExpressionError, WindowError
 from ..names import SignalName
 from ..problems import Problem, suggestion
-from .calculation import Binding, Scope, evaluate, names_of, reach
+from .calculation import Binding, Scope, evaluate, prepared, reach
 from .formulas import read
 from .functions import CONSTANTS, ELEMENTWISE, Function, Value, call_problem
 from .signals import Rehearsal, Signals
@@ -59,7 +59,7 @@ class Expression:
         """Whether the free index `i` occurs."""
         return uses_index(self.tree)
 
-    @property
+    @cached_property
     def reaches(self) -> int:
         """How many points ahead it looks at most."""
         return reach(self.tree)
@@ -207,7 +207,7 @@ class Expression:
 
     def apply(self, rule: Callable[[Node, Scope], R], signals: Signals, index: Index = None, **constants: Any) -> R:
         """Evaluate under another rule than the usual one (a requirement asks for slack instead of truth)."""
-        run = signals if isinstance(signals, Prepared) else Prepared(Plan(names_of(signals)), signals)
+        run = prepared(signals)
         constants = constants if index is None or not constants else {**constants, "i": index}
         scope = Scope(self._bound(run.plan, constants) if constants else self.bound(run.plan, index), run.whole)
         try:

@@ -138,7 +138,8 @@ class Judge:
         with np.errstate(all="ignore"):
             for name, names in self._value_names.items():
                 numbers = numbers_of(self._texts[name], _known(self._metrics[name]), run)
-                found.update((names[index], value) for index, value in numbers.values.items())
+                for index, value in numbers.values.items():
+                    found[names[index]] = value
         return found
 
 

@@ -5,6 +5,7 @@ NaN in the window gives NaN; a window the run does not cover is an error (`Windo
 """
 
 from collections.abc import Callable, Collection, Sequence
+from contextlib import suppress
 from dataclasses import dataclass
 from typing import Any, NamedTuple
 
@@ -19,7 +20,7 @@ from .functions import ELEMENTWISE, Function
 from .reducers import PLATOON, Fold, Span, folds
 from .signals import Signals
 from .syntax import Call, Node, Number, Operation, Reference
-from .terms import Plan, Prepared
+from .terms import Plan, Prepared, Term
 
 Array = NDArray[np.float64]
 
@@ -251,11 +252,13 @@ def numbers_of(text: str, expression: Expression, run: Prepared) -> Numbers:
     values: dict[int | None, float] = {}
     truth = False
     try:
-        indices = expression.instances(run.plan.names)
-        rows = _rows(expression, run, indices)
-        for place, index in enumerate(indices):
+        indices, several = _ready(expression, run.plan)
+        rows = None if several is None else _rows(several, run, len(indices))
+        if rows is not None:
+            return Numbers(dict(zip(indices, map(float, rows.tolist()), strict=True)), rows.dtype == np.bool_)
+        for index in indices:
             values[index] = np.nan
-            value = expression.value(run, index) if rows is None else rows[place]
+            value = expression.value(run, index)
             if value.ndim:
                 raise ExpressionError(_not_reduced(text))
             values[index], truth = float(value), value.dtype == np.bool_
@@ -273,16 +276,28 @@ def measure(name: str, text: str, expression: Expression, run: Prepared) -> Metr
     return Metric(name, text, values or {None: np.nan}, unit, comfort, problem, truth)
 
 
-def _rows(expression: Expression, run: Prepared, indices: tuple[int | None, ...]) -> Array | None:
-    """All values of a metric at once; None where that cannot be, or one of them has to say why it is none."""
-    several = tuple(index for index in indices if index is not None)
-    if len(several) < 2 or not expression.stands_in_rows:
-        return None
+def _ready(expression: Expression, plan: Plan) -> tuple[tuple[int | None, ...], Term | None]:
+    """The indices of a metric, and what gives its values at once where that can be."""
+    key = "ready", expression.text, id(expression.functions)
+    if key not in plan.bindings:
+        indices = expression.instances(plan.names)
+        several = tuple(index for index in indices if index is not None)
+        together = None
+        if len(several) > 1 and expression.stands_in_rows:
+            with suppress(ExpressionError):  # it says so for each
+                together = expression.bound(plan, several).term(expression.tree)
+        plan.bindings[key] = indices, together
+    found: tuple[tuple[int | None, ...], Term | None] = plan.bindings[key]
+    return found
+
+
+def _rows(together: Term, run: Prepared, count: int) -> Array | None:
+    """All values of a metric at once; None where one of them has to say why it is none."""
     try:
-        values = expression.value(run, several)
-    except ExpressionError:
+        values = run.whole[together]
+    except (ExpressionError, ValueError):
         return None
-    return None if values.shape != (len(several), 1) or np.isnan(values).any() else values[:, 0]
+    return None if values.shape != (count, 1) or np.count_nonzero(np.isnan(values)) else values[:, 0]
 
 
 def _unit(expression: Expression, run: Prepared, index: int | None) -> str:

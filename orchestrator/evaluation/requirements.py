@@ -6,6 +6,7 @@ and what decided it. Only the points that are seen count. What NaN touches fails
 Numbers that differ by rounding are equal: their margin is 0. The grammar and its meaning stand in `docs/metrics.md`.
 """
 
+import math
 import re
 from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass
@@ -18,11 +19,11 @@ from ..names import SignalName
 from ..problems import Problem, suggestion
 from ..times import digits, slack
 from . import signals as runs
-from .calculation import Scope, names_of, reach
+from .calculation import Scope, prepared, reach
 from .expressions import Expression, Index, evaluate_constant, parse
 from .formulas import says_when, tokens_of
 from .metrics import EVERY_STEP, FUNCTIONS
-from .reducers import Span, ends_of, scalar
+from .reducers import Span, scalar
 from .signals import Rehearsal, Signals
 from .slack import ZERO, can_be_true, conditions
 from .syntax import Call, Node, Reference, Temporal, walk
@@ -37,6 +38,7 @@ from .temporal import (
     rehearsed_interval,
     scales_of,
 )
+from .terms import Prepared
 
 QUANTIFIERS: tuple[Word, ...] = ("always", "eventually", "finally")
 _MOST_VALUES = 1 << 15
@@ -156,14 +158,15 @@ class Requirement:
         Raises:
             ExpressionError: for what `check` would have told.
         """
+        signals = prepared(signals)
         try:
             times = self.times(signals)
         except ExpressionError as error:
             return Verdict(self.name, self.text, "inconclusive", reason=str(error))
-        indices = self.condition.instances(names_of(signals))
+        indices = self.condition.instances(signals.plan.names)
         if not indices:
             return Verdict(self.name, self.text, "inconclusive", reason="no signal has such an index")
-        points = Points(signals, reach(self.condition.tree))
+        points = Points(signals, self.condition.reaches)
         span = Span(times.start, times.end, times.outside, forgiven=points.forgiven)
         try:
             rows = self._together(indices, points.count)
@@ -216,10 +219,10 @@ class Requirement:
         return _finite(min(found, key=lambda pair: (pair[0], 0.0 if not pair[0] else pair[1]))[1])
 
     def _verdict(
-        self, worst: Decision, signals: Signals, end: float | None
+        self, worst: Decision, signals: Prepared, end: float | None
     ) -> tuple[Literal["pass", "fail", "inconclusive"], str]:
         """The verdict, and the reason for it, where it needs one."""
-        first, last = ends_of(signals)
+        first, last = signals.ends
         reached = signals.completed if end is None else end <= last + slack(signals.step, last)
         # A number over the whole run (final, settling_time, ...) is not final before the run is.
         reducers = (isinstance(x, Call) and self.condition.functions[x.name].reduces for x in walk(self.condition.tree))
@@ -290,16 +293,15 @@ def _references(node: Node) -> list[Reference]:
 
 def _finite(value: float) -> float | None:
     """A value as it is told; None where it is no measure."""
-    if np.isinf(value):
+    if math.isinf(value):
         return None
     return 0.0 if abs(value) <= ZERO else value
 
 
 def _rehearse(node: Node, scope: Scope) -> None:
     """Calculate a condition in a rehearsal."""
-    signals = scope.signals
-    points = Points(signals, reach(node))
-    Formula(scope, points, interval=rehearsed_interval).values(node, 0, signals.points)
+    points = Points(scope.frame.run, reach(node))
+    Formula(scope, points, interval=rehearsed_interval).values(node, 0, points.count)
 
 
 def _clauses(text: str) -> list[tuple[str, str]]:
@@ -319,7 +321,8 @@ def _clauses(text: str) -> list[tuple[str, str]]:
 
 
 def _moment(expression: Expression, signals: Signals) -> float:
-    return scalar(expression.evaluate(signals), f"'{expression.text}', a time of a window,")
+    with np.errstate(all="ignore"):
+        return scalar(expression.value(prepared(signals)), f"'{expression.text}', a time of a window,")
 
 
 def _is_constant(expression: Expression, names: Collection[str], parameters: Collection[str]) -> bool:

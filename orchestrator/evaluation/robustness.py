@@ -5,13 +5,12 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from .calculation import Scope, names_of, reach
+from .calculation import Scope, prepared, reach
 from .expressions import parse
 from .formulas import says_when
 from .metrics import FUNCTIONS
 from .reducers import Span
 from .requirements import Requirement, parse_requirement
-from .signals import Signals
 from .slack import decoded
 from .syntax import Node
 from .temporal import Formula, Points, scales_of
@@ -36,7 +35,7 @@ def robustness(text: str, run: Any, *, index: int | None = None, scaled: bool = 
     Raises:
         ExpressionError: the text cannot be read, or names what is not there.
     """
-    signals: Signals = getattr(run, "results", run)
+    signals = prepared(getattr(run, "results", run))
     if says_when(text) or text.split()[:1] == ["finally"]:
         requirement = parse_requirement("", text)
     else:
@@ -51,7 +50,7 @@ def robustness(text: str, run: Any, *, index: int | None = None, scaled: bool = 
         chosen = span.points(points.times(0, points.count))
         return _from_then_on(requirement.quantifier, low, chosen), _from_then_on(requirement.quantifier, high, chosen)
 
-    every = condition.instances(names_of(signals)) if index is None else (index,)
+    every = condition.instances(signals.plan.names) if index is None else (index,)
     found = []
     for at in every:
         low, high = condition.apply(values, signals, at)

@@ -81,8 +81,8 @@ class Part:
 
     def is_as(self, other: "Part") -> bool:
         """Whether it has the same points of a run as another part."""
-        own, others = ((x.first, x.overlap, x.beyond, x.points) for x in (self, other))
-        return own == others
+        own = self.first, self.overlap, self.beyond, self.points
+        return own == (other.first, other.overlap, other.beyond, other.points)
 
     @property
     def points(self) -> int:

@@ -74,8 +74,8 @@ def _made_of(node: Node) -> list[Node]:
 def _compared(operator: str, left: Node, right: Node, scope: Scope, scale: float | Array | None) -> Array:
     a, b = _number(left, scope), _number(right, scope)
     gap, numbers = np.asarray(b - a), [part for side in (left, right) for part in scope.binding.known(_made_of, side)]
-    most = ROUNDING * np.maximum.reduce([scope.frame.largest(scope.binding.term(part)) for part in numbers])
-    is_near = not np.abs(gap).min(initial=np.inf) > most
+    nearest = float(np.abs(gap).min(initial=np.inf))
+    is_near = not all(nearest > ROUNDING * scope.frame.largest(scope.binding.term(part)) for part in numbers)
     if is_near:  # somewhere, perhaps
         close = ROUNDING * reduce(np.maximum, [np.abs(_number(part, scope)) for part in numbers])
         equal = (a == b) | (np.abs(gap) <= np.where(np.isfinite(close), close, 0.0))

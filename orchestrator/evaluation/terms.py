@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from ..errors import ExpressionError, WindowError
 from .functions import Function, Value
-from .reducers import Fold, Selection, Span, Window, nothing_in_window, scalar, span_of
+from .reducers import Fold, Selection, Span, Window, ends_of, nothing_in_window, scalar, span_of
 from .signals import Part, Rehearsal, Signals, parts_of
 from .vocabulary import Names
 
@@ -140,7 +140,7 @@ class Frame:
     def __init__(self, run: "Prepared", signals: Signals) -> None:
         self.run, self.signals = run, signals
         self._values: dict[Term, Value] = {}
-        self._largest: dict[Term, Value] = {}
+        self._largest: dict[Term, float] = {}
 
     def __getitem__(self, term: Term) -> Value:
         value = self._values.get(term)
@@ -170,12 +170,14 @@ class Frame:
             return np.asarray(self[argument], dtype=np.float64)
         return None if argument is None else [self.argument(item) for item in argument]
 
-    def largest(self, term: Term) -> Value:
+    def largest(self, term: Term) -> float:
         """The largest magnitude among the values of a term; NaN where one is."""
-        if term not in self._largest:
+        found = self._largest.get(term)
+        if found is None:
             values = self.argument(term)
-            self._largest[term] = np.maximum(values.max(initial=0.0), -values.min(initial=0.0))
-        return self._largest[term]
+            high, low = float(values.max(initial=0.0)), float(values.min(initial=0.0))
+            found = self._largest[term] = high if high >= -low else -low
+        return found
 
     def selection(self, span: Span) -> Selection:
         """Which points count, in a part of the run."""
@@ -208,16 +210,22 @@ class Prepared:
 
     def frame(self, part: Part) -> Frame:
         """The values at some points; of the part that was looked at last they are kept."""
-        if self._last is None or not self._last[0].is_as(part):
+        if self._last is None or not (self._last[0] is part or self._last[0].is_as(part)):
             self._last = part, Frame(self, part)
         return self._last[1]
+
+    @cached_property
+    def ends(self) -> tuple[float, float]:
+        """The first and the last time in s, as `ends_of` has them."""
+        return ends_of(self.signals)
 
     def span(self, reduction: Reduction) -> Span:
         """The points that count for a reducer."""
         span = self._spans.get(reduction.window)
         if span is None:
             bounds = {name: self.whole.argument(bound) for name, bound in reduction.bounds.items()}
-            span = self._spans[reduction.window] = span_of(self.signals, **bounds, half_open=reduction.half_open)
+            span = span_of(self.ends, self.signals.step, **bounds, half_open=reduction.half_open)
+            self._spans[reduction.window] = span
         return span
 
     def reduced(self, reduction: Reduction) -> Value:
@@ -324,13 +332,13 @@ class _Look:
     def see(self, frame: Frame) -> bool:
         """Take in a part of the run; False if some member cannot."""
         groups: dict[Hashable, tuple[Fold, list[Reduction], list[Value]]] = {}
-        before = self._members
+        before, points = self._members, frame.signals.points
         for member in before:
             try:
                 varying = {name: frame.argument(term) for name, term in member.varying.items()}
                 rows, fold = member.function.call(self._span, **self._fixed, **varying)
-                if rows.ndim and rows.shape[-1] not in (1, frame.signals.points):
-                    raise ValueError(f"{rows.shape[-1]} points of {frame.signals.points}")
+                if rows.ndim and rows.shape[-1] not in (1, points):
+                    raise ValueError(f"{rows.shape[-1]} points of {points}")
             except (ExpressionError, ValueError) as error:
                 self._give_up([member], error)
                 continue
@@ -348,14 +356,14 @@ class _Look:
     def finish(self) -> None:
         """Find the values."""
         for fold, members, counts in self._folds.values():
-            places = iter(range(sum(counts)))
+            begin = 0
             for member, count in zip(members, counts, strict=True):
-                own = [next(places) for _ in range(count)]
                 try:
-                    numbers = [fold.value(place) for place in own]
-                    self._found[member] = np.array([numbers]).T if member.several else np.asarray(numbers[0])
+                    numbers = fold.numbers(slice(begin, begin + count))
+                    self._found[member] = numbers[:, np.newaxis] if member.several else np.asarray(numbers[0])
                 except WindowError as error:
                     self._found[member] = error
+                begin += count
         for member in self._members:
             if member not in self._found:
                 self._found[member] = WindowError(nothing_in_window())

@@ -3,7 +3,7 @@
 from . import folds
 from .folds import Fold
 from .platoon import PLATOON
-from .windows import Selection, Span, Window, ends_of, nothing_in_window, scalar, span_of, time_windows, window_of
+from .windows import Selection, Span, Window, at, ends_of, nothing_in_window, scalar, span_of, time_windows, window_of
 
 __all__ = [
     "PLATOON",
@@ -11,6 +11,7 @@ __all__ = [
     "Selection",
     "Span",
     "Window",
+    "at",
     "ends_of",
     "folds",
     "nothing_in_window",

@@ -23,11 +23,11 @@ class Fold(Protocol):
     def see(self, window: Window) -> None:
         """Take the next window in."""
 
-    def value(self, signal: int) -> float:
-        """The number of the signal in this place.
+    def numbers(self, signals: slice) -> Array:
+        """The numbers of the signals in these places.
 
         Raises:
-            WindowError: the windows do not tell it.
+            WindowError: the windows do not tell one of them.
         """
 
 
@@ -69,18 +69,19 @@ class Merged:
         part = self._part(window)
         self._seen = part if self._seen is None else self._merge(self._seen, part)
 
-    def value(self, signal: int) -> float:
+    def numbers(self, signals: slice) -> Array:
         """As `Fold` has it."""
-        if self._is_nan is not None and self._is_nan[signal]:
-            return np.nan
         if self._seen is None:
             raise WindowError(nothing_in_window())
         if self._numbers is None:
-            self._numbers = self._finish(self._seen)
-        number = float(self._numbers[signal])
-        if self._needs and not number >= 0.0:
-            raise WindowError(self._needs)
-        return number
+            numbers = self._finish(self._seen)
+            self._numbers = numbers if self._is_nan is None else np.where(self._is_nan, np.nan, numbers)
+        found = self._numbers[signals]
+        if self._needs:
+            told = found >= 0.0 if self._is_nan is None else (found >= 0.0) | self._is_nan[signals]
+            if not told.all():
+                raise WindowError(self._needs)
+        return found
 
 
 def largest(values: Array) -> Array:
@@ -104,11 +105,11 @@ def _as_it_is(seen: Array) -> Array:
 
 
 def _least(seen: Array) -> Array:
-    return np.asarray(seen.min(axis=-1))
+    return np.asarray(np.minimum.reduce(seen, axis=-1))
 
 
 def _most(seen: Array) -> Array:
-    return np.asarray(seen.max(axis=-1))
+    return np.asarray(np.maximum.reduce(seen, axis=-1))
 
 
 def _sum(seen: Array) -> Array:
@@ -117,19 +118,19 @@ def _sum(seen: Array) -> Array:
 
 def minimum() -> Fold:
     """The least value."""
-    return Merged(lambda w: w.kept.min(axis=-1), np.minimum, _least, nan="carried")
+    return Merged(lambda w: _least(w.kept), np.minimum, _least, nan="carried")
 
 
 def maximum() -> Fold:
     """The greatest value."""
-    return Merged(lambda w: w.kept.max(axis=-1), np.maximum, _most, nan="carried")
+    return Merged(lambda w: _most(w.kept), np.maximum, _most, nan="carried")
 
 
 def peaks(finish: Callable[[Array], float] | None = None) -> Fold:
     """The greatest magnitude, or what is to be made of that of each row."""
 
     def part(window: Window) -> Array:
-        return np.asarray(np.maximum(window.kept.max(axis=-1), -window.kept.min(axis=-1)) + 0.0)  # never -0
+        return np.asarray(np.maximum(_most(window.kept), -_least(window.kept)) + 0.0)  # never -0
 
     if finish is None:
         return Merged(part, np.maximum, _most, nan="carried")
@@ -161,9 +162,12 @@ def means(finish: Callable[[Array], Array], *, squares: bool = False) -> Fold:
 
     def part(window: Window) -> Array:
         seen = Window(np.square(window.rows), window.selection) if squares else window
-        area = seen.integral()
-        same, duration = np.ones(area.shape), float(window.selection.lengths.sum())
-        return np.array([area, same * duration, total(seen.kept), same * seen.times.size])
+        area, duration = seen.integral(), float(window.selection.lengths.sum())
+        sums = np.zeros((4, *area.shape))
+        sums[0], sums[1], sums[3] = area, duration, seen.times.size
+        if not duration:  # else nobody asks for it
+            sums[2] = total(seen.kept)
+        return sums
 
     def mean(sums: Array) -> Array:
         area, time, sum_of_all, count = sums
@@ -201,7 +205,7 @@ def last_time() -> Fold:
 def jerk() -> Fold:
     """The steepest slope between neighbouring points."""
     return Merged(
-        lambda w: np.abs(w.slopes()).max(axis=-1, initial=-np.inf),
+        lambda w: np.maximum.reduce(np.abs(w.slopes()), axis=-1, initial=-np.inf),
         np.maximum,
         _most,
         needs="jerk needs two neighbouring recorded points in the window",
@@ -238,7 +242,7 @@ def overshoot() -> Fold:
 
     def part(window: Window) -> Array:
         kept = window.kept
-        return np.array([kept[..., 0], kept.max(axis=-1), kept.min(axis=-1)])
+        return np.array([kept[..., 0], _most(kept), _least(kept)])
 
     def merge(before: Array, after: Array) -> Array:
         return np.array([before[0], np.maximum(before[1], after[1]), np.minimum(before[2], after[2])])
@@ -273,12 +277,12 @@ class Value:
             rows = window.rows[..., beside].reshape(-1, time[beside].size)
             self._found = np.array([np.interp(moment, time[beside], row) for row in rows]).reshape(shape)
 
-    def value(self, signal: int) -> float:
+    def numbers(self, signals: slice) -> Array:
         """As `Fold` has it."""
         if self._found is None:
             raise WindowError(f"no recorded points around t = {digits(self._moment)} s")
-        found = self._found[signal]
-        return np.nan if np.isnan(found).any() else float(largest(found))
+        found = self._found[signals]
+        return np.where(np.isnan(found).any(axis=-1), np.nan, largest(found))
 
 
 class MeanJerk:
@@ -327,10 +331,9 @@ class MeanJerk:
         first = int(np.argmax(left)) if left.any() else max(time.size - 1, 0)
         self._time, self._rows, self._starts = time[first:], rows[..., first:], left[first:]
 
-    def value(self, signal: int) -> float:
+    def numbers(self, signals: slice) -> Array:
         """As `Fold` has it."""
-        if self._is_nan[signal]:
-            return np.nan
-        if not np.isfinite(self._largest[signal]):
+        found = np.where(self._is_nan, np.nan, self._largest)[signals]
+        if np.isinf(found).any():
             raise WindowError(f"mean_jerk needs recorded points {digits(self._width)} s apart in the window")
-        return float(self._largest[signal])
+        return found

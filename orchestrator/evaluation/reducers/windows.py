@@ -3,7 +3,7 @@
 from collections.abc import Hashable, Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Any
+from typing import Any, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,6 +14,10 @@ from ...times import digits, slack
 from ..signals import Part, Signals
 
 Array = NDArray[np.float64]
+Places: TypeAlias = tuple[slice, ...] | NDArray[np.intp]
+"""Where points that count are: a few stretches of them, which are copied ten times as fast, or one by one."""
+_STRETCHES = 16
+"""So many of them at most."""
 
 
 @dataclass(frozen=True)
@@ -68,14 +72,14 @@ class Selection:
     Attributes:
         time: all points, shape (T,), in s. points: whether each counts. span: why.
         ends: the same of the ends of intervals, among which is the last point of the part before.
-        kept: where the points that count are, as a slice if they follow one another.
+        kept: where the points that count are.
     """
 
     time: Array
     points: NDArray[np.bool_]
     span: Span
     ends: NDArray[np.bool_]
-    kept: slice | NDArray[np.intp]
+    kept: Places
 
     @classmethod
     def of(cls, time: Array, overlap: int, span: Span) -> "Selection":
@@ -91,29 +95,36 @@ class Selection:
         return np.flatnonzero(self.ends)
 
     @cached_property
-    def between(self) -> slice | NDArray[np.intp]:
+    def between(self) -> Places:
         """Where the intervals that count are."""
         return _places(self.span.intervals(self.time, self.ends))
 
     @cached_property
     def times(self) -> Array:
         """The points that count, in s."""
-        return self.time[self.kept]
+        return at(self.time, self.kept)
 
     @cached_property
     def lengths(self) -> Array:
         """Of the intervals that count, in s."""
-        return np.asarray(np.diff(self.time)[self.between])
+        return at(np.diff(self.time), self.between)
 
 
-def _places(chosen: NDArray[np.bool_]) -> slice | NDArray[np.intp]:
+def _places(chosen: NDArray[np.bool_]) -> Places:
     """Where it is true."""
-    if chosen.all():
-        return slice(0, len(chosen))
-    places = np.flatnonzero(chosen)
-    if places.size and places[-1] - places[0] == places.size - 1:
-        return slice(int(places[0]), int(places[-1]) + 1)
-    return places if places.size else slice(0, 0)
+    ends = np.flatnonzero(np.diff(chosen, prepend=False, append=False)).reshape(-1, 2)
+    if len(ends) > _STRETCHES:
+        return np.flatnonzero(chosen)
+    return tuple(slice(*pair) for pair in ends.tolist()) or (slice(0, 0),)
+
+
+def at(rows: Array, places: Places) -> Array:
+    """Rows at the points that count."""
+    if isinstance(places, np.ndarray):
+        return rows.take(places, axis=-1)
+    if len(places) == 1:
+        return rows[..., places[0]]
+    return np.concatenate([rows[..., stretch] for stretch in places], axis=-1)
 
 
 @dataclass(frozen=True)
@@ -153,21 +164,21 @@ class Window:
     @cached_property
     def kept(self) -> Array:
         """The rows at the points that count."""
-        return _at(self.rows, self.selection.kept)
+        return at(self.rows, self.selection.kept)
 
     def integral(self, rows: Array | None = None) -> Array:
         """Trapezoid rule over the intervals that count, one value a row; of other rows if they are given."""
         values = self.rows if rows is None else rows
-        areas = 0.5 * (values[..., 1:] + values[..., :-1])
-        return total(_at(areas, self.selection.between) * self.selection.lengths)
+        areas = at(values[..., 1:] + values[..., :-1], self.selection.between)
+        areas *= 0.5
+        areas *= self.selection.lengths
+        return total(areas)
 
     def slopes(self) -> Array:
         """Difference quotients over the intervals that count, shape (..., intervals)."""
-        return _at(np.diff(self.rows), self.selection.between) / self.selection.lengths
-
-
-def _at(rows: Array, places: slice | NDArray[np.intp]) -> Array:
-    return rows[..., places] if isinstance(places, slice) else rows.take(places, axis=-1)
+        slopes = at(np.diff(self.rows), self.selection.between)
+        slopes /= self.selection.lengths
+        return slopes
 
 
 def total(values: Array) -> Array:
@@ -210,8 +221,18 @@ def time_windows(outside: Any) -> list[tuple[float, float]]:
     return windows
 
 
-def span_of(signals: Signals, after: Any, until: Any, outside: Any, *, half_open: bool = False) -> Span:
+def span_of(
+    ends: tuple[float, float], step: float, after: Any, until: Any, outside: Any, *, half_open: bool = False
+) -> Span:
     """The window that is asked for in a call of a reducer.
+
+    Args:
+        ends: the first and the last time of the run, in s.
+        step: its communication step, in s.
+        after: as it was given, or None.
+        until: likewise.
+        outside: likewise.
+        half_open: as `Span` has it.
 
     Raises:
         ExpressionError: the arguments are not of the right kind.
@@ -220,10 +241,10 @@ def span_of(signals: Signals, after: Any, until: Any, outside: Any, *, half_open
     start = None if after is None else scalar(after, "after")
     end = None if until is None else scalar(until, "until")
     excluded = [] if outside is None else time_windows(outside)
-    first, last = ends_of(signals)
-    if end is not None and end > last + slack(signals.step, last):
+    first, last = ends
+    if end is not None and end > last + slack(step, last):
         raise WindowError(f"the window lasts until {digits(end)} s but the recorded points end at {digits(last)} s")
-    return Span(start, end, excluded, half_open, first if start is None else start, slack(signals.step, first, last))
+    return Span(start, end, excluded, half_open, first if start is None else start, slack(step, first, last))
 
 
 def ends_of(signals: Signals) -> tuple[float, float]:

@@ -1,5 +1,6 @@
 """How a requirement comes out in a run: the point that decides, and by how much."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Literal
 
@@ -7,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .. import signals as runs
-from ..reducers import Span
+from ..reducers import Selection, Span, at
 from ..syntax import Node
 from .blame import Culprit, Search
 from .values import Formula, horizon
@@ -42,16 +43,17 @@ class Decision:
         self.high: Extreme | None = None
         self._missing: Extreme | None = None
         self._block = (0, 0)
-        final = np.empty(0, np.int64)
+        final: int | None = None
         for first, last in self._blocks():
-            places = formula.within(span, first, last)
-            self.points += len(places)
+            chosen = formula.within(span, first, last)
+            count = chosen.times.size
+            self.points += count
             if word == "finally":
-                final = first + places[-1:] if len(places) else final
-            elif len(places):
-                self._see(first, last, places)
-        if len(final):
-            self._see(int(final[0]), int(final[0]) + 1, np.zeros(1, np.int64))
+                final = first + int(chosen.places[-1]) if count else final
+            elif count:
+                self._see(first, last, chosen)
+        if final is not None:
+            self._see(final, final + 1, None)
         if word in ("finally", "") and self.points:
             self.points = 1
 
@@ -65,11 +67,12 @@ class Decision:
                 size *= int(ahead // size) + 1
         return [(first, min(first + size, count)) for first in range(0, count, size)]
 
-    def _see(self, first: int, last: int, places: NDArray[np.int64]) -> None:
+    def _see(self, first: int, last: int, chosen: Selection | None) -> None:
+        """Take in points from one up to another, all or those chosen."""
         values, block = self.formula.values(self._node, first, last), (first, last)
-        if len(places) < last - first:
-            values = values.of(lambda x: x.take(places, axis=-1))
-        numbers = first + places
+        numbers: Sequence[int] | NDArray[np.int64] = range(first, last)
+        if chosen is not None and chosen.times.size < last - first:
+            values, numbers = values.of(lambda x: at(x, chosen.kept)), first + chosen.places
         new = _least(values.high, numbers)
         if np.isnan(new.value) and (self._missing is None or new.row < self._missing.row):
             self._missing = new
@@ -122,14 +125,14 @@ class Decision:
         return Search(self.formula, *self._block).find(self._node, found.place, not self.holds, found.row)
 
 
-def _least(values: Array, places: NDArray[np.int64]) -> Extreme:
+def _least(values: Array, places: Sequence[int] | NDArray[np.int64]) -> Extreme:
     """The first of the least values, of the row furthest ahead; a NaN is less than all."""
     rows = np.atleast_2d(values)
     row, column = divmod(int(np.argmin(rows)), rows.shape[1])
     return Extreme(float(rows[row, column]), int(places[column]), row, len(rows))
 
 
-def _best(values: Array, places: NDArray[np.int64]) -> Extreme:
+def _best(values: Array, places: Sequence[int] | NDArray[np.int64]) -> Extreme:
     """The first of the greatest values; of rows, which count together, the least."""
     rows = np.atleast_2d(values)
     together = rows.min(axis=0)

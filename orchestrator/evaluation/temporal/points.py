@@ -8,7 +8,8 @@ from numpy.typing import NDArray
 
 from ...times import slack
 from .. import signals as runs
-from ..signals import Part, Signals
+from ..signals import Part
+from ..terms import Prepared
 
 Array = NDArray[np.float64]
 Places = NDArray[np.int64]
@@ -37,12 +38,12 @@ class Points:
         signals: the run. ahead: how many points further ahead expressions look.
     """
 
-    def __init__(self, signals: Signals, ahead: int) -> None:
+    def __init__(self, signals: Prepared, ahead: int) -> None:
         self.signals, self._ahead = signals, ahead
         self.count = signals.points
         self._parts: dict[tuple[int, int], Part] = {}
         self._times: dict[int, float] = {}
-        self.begin, self.end = (self.time(0), self.time(self.count - 1)) if self.count else (np.inf, -np.inf)
+        self.begin, self.end = signals.ends
         self.forgiven = slack(signals.step, self.begin, self.end)
 
     def part(self, first: int, last: int) -> Part:

@@ -5,6 +5,7 @@ and the most that it can be, whatever comes. Mostly they are one.
 """
 
 from collections.abc import Callable, Sequence
+from functools import partial, reduce
 from typing import NamedTuple
 
 import numpy as np
@@ -15,7 +16,7 @@ from ...problems import Problem
 from ...times import digits
 from .. import signals as runs
 from ..calculation import Scope, evaluate
-from ..reducers import Span, scalar
+from ..reducers import Selection, Span, scalar
 from ..signals import Part
 from ..slack import Scales, slack_of
 from ..syntax import CHANGES, Node, Operation, Reference, Temporal, walk
@@ -146,13 +147,13 @@ class Formula:
         match node:
             case Temporal():
                 return self._temporal(node, first, last)
-            case _ if not self.is_temporal(node):
-                return self._plain(node, first, last)
             case Operation(operator="not", operands=(operand,)):
                 return self.values(operand, first, last).negative()
             case Operation(operator="and" | "or" as operator, operands=operands):
                 choose = np.minimum if operator == "and" else np.maximum
-                return _combined(choose.reduce, [self.values(operand, first, last) for operand in operands])
+                return _combined(partial(reduce, choose), [self.values(operand, first, last) for operand in operands])
+            case _ if not self.is_temporal(node):
+                return self._plain(node, first, last)
             case Operation(operator="if", operands=(condition, *branches)):
                 choice = self.choice(condition, first, last)
                 return _combined(
@@ -166,9 +167,9 @@ class Formula:
         """Whether a word of logic over time stands in a part."""
         return self.scope.binding.known(is_temporal, node)
 
-    def within(self, span: Span, first: int, last: int) -> Places:
-        """Which of the points from `first` up to `last` count, counted from the first of them."""
-        return self.scope.of(self.points.part(first, last)).frame.selection(span).places
+    def within(self, span: Span, first: int, last: int) -> Selection:
+        """Which of the points from `first` up to `last` count."""
+        return self.scope.frame.run.frame(self.points.part(first, last)).selection(span)
 
     def choice(self, condition: Node, first: int, last: int) -> Array:
         """The truth of the condition of an `if`."""
@@ -361,7 +362,7 @@ def _opened(found: Bounds, where: NDArray[np.bool_], most: Array) -> Bounds:
 
 
 def _combined(combine: Callable[[Sequence[Array]], Array], parts: list[Bounds]) -> Bounds:
-    low = combine(np.broadcast_arrays(*(part.low for part in parts)))
+    low = np.asarray(combine([part.low for part in parts]))
     if all(part.high is part.low for part in parts):
         return Bounds.exact(low)
-    return Bounds(low, combine(np.broadcast_arrays(*(part.high for part in parts))))
+    return Bounds(low, combine([part.high for part in parts]))

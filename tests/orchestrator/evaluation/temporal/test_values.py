@@ -17,7 +17,7 @@ def bounds(text, run, size=None):
     """The least and the most at every point, found at once or in pieces."""
 
     def look(node, scope):
-        formula, count = Formula(scope, Points(run, 0)), run.points
+        formula, count = Formula(scope, Points(scope.frame.run, 0)), run.points
         pieces = [formula.values(node, k, min(k + (size or count), count)) for k in range(0, count, size or count)]
         return joined(*pieces)
 
