@@ -38,7 +38,7 @@ LOOP_TESTS = [
         for name in ("", "_blocks", "_coupling", "_fmi1", "_fmi3", "_texts")
     ),
     *("tests/orchestrator/master/test_kernel.py", "tests/orchestrator/master/test_threads.py"),
-    "tests/orchestrator/master/test_varying.py",
+    *("tests/orchestrator/master/test_varying.py", "tests/orchestrator/master/algebraic"),
     *("tests/orchestrator/master/test_event_loops.py", "tests/orchestrator/fmi/test_foreign.py"),
 ]
 RUNTIME_TESTS = ["tests/fmus/runtime"]

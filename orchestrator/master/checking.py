@@ -52,7 +52,7 @@ def _against_threads(system: System, models: Mapping[str, Model], wiring: Wiring
         yield "feed-through is refreshed in one thread"
     interfaces = {name: model.interface for name, model in models.items()}
     if system.stepping.algebraic_loops == "solve" and find_loops(interfaces, wiring.every_link, doubtful=True):
-        yield "algebraic loops are solved in Python"
+        yield "algebraic loops are solved in one thread"
     for what, names in _without_threads(system, models).items():
         if names:
             yield f"{what}: {listed(names)}"

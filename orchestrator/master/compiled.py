@@ -83,8 +83,8 @@ class CompiledLoop:
     def __init__(self, coupling: Coupling, algorithm: Programmed) -> None:
         self._coupling, self._algorithm = coupling, algorithm
         self._exchange = coupling.exchange
-        is_shared = kernel.HAS_THREADS and algorithm.takes_threads and coupling.refresher is None
-        is_shared = is_shared and "String" not in self._exchange.kinds  # they are numbered one by one
+        is_shared = kernel.HAS_THREADS and algorithm.takes_threads and "String" not in self._exchange.kinds
+        is_shared = is_shared and coupling.refresher is None and coupling.loops is None
         threads = max(1, min(coupling.settings.threads, len(coupling.slaves))) if is_shared else 1
         self.plan = Plan(coupling, [algorithm.program()], threads=threads)
         self._under_way: tuple[Table, Observer, float, float] | None = None
@@ -228,6 +228,8 @@ class CompiledLoop:
             if failed in self.plan.iterations:
                 self.plan.iterations[failed].give_up(time, step)
                 return False
+            if failed in self.plan.algebra.solving:
+                raise self.plan.algebra.solving[failed].failure(time + step)
             return self._recover(failed, status, time, step)
         except RunError as failure:
             told = failure

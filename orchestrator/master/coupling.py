@@ -4,18 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 
-from ..errors import CouplingError
 from ..fmi import Slave
-from ..times import digits
 from ..wiring import Link
-from .algebraic import LoopSolver
+from .algebraic import SOLVED, LoopSolver
 from .exchange import Exchange
 from .extrapolation import Extrapolator
 from .refresh import Refresher
 from .settings import Settings
-
-_SOLVED = 1e-9
-"""Relative residual up to which an algebraic loop counts as solved."""
 
 
 class Coupling:
@@ -95,22 +90,12 @@ class Coupling:
             if self.refresher is not None:
                 self.refresher.refresh(time)
             if self.loops is not None:
-                self._solve_loops(self.loops, time)
+                if not self.loops.solve(time) <= SOLVED:
+                    raise self.loops.failure(time)
                 if self.refresher is not None:  # what follows from the loops
                     self.refresher.refresh(time)
         finally:
             self.exchange.is_at_point = False
-
-    @staticmethod
-    def _solve_loops(loops: LoopSolver, time: float) -> None:
-        left = loops.solve(time)
-        if not left <= _SOLVED:
-            names = ", ".join(loops.signals[:6])
-            raise CouplingError(
-                f"t = {digits(time)} s: the algebraic loop through {names} has no solution near its "
-                f"last one: it is left "
-                f"with a relative residual of {left:.3g}; take a smaller step, or put a component with memory into it"
-            )
 
     def tolerances(self, default: float, own: Mapping[str, float] | None = None) -> list[tuple[float, float]]:
         """Relative and absolute tolerance of each value.

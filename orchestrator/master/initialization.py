@@ -63,9 +63,8 @@ def _sweep(exchange: Exchange, sequence: Sequence[Slave], time: float) -> None:
 
 
 def _solve(exchange: Exchange, sequence: Sequence[Slave], time: float, moving: Sequence[int]) -> list[int]:
-    unknown = [k for k in moving if exchange.kinds[k] == "Real"]
     names = ", ".join(exchange.signals[k] for k in moving[:6]) + (", ..." if len(moving) > 6 else "")
-    solver = LoopSolver(exchange, unknown)
+    solver = LoopSolver(exchange, moving)
     worst = math.inf
     try:
         for _ in range(_ATTEMPTS):
@@ -74,7 +73,7 @@ def _solve(exchange: Exchange, sequence: Sequence[Slave], time: float, moving: S
             _sweep(exchange, sequence, time)
             worst = max(left, _largest_change(found, exchange.values))
             if worst <= _SOLVED:
-                return unknown
+                return solver.reals
     except LostError:
         raise
     except (FmuError, ValueError, OverflowError) as error:

@@ -246,9 +246,11 @@ class Blocks:
     def _check(self, failed: int, status: int) -> None:
         """Raise if an FMU was lost, or gives no state back: what else may fail is tried again."""
         slave, call = self._plan.culprits[failed]
+        if slave is None:  # nothing was called: a loop has no solution
+            return
         kind, late = self._plan.operations[failed][0], self._plan.late[failed]
         assert isinstance(slave, LoadedSlave)
-        is_of_end = kind in (Kind.GET, Kind.READ) or (kind == Kind.SET and late)
+        is_of_end = kind in (Kind.GET, Kind.READ, Kind.ASK) or (kind == Kind.SET and late)
         slave.time = float(self._control["called_at"][0] + is_of_end * self._control["called_for"][0])
         if status >> 32 > 0:
             raise slave.lose(said(call, status >> 32, (status & 0x7FFFFFFF) - (status & 0x80000000)))

@@ -1,4 +1,4 @@
-from .arrays import ElementsChannel
+from .arrays import ElementsChannel, whole_arrays
 from .channel import FmuChannel, MixedChannel
 from .fmi1 import Fmi1Slave
 from .fmi2 import FmuSlave
@@ -26,4 +26,5 @@ __all__ = [
     "names_of_platform",
     "plain_interface",
     "read_interface",
+    "whole_arrays",
 ]

@@ -66,6 +66,7 @@ class FmuSlave(LoadedSlave):
     SET, GET, DO_STEP = "fmi2Set", "fmi2Get", "fmi2DoStep"
     TERMINATE, RESET, FREE, CANCEL = "fmi2Terminate", "fmi2Reset", "fmi2FreeInstance", "fmi2CancelStep"
     INTERPOLATE = "fmi2SetRealInputDerivatives"
+    DERIVE = "fmi2GetDirectionalDerivative"
     STATE = (
         "fmi2GetFMUstate",
         "fmi2SetFMUstate",
@@ -127,5 +128,5 @@ class FmuSlave(LoadedSlave):
         rows, columns = self.references(unknowns), self.references(knowns)
         found = (c_double * len(unknowns))()
         given = (c_double * len(knowns))(*seed)
-        self.call("fmi2GetDirectionalDerivative", rows, len(unknowns), columns, len(knowns), given, found)
+        self.call(self.DERIVE, rows, len(unknowns), columns, len(knowns), given, found)
         return list(found)

@@ -96,6 +96,7 @@ class Fmi3Slave(LoadedSlave):
     SIGNATURES, TYPES = _SIGNATURES, _TYPES
     SET, GET, DO_STEP = "fmi3Set", "fmi3Get", "fmi3DoStep"
     TERMINATE, RESET, FREE = "fmi3Terminate", "fmi3Reset", "fmi3FreeInstance"
+    DERIVE = "fmi3GetDirectionalDerivative"
     STATE = (
         "fmi3GetFMUState",
         "fmi3SetFMUState",
@@ -185,8 +186,6 @@ class Fmi3Slave(LoadedSlave):
         rows, columns = self.references(all_unknowns), self.references(all_knowns)
         found, seeds = (c_double * len(all_unknowns))(), dict(zip(knowns, seed, strict=True))
         given = (c_double * len(all_knowns))(*(seeds.get(name, 0.0) for name in all_knowns))
-        self.call(
-            "fmi3GetDirectionalDerivative", rows, len(rows), columns, len(columns), given, len(given), found, len(found)
-        )
+        self.call(self.DERIVE, rows, len(rows), columns, len(columns), given, len(given), found, len(found))
         by_name = dict(zip(all_unknowns, found, strict=True))
         return [by_name[name] for name in unknowns]

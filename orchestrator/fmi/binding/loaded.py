@@ -59,6 +59,8 @@ class LoadedSlave(Stepping):
     FREE: ClassVar[str]
     CANCEL: ClassVar[str] = ""
     INTERPOLATE: ClassVar[str] = ""
+    DERIVE: ClassVar[str] = ""
+    """The function that gives directional derivatives."""
     STATE: ClassVar[tuple[str, str, str, str, str, str]]
     """The functions that get, set, free, measure, serialize and deserialize a saved state."""
     COUNTS_VALUES: ClassVar[bool] = False

@@ -19,13 +19,11 @@ _NAMES = {
         "setup": "fmi2SetupExperiment",
         "enter_initialization": "fmi2EnterInitializationMode",
         "exit_initialization": "fmi2ExitInitializationMode",
-        "directional_derivatives": "fmi2GetDirectionalDerivative",
     },
     "3.0": {
         "instantiate": "fmi3InstantiateCoSimulation",
         "enter_initialization": "fmi3EnterInitializationMode",
         "exit_initialization": "fmi3ExitInitializationMode",
-        "directional_derivatives": "fmi3GetDirectionalDerivative",
     },
 }
 """Functions of the standard by what they are for, where the classes do not name them."""
@@ -38,7 +36,7 @@ def call_name(interface: Interface, call: str, kind: Type, names: Sequence[str])
         own = interface.variables[names[0]].fmi_type if names else ""
         return f"{slave.SET if call == 'set' else slave.GET}{slave.TYPES[own or kind][0]}"
     known = {"step": slave.DO_STEP, "terminate": slave.TERMINATE, "reset": slave.RESET, "free": slave.FREE}
-    known |= {"interpolate": slave.INTERPOLATE} | _NAMES[interface.version]
+    known |= {"interpolate": slave.INTERPOLATE, "directional_derivatives": slave.DERIVE} | _NAMES[interface.version]
     states = getattr(slave, "STATE", ())  # FMI 1.0 has none
     known |= dict(zip(("save", "restore", "forget", "size", "serialize", "deserialize"), states, strict=False))
     return known.get(call) or call

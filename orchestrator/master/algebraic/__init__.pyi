@@ -1,4 +1,5 @@
 from .finding import find_feeders, find_loops
-from .solver import LoopSolver
+from .roots import SOLVED
+from .solver import NUMBERS, LoopSolver
 
-__all__ = ["LoopSolver", "find_feeders", "find_loops"]
+__all__ = ["NUMBERS", "SOLVED", "LoopSolver", "find_feeders", "find_loops"]

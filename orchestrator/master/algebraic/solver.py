@@ -1,26 +1,34 @@
-"""Algebraic loops: where values depend on themselves at one instant, and what they must be there.
+"""Algebraic loops: what values must be that depend on themselves at one instant.
 
-A loop is found in the dependencies that the FMUs list, or by exchange that does not settle. It is solved through set
-and get alone, by Newton's method in the form of Powell's hybrid (MINPACK, through SciPy), with the FMUs' directional
-derivatives where they give them and finite differences where not.
+They are solved for through set and get alone, by Newton's method (`roots`) with the FMUs' directional derivatives where
+they give them and finite differences where not. The compiled loop does the same (``native/algebraic/solving.c``).
 """
 
 from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
+from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
-from ...errors import FmuError
+from ...errors import CouplingError, FmuError, LostError
 from ...fmi import Slave
+from ...times import digits
 from ..exchange import Exchange
+from .roots import SETTLED, SOLVED, Vector, find_root, relative
 
 _DIFFERENCE = 1e-7
 """Relative step of finite differences: the square root of the rounding error, and a little more."""
 _ATTEMPTS = 8
-"""How often what is no real number may change with the solution."""
+"""How often what is no real number may change with the solution, and once more for each of them."""
+_BEGINS = 4
+"""From how many values it is begun: where it leads nowhere, once more from what the last ones lead to."""
+_REFUSALS = ("", "error", "discard")
+"""Statuses by which an FMU gives no directional derivatives, and still lives."""
+NUMBERS = 3
+"""How often it was solved, the worst mismatch that was left at any point, and the one that was left last."""
+_SOLUTIONS, _WORST, _LEFT = range(NUMBERS)
 
 
 class LoopSolver:
@@ -31,25 +39,54 @@ class LoopSolver:
         places: where the unknown values stand. What is no real number among them follows from the others: each solution
             is passed on until it changes nothing any more.
         feeders: instances that pass on at once what others give, in their order: they are brought up to date first.
+
+    Attributes:
+        reals: places of the unknown real numbers. others: and of what else is passed on.
+        instances: those that give or take them. rows: of each the numbers of the real ones that it gives.
+        attempts: how often others may change. numbers: what is counted; the compiled loop goes on with them.
     """
 
     def __init__(self, exchange: Exchange, places: Sequence[int], feeders: Sequence[Slave] = ()) -> None:
-        self._exchange, self._feeders = exchange, feeders
-        self._places = [k for k in places if exchange.kinds[k] == "Real"]
-        self._others = [k for k in places if exchange.kinds[k] != "Real"]
+        self._exchange, self.feeders = exchange, feeders
+        self.reals = [k for k in places if exchange.kinds[k] == "Real"]
+        self.others = [k for k in places if exchange.kinds[k] != "Real"]
         self.signals = [exchange.signals[k] for k in places]
-        self.residual = 0.0
-        """The worst relative mismatch that was left at any point."""
-        self.solutions = 0
-        """How often it had to be solved."""
+        self.attempts = _ATTEMPTS + len(self.others)
+        self.numbers = np.zeros(NUMBERS)
         at = frozenset(places)
         owners = {exchange.owners[k] for k in places}
         owners |= {link.target[0] for link in exchange.every_link if exchange.places[link.source] in at}
-        self._instances = [slave for name, slave in exchange.slaves.items() if name in owners]
-        self._outputs = {
-            slave.name: [n for n, k in enumerate(self._places) if exchange.owners[k] == slave.name]
-            for slave in self._instances
+        self.instances = [slave for name, slave in exchange.slaves.items() if name in owners]
+        self.rows = {
+            slave.name: [n for n, k in enumerate(self.reals) if exchange.owners[k] == slave.name]
+            for slave in self.instances
         }
+        self._fixed: list[Any] = []
+        self._reached = np.zeros(len(self.reals))
+
+    def use(self, numbers: Vector) -> None:
+        """Count from now on in another array, which has what the present one has."""
+        self.numbers = numbers
+
+    @property
+    def residual(self) -> float:
+        """The worst relative mismatch that was left at any point."""
+        return float(self.numbers[_WORST])
+
+    @property
+    def left(self) -> float:
+        """The relative mismatch that was left last."""
+        return float(self.numbers[_LEFT])
+
+    @property
+    def solutions(self) -> int:
+        """How often it had to be solved."""
+        return int(self.numbers[_SOLUTIONS])
+
+    def name_of(self, row: int) -> str:
+        """The variable of an instance that one of the unknown real numbers is."""
+        place = self.reals[row]
+        return self._exchange.signals[place].removeprefix(f"{self._exchange.owners[place]}.")
 
     def solve(self, time: float) -> float:
         """Find the values at a time in s, beginning at the present ones, and leave them in the exchange and as inputs.
@@ -60,87 +97,90 @@ class LoopSolver:
         Raises:
             FmuError: an FMU failed.
         """
-        values, left = self._exchange.values, math.inf
-        for slave in self._feeders:
+        values = self._exchange.values
+        for slave in self.feeders:
             self._exchange.write(slave.name, time)
             self._exchange.read(slave, time)
-        for _ in range(_ATTEMPTS):
-            left = self._solve(time)
-            if not self._others:
+        for _ in range(self.attempts):
+            self._fixed = [values[k] for k in self.others]
+            with np.errstate(all="ignore"):
+                left = self._solve(time)
+            if self._fixed == [values[k] for k in self.others]:
                 break
-            reals = np.array([values[k] for k in self._places], dtype=np.float64)
-            others = [values[k] for k in self._others]
-            left = max(left, _relative(self._mismatch(reals, time), reals))
-            if others != [values[k] for k in self._others]:
-                left = math.inf
-            elif left <= _AGREE:
-                break
-        self.residual = max(self.residual, left)
+        else:
+            left = math.inf
+        self.numbers[_WORST], self.numbers[_LEFT] = max(self.residual, left), left
         return left
+
+    def failure(self, time: float) -> CouplingError:
+        """What to say of a solution at a time in s that leaves too much."""
+        names = ", ".join(self.signals[:6])
+        return CouplingError(
+            f"t = {digits(time)} s: the algebraic loop through {names} has no solution near its "
+            f"last one: it is left "
+            f"with a relative residual of {self.left:.3g}; take a smaller step, or put a component with memory into it"
+        )
 
     def _solve(self, time: float) -> float:
-        """The same for the real numbers, whatever the others are."""
-        values = self._exchange.values
-        given = np.array([values[k] for k in self._places], dtype=np.float64)
-        given[~np.isfinite(given)] = 0.0
-        found = given + self._mismatch(given, time)
-        left = _relative(found - given, found)
-        if not left <= _SETTLED:
-            from scipy import optimize
+        """The same for the real numbers, with the others as they are fixed."""
 
-            self.solutions += 1
-            with np.errstate(all="ignore"):
-                solution = optimize.root(
-                    self._mismatch, given, args=(time,), jac=self._jacobian, method="hybr", options={"xtol": 1e-14}
-                ).x
-            left = self._remaining(solution, time)
-            found = solution + self._mismatch(solution, time)
-        for place, value in zip(self._places, found, strict=True):
-            values[place] = float(value)
+        def evaluate(candidate: Vector) -> Vector:
+            return self._mismatch(candidate, time)
+
+        given = np.array([self._exchange.values[k] for k in self.reals], dtype=np.float64)
+        given[~np.isfinite(given)] = 0.0
+        mismatch = evaluate(given)
+        left = relative(mismatch, self._reached)
+        if left <= SETTLED:
+            return left
+        self.numbers[_SOLUTIONS] += 1.0
+        for attempt in range(_BEGINS):
+            if attempt > 0:
+                given = self._reached
+                if not np.isfinite(given).all():
+                    break
+                mismatch = evaluate(given)
+            found, left, is_shown = find_root(evaluate, lambda at: self._jacobian(at, time), given, mismatch)
+            if not is_shown:
+                evaluate(found)
+            if left <= SOLVED:
+                break
         return left
 
-    def _remaining(self, solution: NDArray[np.float64], time: float) -> float:
-        """The larger of the relative mismatch and of Newton's next correction.
+    def _place(self, candidate: Vector) -> None:
+        """Put values where they stand, beside the others as they are fixed."""
+        values = self._exchange.values
+        for place, value in zip(self.reals, candidate.tolist(), strict=True):
+            values[place] = value
+        for place, other in zip(self.others, self._fixed, strict=True):
+            values[place] = other
 
-        A small mismatch alone proves nothing: x = x + 1 has one at any x that is large enough.
-        """
-        if not np.isfinite(solution).all():
-            return math.inf
-        mismatch = self._mismatch(solution, time)
-        try:
-            correction = np.linalg.solve(self._jacobian(solution, time), mismatch)
-        except np.linalg.LinAlgError:
-            return math.inf
-        return max(_relative(mismatch, solution), _relative(np.asarray(correction, dtype=np.float64), solution))
-
-    def _mismatch(self, candidate: NDArray[np.float64], time: float) -> NDArray[np.float64]:
+    def _mismatch(self, candidate: Vector, time: float) -> Vector:
         """Outputs that the candidate values lead to, minus the candidate."""
         exchange = self._exchange
-        for place, value in zip(self._places, candidate, strict=True):
-            exchange.values[place] = float(value)
-        for slave in self._instances:
+        self._place(candidate)
+        for slave in self.instances:
             exchange.write(slave.name, time)
-        for slave in self._instances:
+        for slave in self.instances:
             exchange.read(slave, time)
-        return np.array([exchange.values[k] for k in self._places]) - candidate
+        self._reached = np.array([exchange.values[k] for k in self.reals], dtype=np.float64)
+        return self._reached - candidate
 
-    def _jacobian(self, candidate: NDArray[np.float64], time: float) -> NDArray[np.float64]:
-        """Derivatives of the mismatch, one column for each unknown."""
-        base = candidate + self._mismatch(candidate, time)
-        for place, value in zip(self._places, candidate, strict=True):
-            self._exchange.values[place] = float(value)
-        jacobian = -np.eye(len(self._places))
-        for slave in self._instances:
-            rows = self._outputs[slave.name]
+    def _jacobian(self, candidate: Vector, time: float) -> Vector:
+        """Derivatives of the mismatch, one column for each unknown, at the values at which it was evaluated last."""
+        self._place(candidate)
+        jacobian = -np.eye(len(self.reals))
+        for slave in self.instances:
+            rows = self.rows[slave.name]
             if not rows:
                 continue
-            for column, place in enumerate(self._places):
+            for column, place in enumerate(self.reals):
                 seeds = self._seeds(slave.name, place)
                 if not seeds:
                     continue
                 slopes = self._directional(slave, rows, seeds)
                 if slopes is None:
-                    slopes = self._differences(slave, rows, place, time, base=base)
+                    slopes = self._differences(slave, rows, place, time)
                 jacobian[rows, column] += slopes
         return jacobian
 
@@ -155,37 +195,26 @@ class LoopSolver:
                     seeds[feed.targets[k]] = feed.scales[k] * factor
         return seeds
 
-    def _directional(self, slave: Slave, rows: Sequence[int], seeds: Mapping[str, float]) -> NDArray[np.float64] | None:
+    def _directional(self, slave: Slave, rows: Sequence[int], seeds: Mapping[str, float]) -> Vector | None:
         """What the FMU itself says; None where it says nothing."""
         if not slave.interface.directional_derivatives or self._exchange.output_changes:
             return None
-        unknowns = [self.signals[n].removeprefix(f"{slave.name}.") for n in rows]
+        unknowns = [self.name_of(n) for n in rows]
         try:
             return np.array(slave.directional_derivatives(unknowns, list(seeds), list(seeds.values())))
-        except FmuError:  # it promised too much; differences do as well
-            return None
+        except FmuError as error:
+            if isinstance(error, LostError) or error.status not in _REFUSALS:
+                raise
+            return None  # it promised too much; differences do as well
 
-    def _differences(
-        self, slave: Slave, rows: Sequence[int], place: int, time: float, *, base: NDArray[np.float64]
-    ) -> NDArray[np.float64]:
+    def _differences(self, slave: Slave, rows: Sequence[int], place: int, time: float) -> Vector:
         exchange = self._exchange
         kept = list(exchange.values)
         moved = kept[place] + _DIFFERENCE * max(1.0, abs(kept[place]))
         exchange.values[place] = moved
         exchange.write(slave.name, time)
         exchange.read(slave, time)
-        reached = np.array([exchange.values[self._places[n]] for n in rows])
+        reached = np.array([exchange.values[self.reals[n]] for n in rows])
         exchange.values[:] = kept
         exchange.write(slave.name, time)
-        return np.asarray((reached - base[list(rows)]) / (moved - kept[place]))
-
-
-_AGREE = 1e-9
-"""Relative mismatch up to which what is no real number is taken to fit the real ones."""
-_SETTLED = 1e-13
-"""Relative mismatch below which nothing is solved."""
-
-
-def _relative(difference: NDArray[np.float64], values: NDArray[np.float64]) -> float:
-    largest = np.max(np.abs(difference) / np.maximum(1.0, np.abs(values)), initial=0.0)
-    return float(largest) if math.isfinite(largest) else math.inf
+        return np.asarray((reached - self._reached[list(rows)]) / (moved - kept[place]))

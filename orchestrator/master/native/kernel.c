@@ -7,8 +7,8 @@
    and takes over between blocks for progress, flushing and interruption.
 
    This file is what Python sees of it; plan.c makes a plan of Python's arrays, stepping.c takes the steps, team.c with
-   several threads, adaptive.c chooses how long they are; loops.c repeats them, with acceleration.c, and courses.c continues
-   inputs. growth.c looks at what came of them. */
+   several threads, adaptive.c chooses how long they are; loops.c repeats them, with acceleration.c, algebraic/ solves loops
+   within an instant, and courses.c continues inputs. growth.c looks at what came of them. */
 
 #include "growth.h"
 #include "plan.h"
@@ -75,8 +75,8 @@ static int take(Plan *plan, const Block *block, Control *control, Outcome *outco
 }
 
 PyDoc_STRVAR(run_doc,
-    "run(operations, parts, channels, instances, entries, references, forms, courses, notes, loops, passed, points, states,\n"
-    "    work, stamps, changes, kept, values, history, newest, table, row, places, disturbed, control, texts, every, start,\n"
+    "run(operations, parts, channels, instances, entries, references, forms, courses, notes, loops, solvers,\n"
+    "    parties, terms, passed, points, states, work, stamps, changes, kept, values, history, newest, table, row, places, disturbed, control, texts, every, start,\n"
     "    step, first, count, last) -> (done, written, newest)\n\n"
     "Take up to `count` communication steps from number `first`. Of every `every`-th step and of step number `last` the\n"
     "time and the values that are `kept`, by place, become the next elements of the columns of `table`, one after the\n"
@@ -94,8 +94,8 @@ static PyObject *run(PyObject *module, PyObject *arguments)
     Py_ssize_t newest, row;
     PyObject *result = NULL, *texts;
     (void)module;
-    if (!PyArg_ParseTuple(arguments, "y*y*y*y*y*y*y*y*y*y*y*w*w*w*w*y*y*w*w*nw*nw*w*w*OLddLLL:run", &b[OPERATIONS], &b[PARTS], &b[CHANNELS],
-                          &b[INSTANCES], &b[ENTRIES], &b[REFERENCES], &b[FORMS], &b[COURSES], &b[NOTES], &b[LOOPS], &b[PASSED],
+    if (!PyArg_ParseTuple(arguments, "y*y*y*y*y*y*y*y*y*y*y*y*y*y*w*w*w*w*y*y*w*w*nw*nw*w*w*OLddLLL:run", &b[OPERATIONS], &b[PARTS], &b[CHANNELS],
+                          &b[INSTANCES], &b[ENTRIES], &b[REFERENCES], &b[FORMS], &b[COURSES], &b[NOTES], &b[LOOPS], &b[SOLVERS], &b[PARTIES], &b[TERMS], &b[PASSED],
                           &b[POINTS], &b[STATES], &b[WORK], &b[STAMPS], &b[CHANGES], &b[KEPT], &b[VALUES], &b[HISTORY],
                           &newest, &b[TABLE], &row, &b[PLACES], &b[DISTURBED], &b[CONTROL], &texts, &block.every, &block.start, &block.step,
                           &block.first, &block.count, &block.last)) {

@@ -11,6 +11,8 @@
 
 #include "../../fmi/guard/native/floats.h"
 #include "../../fmi/guard/native/guard.h"
+#include "algebraic/solver.h"
+#include "loops.h"
 
 #include <stddef.h>
 #include <stdint.h>
@@ -25,6 +27,7 @@ enum {
     OPERATION_BEGIN = 9, OPERATION_MARK = 10, OPERATION_END = 11, /* what is repeated: see `Loop` */
     OPERATION_SAVE = 12, OPERATION_RESTORE = 13, OPERATION_FORGET = 14, /* states */
     OPERATION_NOTE = 15, /* inputs that have been set */
+    OPERATION_SOLVE = 16, OPERATION_ASK = 17, /* algebraic loops, and for derivatives: see `Solver` */
 };
 
 enum { AS_IT_IS = 0, TRUE_ABOVE = 1, ROUNDED_UP = 2 };
@@ -94,7 +97,7 @@ typedef struct {
 
 typedef struct {
     int32_t kind;
-    int32_t index;  /* of the channel, instance, change, course, loop or state */
+    int32_t index;  /* of the channel, instance, change, course, loop, state, solver or party */
     int32_t period; /* it is due in every so manyth step, */
     int32_t phase;  /* in those with this rest */
     int32_t is_watched; /* whether it may change how numbers are rounded */
@@ -137,32 +140,6 @@ typedef struct {
     uint64_t handle; /* that the FMU gave; 0 */
 } State;
 
-/* What is repeated: BEGIN; what comes before each but the first round; MARK; a round; END.
-
-   A circle goes round until no value changes; after so many rounds all are again as they were. An iteration goes round
-   until what is passed on agrees with what was guessed; after so many rounds it is lost.
-
-   Its numbers stand in the work space: a head, and of a circle all values as they were before it and before this round;
-   of an iteration what iteration.py lays out there. */
-typedef struct {
-    int64_t kind;
-    int64_t limit; /* rounds */
-    int64_t work;  /* where its numbers begin */
-    int64_t begin; /* first of the places of the values that are compared: so many real numbers, */
-    int64_t real_count;
-    int64_t guess_count; /* of which the first are guessed, */
-    int64_t other_count; /* and others */
-    int64_t method; /* by which the next guess is made */
-    double relaxation;
-} Loop;
-
-enum { CIRCLE = 0, ITERATION = 1 };
-
-enum { RELAXED = 0, AITKEN = 1, ANDERSON = 2 };
-
-/* The head of a loop's numbers. */
-enum { ROUND, COMPARED, ROUNDS, MOST_ROUNDS, RESIDUAL, HEAD = 8 };
-
 /* How far a part of a step that was left has got; each thread has one. The others go on with a part that has failed only
    when it is said to have not: by who knows what comes first, and whether it can be helped. */
 typedef struct {
@@ -175,7 +152,7 @@ typedef struct {
 
 typedef enum {
     STEP, SET_REALS_IN_PLACE, SET_REALS, SET_INTEGERS, GET_REALS, GET_INTEGERS, CHANGE, STEP_3, SET_3, GET_3, SET_TEXTS, GET_TEXTS, LOOK, STAMP, EXTEND,
-    SLOPES, SAVE, RESTORE, FORGET, NOTE, BEGIN, MARK, END,
+    SLOPES, SAVE, RESTORE, FORGET, NOTE, ASK, BEGIN, MARK, END, SOLVE,
 } Kind;
 
 /* Texts by number (types/texts.c). */
@@ -193,6 +170,7 @@ typedef struct {
         State *state;
         Loop *loop;
         const Noting *noting;
+        const Solver *solver;
     };
 } Call;
 
@@ -234,7 +212,11 @@ typedef struct {
     double *stamps; /* what time each of the values belongs to; NULL where nobody asks */
     Loop *loops;
     size_t *loop_groups; /* of each loop those of BEGIN and MARK, from 1 */
-    const int64_t *passed; /* places of the values that loops compare */
+    const Solver *solvers;
+    const Party *parties;
+    const Term *terms;
+    size_t *group_of; /* of each operation its group */
+    const int64_t *passed; /* places of the values that loops compare, and that are solved for */
     double *work;
     const int64_t *forms; /* of the values; NULL where all of them are numbers */
     Texts *texts;         /* NULL where none of them is one */
@@ -325,6 +307,8 @@ static inline int is_plain(const Entry *entry)
     return entry->scale == 1.0 && entry->offset == 0.0 && entry->whole == AS_IT_IS && entry->change < 0;
 }
 
+int are_same(double a, double b); /* the bits of a whole number may be no number */
+
 /* What an entry makes of the value that it reads. */
 double read_entry(const Plan *plan, const Entry *entry, double time);
 
@@ -358,18 +342,21 @@ void begin_loop(const Plan *plan, const Loop *loop);
 void begin_round(const Plan *plan, const Loop *loop);
 Way_on end_round(const Plan *plan, const Loop *loop);
 
-/* How many numbers a loop needs in the work space. */
-size_t work_of(const Plan *plan, const Loop *loop);
+size_t work_of(const Plan *plan, const Loop *loop); /* numbers in the work space */
 
 /* The next guess in the place of the last one, from what it led to; 0 if it is not finite (acceleration.c). */
 int accelerate(int64_t method, double relaxation, size_t count, int is_first, double *guess, double *reached,
                double *work);
 
-/* How many numbers that needs in the work space. */
-size_t work_of_acceleration(int64_t method, size_t count);
+size_t work_of_acceleration(int64_t method, size_t count); /* numbers in the work space */
 
-/* That of a block of which nothing is done. */
-Outcome outcome_of(const Block *block);
+/* Operations from one to another, whenever they are due; NULL, or the call that failed. */
+const Call *take_calls(Hand *hand, int64_t from, int64_t to, const Advance *it, int *status);
+
+/* After a call of one that may change how numbers are rounded: they are rounded as before, and that is noted. */
+void look_at_floats(const Hand *hand, const Advance *it);
+
+Outcome outcome_of(const Block *block); /* nothing is done of it */
 
 /* One part of a communication step, from its place on. */
 void take_part(Hand *hand, int part, const Advance *it, Place *place);

@@ -84,9 +84,9 @@ void begin_round(const Plan *plan, const Loop *loop)
     }
 }
 
-static int are_same(double a, double b)
+int are_same(double a, double b)
 {
-    return a == b || memcmp(&a, &b, sizeof a) == 0; /* the bits of a whole number may be no number */
+    return a == b || memcmp(&a, &b, sizeof a) == 0;
 }
 
 static Way_on end_circle(const Plan *plan, const Loop *loop)

@@ -11,13 +11,13 @@
 #include <string.h>
 
 static const char *const buffer_names[N_BUFFERS] = {
-    "operations", "parts", "channels", "instances", "entries", "references", "forms", "courses", "notes", "loops", "passed",
-    "points", "states", "work", "stamps", "changes", "kept", "values", "history", "table", "places", "disturbed", "control",
+    "operations", "parts", "channels", "instances", "entries", "references", "forms", "courses", "notes", "loops", "solvers", "parties",
+    "terms", "passed", "points", "states", "work", "stamps", "changes", "kept", "values", "history", "table", "places", "disturbed", "control",
 };
 static const size_t buffer_sizes[N_BUFFERS] = {
     sizeof(Operation), sizeof(int64_t), sizeof(Channel), sizeof(Instance), sizeof(Entry),
     sizeof(unsigned),  sizeof(int64_t), sizeof(Course),  sizeof(Noting),   sizeof(Loop),
-    sizeof(int64_t),   sizeof(Points),  sizeof(State),   sizeof(double),   sizeof(double),
+    sizeof(Solver), sizeof(Party), sizeof(Term), sizeof(int64_t),   sizeof(Points),  sizeof(State),   sizeof(double),   sizeof(double),
     sizeof(Change),    sizeof(int64_t), sizeof(double),  sizeof(double),   sizeof(double),
     sizeof(Place),     sizeof(int64_t), sizeof(Control),
 };
@@ -107,6 +107,10 @@ static int resolve(Plan *plan, const Py_buffer *buffers, const Operation *operat
         return resolve_note(plan, buffers, operation, group, call);
     case OPERATION_BEGIN: case OPERATION_MARK: case OPERATION_END:
         return resolve_loop(plan, buffers, operation, group, call);
+    case OPERATION_SOLVE:
+        return resolve_solver(plan, buffers, operation, group, call);
+    case OPERATION_ASK:
+        return resolve_ask(plan, buffers, operation, group, call);
     default:
         return resolve_state(buffers, operation, group, call);
     }
@@ -127,6 +131,7 @@ void free_plan(Plan *plan)
     free(plan->groups);
     free(plan->bounds);
     free(plan->loop_groups);
+    free(plan->group_of);
 }
 
 /* Where the operations of each part end: one part, or for each of n threads one that sets and steps, and then for each
@@ -208,6 +213,9 @@ int make_plan(Plan *plan, const Py_buffer *buffers, Py_ssize_t newest)
     plan->points = buffers[POINTS].buf;
     plan->stamps = length(buffers, STAMPS) == 0 ? NULL : buffers[STAMPS].buf;
     plan->loops = buffers[LOOPS].buf;
+    plan->solvers = buffers[SOLVERS].buf;
+    plan->parties = buffers[PARTIES].buf;
+    plan->terms = buffers[TERMS].buf;
     plan->passed = buffers[PASSED].buf;
     plan->work = buffers[WORK].buf;
     plan->disturbed = buffers[DISTURBED].buf;
@@ -218,7 +226,8 @@ int make_plan(Plan *plan, const Py_buffer *buffers, Py_ssize_t newest)
     plan->calls = calloc(count + 1, sizeof *plan->calls);
     plan->groups = calloc(count + 1, sizeof *plan->groups);
     plan->loop_groups = calloc(2 * length(buffers, LOOPS) + 1, sizeof *plan->loop_groups);
-    if (plan->calls == NULL || plan->groups == NULL || plan->loop_groups == NULL) {
+    plan->group_of = calloc(count + 1, sizeof *plan->group_of);
+    if (plan->calls == NULL || plan->groups == NULL || plan->loop_groups == NULL || plan->group_of == NULL) {
         PyErr_NoMemory();
         return 0;
     }
@@ -239,6 +248,7 @@ int make_plan(Plan *plan, const Py_buffer *buffers, Py_ssize_t newest)
         } else {
             plan->group_count++;
         }
+        plan->group_of[n] = plan->group_count - 1;
     }
     for (size_t n = part + 1; n <= length(buffers, PARTS); n++) {
         plan->bounds[n] = plan->group_count;

@@ -12,7 +12,7 @@
 
 /* Buffers in the sequence of the arguments; `points` and what follows is written. */
 enum {
-    OPERATIONS, PARTS, CHANNELS, INSTANCES, ENTRIES, REFERENCES, FORMS, COURSES, NOTES, LOOPS, PASSED, POINTS, STATES, WORK, STAMPS,
+    OPERATIONS, PARTS, CHANNELS, INSTANCES, ENTRIES, REFERENCES, FORMS, COURSES, NOTES, LOOPS, SOLVERS, PARTIES, TERMS, PASSED, POINTS, STATES, WORK, STAMPS,
     CHANGES, KEPT, VALUES, HISTORY, TABLE, PLACES, DISTURBED, CONTROL,
     N_BUFFERS
 };
@@ -38,13 +38,19 @@ static inline int is_within(int64_t begin, int64_t count, size_t length)
     return begin >= 0 && (uint64_t)begin <= length && (uint64_t)count <= length - (uint64_t)begin;
 }
 
-/* What an operation on a channel, a course, a state or a loop is (resolving.c); 0 if it points outside the plan. */
+/* Whether an entry reads what is there. */
+int is_entry(const Plan *plan, const Entry *entry, size_t change_count);
+
+/* What an operation on a channel, a course, a state, a loop or a solver is (resolving.c, algebraic/checking.c); 0 if it points outside the plan. */
 int resolve_channel(const Plan *plan, const Py_buffer *buffers, const Operation *operation, int64_t index, Group *group,
                     Call *call);
 int resolve_course(Plan *plan, const Py_buffer *buffers, const Operation *operation, Group *group, Call *call);
 int resolve_note(const Plan *plan, const Py_buffer *buffers, const Operation *operation, Group *group, Call *call);
 int resolve_state(const Py_buffer *buffers, const Operation *operation, Group *group, Call *call);
 int resolve_loop(Plan *plan, const Py_buffer *buffers, const Operation *operation, Group *group, Call *call);
+
+int resolve_solver(Plan *plan, const Py_buffer *buffers, const Operation *operation, Group *group, Call *call);
+int resolve_ask(const Plan *plan, const Py_buffer *buffers, const Operation *operation, Group *group, Call *call);
 
 /* Whether each loop's operations come one after the other. */
 int are_loops_closed(const Plan *plan, const Py_buffer *buffers);

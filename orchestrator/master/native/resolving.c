@@ -2,15 +2,19 @@
 
 #include "plan.h"
 
+int is_entry(const Plan *plan, const Entry *entry, size_t change_count)
+{
+    return is_within(entry->place, 1, plan->value_count) && entry->age >= -1 && entry->change >= -1 &&
+           (entry->change < 0 || (uint64_t)entry->change < change_count) &&
+           (entry->age < 0 || (uint64_t)entry->age < plan->depth);
+}
+
 /* Whether a channel's entries can be read (or stand side by side among the values, where they must). */
 static int entries_fit(const Plan *plan, const Entry *entries, int64_t count, size_t change_count, int is_row)
 {
     for (int64_t k = 0; k < count; k++) {
         const Entry *entry = &entries[k];
-        if (!is_within(entry->place, 1, plan->value_count) || entry->age < -1 || entry->change < -1 ||
-            (entry->change >= 0 && (uint64_t)entry->change >= change_count) ||
-            (entry->age >= 0 && (uint64_t)entry->age >= plan->depth) ||
-            (is_row && entry->place != entries[0].place + k)) {
+        if (!is_entry(plan, entry, change_count) || (is_row && entry->place != entries[0].place + k)) {
             return 0;
         }
     }

@@ -3,7 +3,7 @@
    With the same arithmetic, in the same order, as `Exchange` and `Master` have it in Python, so that the two give the same
    bits. */
 
-#include "kernel.h"
+#include "algebraic/solving.h"
 
 #include <limits.h>
 #include <math.h>
@@ -53,7 +53,7 @@ double read_entry(const Plan *plan, const Entry *entry, double time)
     if (entry->whole == TRUE_ABOVE) {
         value = value > entry->threshold;
     } else if (entry->whole == ROUNDED_UP) {
-        value = ceil(value - entry->threshold);
+        value = isnan(value) ? 0.0 : isinf(value) ? copysign(0x1p64, value) : ceil(value - entry->threshold);
     }
     return entry->change < 0 ? value : changed(&plan->changes[entry->change], value, time);
 }
@@ -195,6 +195,7 @@ static const Call *take_group(const Hand *hand, const Group *group, const Advanc
     case SLOPES: return set_slopes(hand, group, status);
     case SAVE: case RESTORE: case FORGET: return treat_states(hand, group, status);
     case NOTE: note_inputs(hand->plan, group, time); return group->end;
+    case ASK: return group->end; /* it is called by who solves */
     default: return change_values(group, time + step);
     }
 }
@@ -216,6 +217,51 @@ static const Group *lead(const Plan *plan, const Group *group)
     return way == AGAIN ? plan->groups + groups[0] - 1 : way == ON ? group : NULL;
 }
 
+void look_at_floats(const Hand *hand, const Advance *it)
+{
+    const Plan *plan = hand->plan;
+    const Group *group = hand->group;
+    if (group->is_watched && float_control() != plan->control) { /* an FMU must not change the numbers of others */
+        fesetenv(&plan->floats);
+        int64_t *mark = &plan->disturbed[group->begin - plan->calls]; /* a group of its own */
+        *mark = *mark == 0 ? it->number + 1 : *mark;
+    }
+}
+
+/* Of a group's calls those from one to before another; the one that failed, or NULL. */
+static const Call *take_some(Hand *hand, const Group *group, Call *from, Call *to, const Advance *it, int *status)
+{
+    Group some;
+    const Group *taken = group;
+    if (group->begin < from || to < group->end) {
+        some = *group;
+        some.begin = from < group->begin ? group->begin : from;
+        some.end = to < group->end ? to : group->end;
+        taken = &some;
+    }
+    hand->group = group;
+    hand->note->function = group->function;
+    const Call *call = take_group(hand, taken, it, status);
+    look_at_floats(hand, it);
+    return call < taken->end ? call : NULL;
+}
+
+const Call *take_calls(Hand *hand, int64_t from, int64_t to, const Advance *it, int *status)
+{
+    const Plan *plan = hand->plan;
+    const Call *call = NULL;
+    for (size_t n = plan->group_of[from]; call == NULL && from < to && n <= plan->group_of[to - 1]; n++) {
+        call = take_some(hand, &plan->groups[n], plan->calls + from, plan->calls + to, it, status);
+    }
+    return call;
+}
+
+/* Where what a group does ends: behind that of who solves are operations that it does itself. */
+static Call *end_of(const Plan *plan, const Group *group)
+{
+    return group->kind == SOLVE ? plan->calls + group->begin->solver->end : group->end;
+}
+
 void take_part(Hand *hand, int part, const Advance *it, Place *place)
 {
     const Plan *plan = hand->plan;
@@ -223,37 +269,24 @@ void take_part(Hand *hand, int part, const Advance *it, Place *place)
     Call *from = plan->calls + place->begin;
     hand->note->time = it->time;
     for (const Group *group = plan->groups + plan->bounds[part]; group < end; group++) {
-        if (group->end <= from || (group->period > 1 && it->number % group->period != group->phase)) {
+        if ((group->end <= from && end_of(plan, group) <= from) ||
+            (group->period > 1 && it->number % group->period != group->phase)) {
             continue;
         }
-        if (group->kind >= BEGIN) {
-            const Group *next = lead(plan, group);
-            if (next == NULL) {
-                place->failed = group->begin - plan->calls;
-                place->status = 0;
-                break;
-            }
-            from = next < group ? plan->calls : from; /* what was done before is to be done again */
-            group = next;
-            continue;
-        }
-        Group rest;
-        const Group *taken = group;
-        if (group->begin < from) { /* taken up again in the middle */
-            rest = *group;
-            rest.begin = from;
-            taken = &rest;
-        }
-        hand->group = group;
-        hand->note->function = group->function;
+        const Call *call = NULL;
         int status = 0;
-        const Call *call = take_group(hand, taken, it, &status);
-        if (group->is_watched && float_control() != plan->control) { /* an FMU must not change the numbers of others */
-            fesetenv(&plan->floats);
-            int64_t *mark = &plan->disturbed[group->begin - plan->calls]; /* a group of its own */
-            *mark = *mark == 0 ? it->number + 1 : *mark;
+        if (group->kind == SOLVE) {
+            call = solve(hand, group, it, &status);
+            from = end_of(plan, group);
+        } else if (group->kind >= BEGIN) {
+            const Group *next = lead(plan, group);
+            call = next == NULL ? group->begin : NULL;
+            from = next != NULL && next < group ? plan->calls : from; /* what was done before is to be done again */
+            group = next == NULL ? group : next;
+        } else {
+            call = take_some(hand, group, from, group->end, it, &status);
         }
-        if (call < group->end) {
+        if (call != NULL) {
             place->failed = call - plan->calls;
             place->status = status;
             break;

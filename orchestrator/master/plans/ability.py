@@ -25,7 +25,7 @@ def is_able(coupling: Coupling, repeated: Iterable[str]) -> bool:
     able = able and Courses.are_able(coupling.extrapolator, exchange)
     here = not any(isinstance(slave, IsolatedSlave) for slave in slaves.values())
     able = able and (refresher is None or (here and refresher.is_decided))
-    return able and coupling.loops is None and can_exchange(exchange)
+    return able and (here or coupling.loops is None) and can_exchange(exchange)
 
 
 def _can_be_called(slave: Slave, exchange: Exchange) -> bool:

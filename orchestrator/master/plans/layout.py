@@ -27,6 +27,8 @@ class Kind(IntEnum):
     RESTORE = 13
     FORGET = 14
     NOTE = 15
+    SOLVE = 16
+    ASK = 17
 
 
 AS_IT_IS, TRUE_ABOVE, ROUNDED_UP = 0, 1, 2
@@ -78,6 +80,16 @@ LOOP = np.dtype(
     [(n, "i8") for n in ("kind", "limit", "work", "begin", "real_count", "guess_count", "other_count", "method")]
     + [("relaxation", "f8")]
 )
+SOLVER = np.dtype(
+    [(n, "i8") for n in ("work", "begin", "real_count", "other_count", "attempts", "party", "party_count")]
+    + [(n, "i8") for n in ("evaluating", "deriving", "end")]
+)
+PARTY = np.dtype(
+    [("function", "u8"), ("component", "u8"), ("counts_values", "i8")]
+    + [(n, "i8") for n in ("writing", "written", "reading", "read", "ask")]
+    + [(n, "i8") for n in ("term", "known_count", "row_count", "whole_count")]
+)
+TERM = np.dtype([(n, "i8") for n in ("of", "reference", "count", "element")])
 PLACE = np.dtype([(name, "i8") for name in ("begin", "failed", "status")])
 CONTROL = np.dtype(
     [(name, "f8") for name in ("start", "step", "last", "late", "end", "due", "every", "shortest")]
@@ -96,7 +108,8 @@ SWING = np.dtype(
 
 _SIZES: dict[str, Any] = {
     "operations": OPERATION, "parts": "i8", "channels": CHANNEL, "instances": INSTANCE, "entries": ENTRY,
-    "references": "u4", "forms": "i8", "courses": COURSE, "notes": NOTING, "loops": LOOP, "passed": "i8",
+    "references": "u4", "forms": "i8", "courses": COURSE, "notes": NOTING, "loops": LOOP, "solvers": SOLVER,
+    "parties": PARTY, "terms": TERM, "passed": "i8",
     "points": POINTS, "states": STATE, "work": "f8", "stamps": "f8", "changes": CHANGES, "kept": "i8", "values": "f8",
     "history": "f8", "table": "f8", "places": PLACE, "disturbed": "i8", "control": CONTROL,
 }  # fmt: skip

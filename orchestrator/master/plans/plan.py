@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from ...fmi import Channel, Type
 from ...fmi.binding import ElementsChannel, Fmi3Slave, FmuSlave, LoadedSlave, is_watched
 from ...isolation import IsolatedChannel, Ride
+from ..algebraic import LoopSolver
 from ..algorithms import Batch, Iteration, Operation, Repeated
 from ..coupling import Coupling
 from ..exchange import Change, Yield
@@ -31,12 +32,15 @@ from .layout import (
     NONE,
     NOTING,
     OPERATION,
+    PARTY,
     POINTS,
+    SOLVER,
     STATE,
+    TERM,
     TRUE_ABOVE,
     Kind,
 )
-from .points import add_refresh
+from .points import Algebra, add_point
 
 _STATES = {Operation.SAVE + n: (Kind(Kind.SAVE + n % 3), n // 3) for n in range(6)}
 """What is done to a state, and to which of an instance's."""
@@ -61,7 +65,9 @@ class Plan:
         channels: arrays that are set as a whole.
         courses: the inputs that go on during a step.
         rounds: by operation, what it is repeated for. iterations: by the operation that ends a round.
-        slaves: whom it calls. loops: what is repeated. room: how many numbers there is room for so far.
+        slaves: whom it calls. loops: what is repeated. algebra: what is solved.
+        passed: places of values that are compared, or solved for. feeds: inputs, and where their entries begin.
+        room: how many numbers there is room for so far.
         states: by instance, and by which of its states, its number.
         threads: how many threads there is work for.
         width: how many numbers there are, the values first.
@@ -84,7 +90,7 @@ class Plan:
         self._channels: list[tuple[int, ...]] = []
         self.channels: list[ElementsChannel] = []
         self._entries: list[Entry] = []
-        self._feeds: list[tuple[str, int, list[int], bool, int]] = []
+        self.feeds: list[tuple[str, int, list[int], bool, int]] = []
         self._changed_links = self.exchange.changed_links
         self._references: list[int] = []
         self.operations: list[tuple[int, int, int, int]] = []
@@ -97,7 +103,8 @@ class Plan:
         self.rounds: dict[int, Iteration] = {}
         self.iterations: dict[int, Iteration] = {}
         self.loops: list[tuple[float, ...]] = []
-        self._passed: list[int] = [*watched]
+        self.passed: list[int] = [*watched]
+        self.algebra = Algebra()
         self._work: list[tuple[int, Iteration]] = []
         self.room = 0
         self.states: dict[tuple[str, int], int] = {}
@@ -116,8 +123,8 @@ class Plan:
                 for share in np.array_split(names, threads) if threads > 1 else [names]:
                     self._add(list(share), part.operations, final=len(sections) == 1)
                     ends += [len(self.operations)] * (threads > 1)
-            if n == refreshing and coupling.refresher is not None:
-                add_refresh(self, coupling.refresher)
+            if n == refreshing:
+                add_point(self, coupling)
             ends += [len(self.operations)] * (threads == 1)
         self.spare = self.room
         if len(sections) > 1:
@@ -142,7 +149,10 @@ class Plan:
             self.courses.courses,
             np.array(self._notes, dtype=NOTING),
             np.array(self.loops, dtype=LOOP),
-            np.array(self._passed, dtype=np.int64),
+            np.array(self.algebra.solvers, dtype=SOLVER),
+            np.array(self.algebra.parties, dtype=PARTY),
+            np.array(self.algebra.terms, dtype=TERM),
+            np.array(self.passed, dtype=np.int64),
             self.courses.points,
             self._made_states(),
             self.work,
@@ -186,7 +196,7 @@ class Plan:
         if self._changed_links == self.exchange.changed_links:
             return
         self._changed_links, entries = self.exchange.changed_links, self.arrays[4]
-        for name, n, changes, late, begin in self._feeds:
+        for name, n, changes, late, begin in self.feeds:
             feed = self.exchange.feeds[name][n]
             places = [k for _, places in parts_of(feed.channel) or () for k in places]
             made = self.wide.entries(feed, changes, late=late)
@@ -215,9 +225,9 @@ class Plan:
         passed, real_count = [*iteration.reals, *iteration.others], len(iteration.reals)
         method, relaxation = METHODS[iteration.stepping.acceleration], iteration.stepping.relaxation
         counts = real_count, iteration.guess_count, len(iteration.others)
-        number, begin = len(self.loops), len(self._passed)
+        number, begin = len(self.loops), len(self.passed)
         self.loops.append((ITERATION, iteration.stepping.max_iterations, self.room, begin, *counts, method, relaxation))
-        self._passed += passed
+        self.passed += passed
         self._work.append((self.room, iteration))
         u = iteration.guess_count
         self.room += len(iteration.numbers) + 2 * u + (0, 1 + u, 1 + 24 * u)[method]
@@ -251,12 +261,13 @@ class Plan:
         return made
 
     def _made_work(self) -> NDArray[np.float64]:
-        """Room for the numbers of what is repeated; those of iterations stand there from now on."""
+        """Room for the numbers of what is repeated; those of iterations and solvers stand there from now on."""
         work = np.zeros(self.room)
-        for begin, iteration in self._work:
-            own = work[begin : begin + len(iteration.numbers)]
-            own[:] = iteration.numbers
-            iteration.use(own)
+        counting: list[tuple[int, Iteration | LoopSolver]] = [*self._work, *self.algebra.work]
+        for begin, one in counting:
+            own = work[begin : begin + len(one.numbers)]
+            own[:] = one.numbers
+            one.use(own)
         return work
 
     def add_operation(
@@ -275,7 +286,7 @@ class Plan:
         for n, feed in enumerate(self.exchange.feeds[slave.name]):
             slots = feed.changes or [None] * len(feed.targets)
             changes = [-1 if slot is None else self._add_change(slot, -1, feed.kind) for slot in slots]
-            self._feeds.append((slave.name, n, changes, late, len(self._entries)))
+            self.feeds.append((slave.name, n, changes, late, len(self._entries)))
             entries = self.wide.entries(feed, changes, late=late)
             if course is None or n != course.feed:
                 made += self._add_channels(

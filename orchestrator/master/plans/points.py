@@ -2,13 +2,37 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Protocol
 
+from ...fmi.binding import Fmi3Slave, LoadedSlave, whole_arrays
+from ..algebraic import NUMBERS, LoopSolver
 from ..algorithms import HEAD
+from ..coupling import Coupling
 from ..exchange import Exchange, Yield
 from ..refresh import Refresher
 from .ability import Called
+from .flattening import parts_of
 from .layout import CIRCLE, NOBODY, Kind
+
+Term = tuple[int, int, int, int]
+"""Of an input its entry, of an unknown value which it is; its value reference; elements of its array; which of them."""
+
+
+class Algebra:
+    """Who solves algebraic loops, for the kernel.
+
+    Attributes:
+        solvers, parties, terms: as ``native/kernel.h`` has them.
+        solving: by their operations, who they are. work: where their numbers begin.
+    """
+
+    def __init__(self) -> None:
+        self.solvers: list[tuple[int, ...]] = []
+        self.parties: list[tuple[int, ...]] = []
+        self.terms: list[Term] = []
+        self.solving: dict[int, LoopSolver] = {}
+        self.work: list[tuple[int, LoopSolver]] = []
 
 
 class Growing(Protocol):
@@ -16,7 +40,11 @@ class Growing(Protocol):
 
     exchange: Exchange
     slaves: dict[str, Called]
+    operations: list[tuple[int, int, int, int]]
     loops: list[tuple[float, ...]]
+    passed: list[int]
+    feeds: list[tuple[str, int, list[int], bool, int]]
+    algebra: Algebra
     room: int
     width: int
 
@@ -33,7 +61,17 @@ class Growing(Protocol):
         """Read outputs of one type, or look at them."""
 
 
-def add_refresh(plan: Growing, refresher: Refresher) -> None:
+def add_point(plan: Growing, coupling: Coupling) -> None:
+    """Add all that brings values up to date, as `Coupling.settle` does."""
+    if coupling.refresher is not None:
+        _add_refresh(plan, coupling.refresher)
+    if coupling.loops is not None:
+        _add_solution(plan, coupling.loops)
+        if coupling.refresher is not None:  # what follows from the loops
+            _add_refresh(plan, coupling.refresher)
+
+
+def _add_refresh(plan: Growing, refresher: Refresher) -> None:
     """Add what brings feed-through up to date."""
     for stage, is_circle in refresher.stages:
         names = [name for name in stage if name not in refresher.refused]
@@ -52,3 +90,80 @@ def add_refresh(plan: Growing, refresher: Refresher) -> None:
             for part in plan.exchange.yields[name]:
                 if part.is_real:
                     plan.add_reads(Kind.LOOK, plan.slaves[name], part, (1, 0))
+
+
+def _add_solution(plan: Growing, loops: LoopSolver) -> None:
+    """Add what solves algebraic loops."""
+    algebra, first = plan.algebra, len(plan.operations)
+    algebra.solving[first] = loops
+    algebra.work.append((plan.room, loops))
+    plan.add_operation(Kind.SOLVE, len(algebra.solvers), NOBODY, (1, 0))
+    for feeder in loops.feeders:
+        plan.add_sets(plan.slaves[feeder.name], 1, late=True)
+        plan.add_gets(plan.slaves[feeder.name], 1, None, kind=Kind.READ)
+    called = (plan.slaves[slave.name] for slave in loops.instances)
+    slaves = [slave for slave in called if isinstance(slave, LoadedSlave)]  # no others: see `is_able`
+    knowns: dict[str, list[Term]] = {}
+    ends = [len(plan.operations)]
+    for slave in slaves:
+        begin = len(plan.feeds)
+        plan.add_sets(slave, 1, late=True)
+        knowns[slave.name] = [term for feed in plan.feeds[begin:] for term in _inputs(plan, slave, feed)]
+        ends.append(len(plan.operations))
+    for slave in slaves:
+        plan.add_gets(slave, 1, None, kind=Kind.READ)
+        ends.append(len(plan.operations))
+    count, party = len(slaves), len(algebra.parties)
+    for n, slave in enumerate(slaves):
+        call = "" if plan.exchange.output_changes else slave.DERIVE
+        function = (
+            slave.addresses(call)[0] if slave.interface.directional_derivatives and call in slave.functions else 0
+        )
+        own = ends[n], ends[n + 1], ends[count + n], ends[count + n + 1], len(plan.operations)
+        names = [loops.name_of(row) for row in loops.rows[slave.name]]
+        whole = whole_arrays(names, slave.interface)
+        rows = [(row, 0, 1, whole.index(name)) for row, name in zip(loops.rows[slave.name], names, strict=True)]
+        asked = [(0, reference, size, 0) for reference, size in _references(slave, whole)]
+        counts = len(knowns[slave.name]), len(rows), len(asked)
+        if function:
+            plan.add_operation(Kind.ASK, len(algebra.parties), (slave, call), (1, 0))
+        algebra.parties.append(
+            (function, slave.pointer, isinstance(slave, Fmi3Slave), *own, len(algebra.terms), *counts)
+        )
+        algebra.terms += [*knowns[slave.name], *rows, *asked]
+    n, m = len(loops.reals), len(loops.others)
+    algebra.solvers.append(
+        (plan.room, len(plan.passed), n, m, loops.attempts, party, count, ends[0], ends[-1], len(plan.operations))
+    )
+    plan.passed += [*loops.reals, *loops.others]
+    plan.room += NUMBERS + 3 * n + n * (9 + 2 * n) + m + plan.width
+
+
+def _inputs(plan: Growing, slave: LoadedSlave, feed: tuple[str, int, list[int], bool, int]) -> list[Term]:
+    """The real inputs of one feed of an instance, in its order."""
+    made, variables, wholes = (
+        plan.exchange.feeds[slave.name][feed[1]],
+        slave.interface.variables,
+        slave.interface.wholes,
+    )
+    if not made.is_real:
+        return []
+    places = [k for _, own in parts_of(made.channel) or () for k in own]
+    found = []
+    for k, name in enumerate(made.targets):
+        element = variables[name].element
+        whole = (name,) if element is None else wholes[element[0]]
+        found.append((feed[4] + places.index(k), variables[whole[0]].reference, len(whole), list(whole).index(name)))
+    return found
+
+
+def _references(slave: LoadedSlave, whole: Sequence[str]) -> list[tuple[int, int]]:
+    """Of variables, each array whole, the value references and how many numbers each of them stands for."""
+    found: dict[str, tuple[int, int]] = {}
+    for name in whole:
+        variable = slave.interface.variables[name]
+        if variable.element is None:
+            found[name] = variable.reference, 1
+        elif not variable.element[1]:
+            found[name] = variable.reference, len(slave.interface.wholes[variable.element[0]])
+    return list(found.values())

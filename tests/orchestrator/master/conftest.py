@@ -9,11 +9,14 @@ from pathlib import Path
 from types import SimpleNamespace
 
 import fmpy
+import numpy as np
 import pytest
 from railcosim.orchestrator.errors import RunError
 from railcosim.orchestrator.isolation import instantiate
 from railcosim.orchestrator.master import compiled
+from railcosim.orchestrator.master.compiled import CompiledLoop
 from railcosim.orchestrator.master.loop import Master
+from railcosim.orchestrator.master.plans import CHANGES, CONTROL, PLACE
 from railcosim.orchestrator.run.checking import check
 from railcosim.orchestrator.run.execution import run
 from railcosim.orchestrator.system import System
@@ -50,6 +53,14 @@ def scarce_kernel(compile_kernel, tmp_path_factory):
     module = importlib.util.module_from_spec(spec)
     spec.loader.exec_module(module)
     return module, ctypes.c_int.in_dll(ctypes.CDLL(library), "scarce_left")
+
+
+NAMES = (
+    "operations parts channels instances entries references forms courses notes loops solvers parties terms "
+    "passed points states work stamps "
+    "changes kept values history newest table row places "
+    "disturbed control texts every start step first count last"
+)
 
 
 @pytest.fixture
@@ -144,6 +155,23 @@ def instantiated(workspace):
 
     yield make
     for slave in made:
+        slave.free()
+
+
+@pytest.fixture
+def arguments(workspace, odd, ring, instantiated):
+    """What the kernel is called with for a ring, by name; its steps do not vary."""
+    master = instantiated(ring(odd, 3))
+    plan = [array.copy() for array in CompiledLoop(master.coupling, master.algorithm).plan.arrays]
+    values = np.array(master.values)
+    changes = np.zeros(1, CHANGES)
+    table, kept = np.empty((len(values) + 1, 8)), np.arange(len(values))
+    places = np.array([(0, -1, 0)], PLACE)
+    disturbed = np.zeros(len(plan[0]), np.int64)
+    state = values, np.tile(values, (2, 1)), 1, table, 0, places, disturbed
+    given = [*plan, changes, kept, *state, np.zeros(0, CONTROL), None, 1, 0.0, 0.25, 0, 4, 4]
+    yield dict(zip(NAMES.split(), given, strict=True))
+    for slave in master.slaves.values():
         slave.free()
 
 

@@ -7,6 +7,7 @@ import pytest
 from railcosim.orchestrator.cli import app as cli
 from railcosim.orchestrator.errors import CouplingError, FmuError
 from railcosim.orchestrator.fmi.binding.fmi2 import FmuSlave
+from railcosim.orchestrator.master import compiled
 from railcosim.orchestrator.master.algebraic.solver import LoopSolver
 from railcosim.orchestrator.run.execution import run
 from railcosim.orchestrator.system import System
@@ -31,7 +32,8 @@ def affine(mine, gain, **how):
 
 @pytest.fixture
 def ways(monkeypatch):
-    """How often each of the two ways to slopes is taken."""
+    """How often each of the two ways to slopes is taken, in Python."""
+    monkeypatch.setattr(compiled, "kernel", None)
     count = {"directional": 0, "differences": 0}
     derive, differ = FmuSlave.directional_derivatives, LoopSolver._differences
 

@@ -1,0 +1,259 @@
+"""Algebraic loops in the compiled loop: the same bits, words and counts as in Python."""
+
+import sys
+
+import fmpy
+import numpy as np
+import pytest
+from railcosim.orchestrator.errors import CouplingError
+from railcosim.orchestrator.master import compiled
+from railcosim.orchestrator.run.execution import run
+from railcosim.orchestrator.system import Connection, Event, System
+
+pytestmark = [
+    pytest.mark.skipif(compiled.kernel is None, reason="installed without the compiled step loop"),
+    pytest.mark.skipif(not sys.platform.startswith("linux"), reason="FMUs by hand are compiled for Linux here"),
+]
+EXPLICIT = pytest.mark.parametrize("algorithm", ["gauss-seidel", "jacobi"])
+
+
+@pytest.fixture
+def bent(compile_c, xml, tmp_path):
+    """The FMU of bent.c."""
+
+    def make(*options, derives=True):
+        v, whole = xml["variable"], {"variability": "discrete"}
+        shown = [v("u", "input", start=0.0), v("v", "input", start=0.0)]
+        shown += [v("y", "output", dependencies=["u", "v"]), v("z", "output", dependencies=["u", "v"])]
+        shown += [v(name, "parameter", start=0.0, variability="tunable") for name in ("a", "b", "c")]
+        shown += [v(name, "parameter", "Integer", 0, variability="tunable") for name in ("f", "mode")]
+        shown += [v("m", "input", "Integer", 0, **whole), v("n", "output", "Integer", dependencies=["m"], **whole)]
+        able = f'canHandleVariableCommunicationStepSize="true" providesDirectionalDerivative="{str(derives).lower()}"'
+        files = {
+            "modelDescription.xml": xml["description"](shown, identifier="Bent", simulation=able),
+            f"binaries/{fmpy.platform}/Bent{fmpy.sharedLibraryExtension}": compile_c("bent.c", *options),
+        }
+        return str(xml["write_archive"](tmp_path / f"bent{len(list(tmp_path.iterdir()))}.fmu", files))
+
+    return make
+
+
+def coupled(model, first, second, stop=2.0, **how):
+    """y of each is u of the other one, and v of both is 0.25 of y of the first one."""
+    system = System(**{"stop_time": stop, "step": 0.25, "algebraic_loops": "solve"} | how)
+    for name, start in (("p", first), ("q", second)):
+        system.add(name, model, **start)
+    system.connect("p.y", "q.u")
+    system.connect("q.y", "p.u")
+    for name in "pq":
+        system.connect("p.y", f"{name}.v", scale=0.25)
+    return system
+
+
+@pytest.fixture
+def told(both, used, monkeypatch):
+    """Both ways have the same values, the same errors, and count the same."""
+
+    def go(system, **how):
+        result = both(system, **how)
+        count = len(used)
+        fast = _coupling(system, **how)
+        assert len(used) > count
+        with monkeypatch.context() as patch:
+            patch.setattr(compiled, "kernel", None)
+            assert fast == _coupling(system, **how)
+        return result
+
+    return go
+
+
+def _coupling(system, **how):
+    try:
+        return run(system, **how).coupling
+    except Exception as error:  # what it is has been looked at
+        return str(error)
+
+
+@EXPLICIT
+@pytest.mark.parametrize("derives", [True, False])
+@pytest.mark.parametrize("f", range(6))
+def test_bent_ones(told, bent, algorithm, derives, f):
+    """With the FMUs' own derivatives and with differences; the equations hold."""
+    start = [{"a": 0.5, "b": -0.75, "c": -1.0, "f": f}, {"a": -1.5, "b": 0.5, "c": 0.5, "f": f}]
+    result = told(coupled(bent(derives=derives), *start, algorithm=algorithm))
+    shape = [lambda x: x, np.tanh, lambda x: x**3, lambda x: np.clip(x, -2.0, 2.0), np.exp, np.cos][f]
+    assert result.status == "completed"
+    p, q, t = result["p.y"], result["q.y"], result.time
+    assert p == pytest.approx(-1.0 + 0.5 * shape(q) - 0.75 * shape(0.25 * p) + t, rel=1e-9, abs=1e-9)
+    assert q == pytest.approx(0.5 - 1.5 * shape(p) + 0.5 * shape(0.25 * p) + t, rel=1e-9, abs=1e-9)
+
+
+WAYS = {
+    "refresh": {"refresh": True},
+    "a bias": {"events": [Event("p.u", "bias", 0.5, value=0.5, duration=0.5)]},
+    "a gain": {"events": [Event("p.u", "connect", 0.5, source=Connection("q.y", "p.u", scale=-2.0), duration=1.0)]},
+    "an output": {"events": [Event("p.y", "bias", 0.5, value=0.5, duration=0.5)]},
+    "another source": {"events": [Event("p.u", "connect", 0.75, source=Connection("p.z", "p.u"), fade=0.5)]},
+    "a parameter": {"events": [Event("p.a", "set", 0.5, value=2.0)]},
+}
+
+
+@EXPLICIT
+@pytest.mark.parametrize("way", WAYS)
+def test_events_and_refresh(told, bent, algorithm, way):
+    """What is behind the loop follows it; a delay is no part of it."""
+    how = dict(WAYS[way])
+    events = how.pop("events", [])
+    start = [{"a": -0.5, "c": -1.0}, {"a": 1.5, "b": 0.5, "c": 0.5}]
+    system = coupled(bent(), *start, algorithm=algorithm, **how)
+    for name, b in (("before", 1.0), ("after", 2.0), ("late", 1.0)):
+        system.add(name, bent(), a=1.0, b=b)
+    system.connections = [c for c in system.connections if c.target != "q.v"]
+    system.connect("before.y", "q.v")
+    system.connect("p.y", "after.u")
+    system.connect("p.y", "late.u", delay=2)
+    system.connect("late.y", "before.u", scale=0.01)
+    system.events += events
+    assert told(system).status == "completed"
+
+
+def test_inputs_that_go_on(told, bent, able):
+    start = [{"a": -0.5, "c": -1.0}, {"a": 1.5, "b": 0.5, "c": 0.5}]
+    system = coupled(bent(), *start, extrapolation=1)
+    system.add("lag", able)
+    system.connect("p.y", "lag.u")
+    system.connect("lag.x", "lag.v", scale=0.5)
+    assert told(system).status == "completed"
+
+
+@pytest.mark.parametrize("shown", ["no promise", "no function"])
+def test_a_promise_without_a_function(told, bent, shown):
+    model = bent(*["-DMUTE"] * (shown == "no function"))
+    assert told(coupled(model, {"a": 3.0}, {"a": -2.0, "c": 1.0})).status == "completed"
+
+
+@pytest.mark.parametrize("mode", [102, 103, 104, 109, 203, 204, 303, 304, 400])
+@pytest.mark.parametrize("derives", [True, False])
+def test_one_that_fails_in_between(both, bent, mode, derives):
+    """An FMU that refuses derivatives is not asked for them; whatever else it refuses ends the run."""
+    system = coupled(bent(derives=derives), {"a": 3.0, "mode": mode}, {"a": -2.0, "c": 1.0})
+    result = both(system)
+    goes_on = mode in (102, 103, 400) or (mode in (104, 109) and not derives)
+    assert result.status == ("completed" if goes_on else "failed")
+    if not goes_on:
+        assert (result.error.instance, result.error.time) == ("p", 1.0 if mode < 200 else result.error.time)
+
+
+@pytest.mark.parametrize(("f", "a", "c"), [(0, 1.0, 1.0), (4, 1.0, 0.0), (6, 1.0, -5.0)])
+def test_no_solution(told, bent, f, a, c):
+    """y = y + 1 + t; y = exp y + t; y = root of y, less 5: nothing to be found from 0.25 s on."""
+    system = System(start_time=0.0, stop_time=1.0, step=0.25, algebraic_loops="solve")
+    system.add("p", bent(), a=0.0, c=5.0, f=f)
+    system.connect("p.y", "p.u")
+    system.events.append(Event("p.a", "set", 0.25, value=a))
+    system.events.append(Event("p.c", "set", 0.25, value=c))
+    result = told(system)
+    assert isinstance(result.error, CouplingError)
+
+
+def test_a_solution_that_ceases_to_exist(told, bent):
+    """y = exp y + t - 2.1 has none from t = 1.1 s on: the curve of exp y - y has its lowest point at 1."""
+    system = System(stop_time=2.0, step=0.25, algebraic_loops="solve")
+    system.add("p", bent(), a=1.0, c=-2.1, f=4)
+    system.connect("p.y", "p.u")
+    result = told(system)
+    assert str(result.error).startswith("t = 1.25 s: the algebraic loop through p.y has no solution")
+    assert result.time[-1] == 1.0
+
+
+@EXPLICIT
+def test_truth_values_and_whole_numbers(told, mine, bent, algorithm):
+    """y = t, or 10 + t while y is above a level; upside down there is no solution at 5 s."""
+    system = System(stop_time=8.0, step=1.0, algebraic_loops="solve", algorithm=algorithm)
+    system.add("switch", mine("Switch"))
+    system.add("level", mine("Level"), level=4.5)
+    system.add("clock", mine("Clock"))
+    system.connect("clock.t", "switch.w")
+    system.connect("switch.y", "level.u")
+    system.connect("level.on", "switch.on")
+    result = told(system, kind="native")
+    assert list(result["switch.y"]) == [t + 10.0 * (t > 4.5) for t in range(9)]
+    system.instances["level"].start["upside_down"] = True
+    system.stepping.start_time = 5.0
+    system.add("bend", mine("Affine"), gain=-1.0)
+    system.connections = [c for c in system.connections if c.target != "switch.w"]
+    system.connect("clock.t", "bend.u", offset=-12.0)
+    system.connect("bend.y", "switch.w")
+    result = told(system, kind="native")
+    assert isinstance(result.error, CouplingError)
+
+
+def test_a_number_that_becomes_whole_and_is_none_on_the_way(both, bent):
+    """y = 1 - 3 root of y, of which the first one tried below 0 is none, and goes to a whole number as 0."""
+    system = System(stop_time=1.0, step=0.25, algebraic_loops="solve")
+    system.add("p", bent(derives=False), a=0.0, c=1.0, f=6)
+    system.events.append(Event("p.a", "set", 0.25, value=-3.0))
+    system.connect("p.y", "p.u")
+    system.connect("p.y", "p.m", threshold=0.5)
+    result = both(system)
+    y, t = result["p.y"][1:], result.time[1:]
+    assert y == pytest.approx(1.0 + t - 3.0 * np.sqrt(y), rel=1e-9)
+    assert list(result["p.n"][1:]) == list(np.ceil(y - 0.5) + 1.0)
+
+
+def test_arrays(told, plain_arrays):
+    """z = 0.5 z - 3 z + 1 through two elements of one array, asked for as a whole; y by elements of its own."""
+    system = System(stop_time=1.0, step=0.25, algebraic_loops="solve")
+    system.add("it", plain_arrays, **{f"k[{k}]": 1.0 for k in (1, 2, 3)})
+    system.connect("it.z", "it.u[1,1]", scale=0.5)
+    system.connect("it.z", "it.u[1,2]", scale=-3.0)
+    system.connect("it.y[1,3]", "it.u[1,3]", scale=0.25, offset=0.5)
+    for k in (2, 1):
+        system.connect(f"it.y[2,{k}]", f"it.u[2,{3 - k}]", scale=-0.75 * k, offset=1.0)
+    system.connect("it.y[2,3]", "it.u[2,3]", scale=3.0, offset=1.0)
+    result = told(system)
+    assert result["it.z"] == pytest.approx(np.full(5, 1.0 / 3.5), rel=1e-9)
+    assert result["it.y[2,3]"] == pytest.approx(np.full(5, -0.4), rel=1e-9)
+
+
+@pytest.fixture
+def plain_arrays(arrays):
+    texts = '<String name="copies" valueReference="10" causality="output"><Dimension start="2"/></String>'
+    return str(arrays((texts, ""), ('<Output valueReference="10"/>', "")))
+
+
+def test_isolated_ones_stay_in_python(used, bent):
+    system = coupled(bent(), {"a": 3.0}, {"a": -2.0, "c": 1.0}, stop=0.5)
+    system.instances["p"].isolate = True
+    assert run(system).status == "completed"
+    assert not used
+
+
+@pytest.mark.parametrize("refresh", [True, False])
+def test_steps_that_vary(told, mine, refresh):
+    """`adaptive` solves where a step ends: y = -3 y + t, and a lag behind it."""
+    system = System(stop_time=2.0, step=0.5, algorithm="adaptive", algebraic_loops="solve", refresh=refresh)
+    system.add("a", mine("Affine"), gain=-3.0)
+    system.add("b", mine("Affine"))
+    system.add("clock", mine("Clock"))
+    system.add("lag", mine("Lag"))
+    for source, target in (("a.y", "b.u"), ("b.y", "a.u"), ("clock.t", "a.w"), ("a.y", "lag.u")):
+        system.connect(source, target)
+    result = told(system, kind="native")
+    assert result["a.y"] == pytest.approx(result.time / 4.0, abs=1e-12)
+
+
+def test_steps_that_vary_and_no_solution(both, mine):
+    """-t + 12, 10 more while that is below 4.5: no answer is right from 7.5 s on."""
+    system = System(start_time=5.0, stop_time=8.0, step=0.25, algorithm="adaptive", algebraic_loops="solve")
+    system.add("switch", mine("Switch"))
+    system.add("level", mine("Level"), level=4.5, upside_down=True)
+    system.add("bend", mine("Affine"), gain=-1.0)
+    system.add("clock", mine("Clock"))
+    system.add("lag", mine("Lag"))
+    system.connect("clock.t", "bend.u", offset=-12.0)
+    for source, target in (("bend.y", "switch.w"), ("switch.y", "level.u"), ("level.on", "switch.on")):
+        system.connect(source, target)
+    system.connect("switch.y", "lag.u")
+    result = both(system, kind="native")
+    assert isinstance(result.error, CouplingError)
