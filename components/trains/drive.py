@@ -13,6 +13,8 @@ from .rolling_stock import TRAIN, TRAIN_DESCRIPTION, Effort
 
 _SLOWEST = 0.1
 """m/s: below this speed the power limit is that of this speed."""
+_PUT = 1e-3
+"""m: so little further than it can have come is rounding."""
 DRY, WET, LEAVES = 1.0, 0.6, 0.2
 """Shares of the dry rail's adhesion; that of Curtius and Kniffler is the dry one's."""
 
@@ -36,7 +38,7 @@ class Drive(Component):
     weight for traction and on all of it for braking; what is beyond is cut, the friction brake's part first.
 
     Energies count the force that was held over each step times the way made in it, which is exact for a train that
-    holds its input.
+    holds its input. A train that is elsewhere than it can have come to has been put there: that way counts nothing.
     """
 
     source = "envelopes and efficiencies: the train's data; adhesion: Curtius & Kniffler 1944; shares of it chosen"
@@ -86,6 +88,7 @@ class Drive(Component):
     asked = Memory("N", 0.0, shape=(delays,), description="forces asked for at the last samples, latest first")
     sample = Memory("s", 0.0, description="length of the last sample")
     last_position = Memory("m", 0.0, description="position at the last sample")
+    last_speed = Memory("m/s", 0.0, description="speed at the last sample")
     held = Memory("N", 0.0, shape=(3,), description="traction, regeneration and friction held since then")
     drawn_energy = Memory("J", 0.0, output=True, description="energy drawn for traction, losses included")
     recovered_energy = Memory("J", 0.0, output=True, description="energy given back by the regenerative brake")
@@ -97,7 +100,7 @@ class Drive(Component):
     sliding = Output("1", bool, description="whether adhesion cuts the force")
 
     def initial(self) -> Values:
-        return {"last_position": self.position}
+        return {"last_position": self.position, "last_speed": self.speed}
 
     def derivatives(self) -> Values:
         rate = where(self.jerk > 0.0, self.jerk * self.train.mass, 1e12)
@@ -122,12 +125,16 @@ class Drive(Component):
         }
 
     def update(self) -> Values:
-        way = abs(self.position - self.last_position)
+        made = abs(self.position - self.last_position)
+        # Between two samples a speed stays between what it was and what it is, but for what grades do within one.
+        furthest = 2.0 * self.sample * maximum(abs(self.speed), abs(self.last_speed))
+        way = where(made <= furthest + _PUT, made, 0.0)
         traction, regeneration, friction = self.held
         return {
             "asked": [self.demanded_force, *self.asked[:-1]],
             "sample": self.step,
             "last_position": self.position,
+            "last_speed": self.speed,
             "held": list(self._passed(self._built_up())),
             "drawn_energy": self.drawn_energy + traction * way / self.train.traction.efficiency,
             "recovered_energy": self.recovered_energy + regeneration * way * self.train.regeneration.efficiency,

@@ -164,6 +164,21 @@ def test_the_energies_are_those_of_the_train_that_held_the_force():
     assert abs(three.get("energy_residual")) < 1e-9 * drawn
 
 
+def test_a_train_that_is_put_elsewhere_has_made_no_way():
+    drive = Simulation(Drive(**AT_ONCE, position=1000.0, speed=10.0))
+    drive.initialize()
+    drive.start()
+    drawn = []
+    for position in (1000.0, 1001.0, 1002.0, 200.0, 201.0, 5000.0, 5001.0):
+        drive.set("position", position)
+        drive.set("demanded_force", 10e3)
+        drive.step(0.1)
+        drawn.append(drive.get("drawn_energy"))
+    metre = drawn[1]
+    assert metre > 0.0
+    assert drawn == pytest.approx([0.0, metre, 2 * metre, 2 * metre, 3 * metre, 3 * metre, 4 * metre])
+
+
 CONTROLLERS = sorted(
     name
     for name, kind in CATALOGUE.items()
