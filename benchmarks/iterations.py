@@ -1,4 +1,5 @@
-"""What repeated steps cost: a ring by `iterative` and `adaptive`, beside bare C programs that do the same, and Python.
+"""What repeated steps cost: a ring by `iterative` and `adaptive`, and one whose algebraic loop is solved, beside bare C
+programs that do the same, and Python.
 
     python benchmarks/iterations.py
 
@@ -41,12 +42,14 @@ VARYING: dict[str, Any] = {"algorithm": "adaptive", "tolerance": ERROR}
 class Ours:
     """Instances in a ring, and the master of the package."""
 
+    source, target = "x", "u"
+
     def __init__(self, ring: Ring, **how: Any) -> None:
         system = System(**{"stop_time": 1e6, "step": STEP, "algorithm": "iterative", "tolerance": TOLERANCE} | how)
         for k, start in enumerate(ring.starts):
-            system.add(f"lag{k}", str(ring.path), x=start)
+            system.add(f"lag{k}", str(ring.path), **{self.source: start} if self.source == "x" else {})
         for k in range(ring.count):
-            system.connect(f"lag{ring.before(k)}.x", f"lag{k}.u")
+            system.connect(f"lag{ring.before(k)}.{self.source}", f"lag{k}.{self.target}")
         self.workspace = Workspace()
         checked = check(system, self.workspace)
         slaves = {name: model.instantiate(name) for name, model in checked.models.items()}
@@ -146,6 +149,62 @@ class BareAdaptive(Bare):
         self.sweeps += sweeps.value
 
 
+EXACT = ("-ffp-contract=off",)
+"""As the kernel is compiled."""
+
+
+def names_of(ring: Ring) -> list[str]:
+    return [f"lag{k}" for k in range(ring.count)]
+
+
+class OursSolved(Ours):
+    """A ring of components that pass on at once, in the sequence in which the bare program has them."""
+
+    source, target = "y", "u"
+
+    def __init__(self, ring: Ring) -> None:
+        super().__init__(ring, algorithm="gauss-seidel", algebraic_loops="solve", order=names_of(ring))
+
+
+class InPythonSolved(InPython):
+    """The same without the compiled step loop."""
+
+    source, target = "y", "u"
+
+    def __init__(self, ring: Ring) -> None:
+        super().__init__(ring, algorithm="gauss-seidel", algebraic_loops="solve", order=names_of(ring))
+
+
+class BareSolved(OursSolved):
+    """The C program of instants.c."""
+
+    def __init__(self, ring: Ring) -> None:
+        super().__init__(ring)
+        slaves = [slave for slave in self.master.slaves.values() if isinstance(slave, FmuSlave)]
+        references = {v.name: v.reference for v in slaves[0].interface.variables.values()}
+        calls = "fmi2SetReal", "fmi2DoStep", "fmi2GetReal", FmuSlave.DERIVE
+        self.functions = (ctypes.c_void_p * len(calls))(*(slaves[0].addresses(call)[0] for call in calls))
+        self.fmus = (ctypes.c_void_p * ring.count)(*(slave.pointer for slave in slaves))
+        self.references = ctypes.c_uint(references["u"]), ctypes.c_uint(references["y"])
+        library = ctypes.CDLL(str(compile_c(HERE / "instants.c", self.workspace.folder / "instants.so", *EXACT, "-lm")))
+        self.solve, library.room_of_ring.restype = library.solve_ring, ctypes.c_size_t
+        self.solve.restype = ctypes.c_size_t
+        self.room = np.zeros(library.room_of_ring(ctypes.c_size_t(ring.count)))
+        self.now, self.evaluations = np.array(self.master.values), 0
+
+    def run(self, steps: int) -> None:
+        rows = np.empty((steps, len(self.now)))
+        numbers = [ctypes.c_size_t(n) for n in (len(self.now), self.done, steps)]
+        places = (ctypes.c_void_p(array.ctypes.data) for array in (self.now, self.room, rows))
+        found = self.solve(self.fmus, self.functions, *self.references, *numbers, ctypes.c_double(STEP), *places)
+        self.evaluations += found
+        self.done += steps
+
+    @property
+    def values(self) -> list[float]:
+        return list(self.now)
+
+
 def timed(one: Any, steps: int) -> float:
     begin = time.process_time()
     one.run(steps)
@@ -166,6 +225,10 @@ def main() -> None:
     print("\n| N | steps that were taken | bare C program | railcosim | in Python |\n| --- | --- | --- | --- | --- |")
     for count in counts:
         varying(Ring(path, count, 10_000 // count), options.repetitions)
+    path = Path(build(f"{HERE / 'lag.py'}:Bend", {}, kind="native"))
+    print("\n| N | evaluations per step | bare C program | railcosim | in Python |\n| --- | --- | --- | --- | --- |")
+    for count in options.count or [2, 8, 32]:
+        solved(Ring(path, count, 40_000 // count), options.repetitions)
 
 
 def row(ring: Ring, repetitions: int) -> None:
@@ -203,6 +266,21 @@ def varying(ring: Ring, repetitions: int) -> None:
     ratios = [statistics.median(a / b for a, b in zip(found, costs[0], strict=True)) for found in costs]
     cells = [f"{statistics.median(found):.3g} ({ratio:.3g})" for found, ratio in zip(costs, ratios, strict=True)]
     print(f"| {ring.count} | {bare.taken} | " + " | ".join(cells) + " |", flush=True)
+
+
+def solved(ring: Ring, repetitions: int) -> None:
+    all_of = BareSolved(ring), OursSolved(ring), InPythonSolved(ring)
+    costs: list[list[float]] = [[] for _ in all_of]
+    for _ in range(repetitions):
+        for one, found in zip(all_of, costs, strict=True):
+            steps = ring.steps if one is not all_of[2] else max(1, ring.steps // 100)
+            found.append(timed(one, steps) / steps / ring.count * 1e6)
+    bare, ours = all_of[0], all_of[1]
+    assert bare.done == ours.done
+    assert bare.values == ours.values, (bare.values, ours.values)
+    ratios = [statistics.median(a / b for a, b in zip(found, costs[0], strict=True)) for found in costs]
+    cells = [f"{statistics.median(found):.3g} ({ratio:.3g})" for found, ratio in zip(costs, ratios, strict=True)]
+    print(f"| {ring.count} | {bare.evaluations / bare.done:.3g} | " + " | ".join(cells) + " |", flush=True)
 
 
 def taken(one: Any) -> int:

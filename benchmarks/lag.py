@@ -1,6 +1,6 @@
 """The components of benchmarks/ring.py and benchmarks/iterations.py."""
 
-from railcosim.components import Component, Input, Parameter, State, maths
+from railcosim.components import Component, Input, Output, Parameter, State, maths
 
 
 class Lag(Component):
@@ -22,3 +22,13 @@ class DrivenLag(Component):
 
     def derivatives(self):
         return {"x": 0.5 * self.u + maths.sin(self.time) - self.x}
+
+
+class Bend(Component):
+    """A soft saturation of what it is given at the same instant: y = cos(t) - 2 tanh(u)."""
+
+    u = Input("1", 0.0, description="what it depends on at once")
+    y = Output("1", description="what comes of it")
+
+    def outputs(self):
+        return {"y": maths.cos(self.time) - 2.0 * maths.tanh(self.u)}
