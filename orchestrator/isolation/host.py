@@ -29,6 +29,7 @@ from .service import Service, serve
 
 if TYPE_CHECKING:
     from ..fmi import Channel, Slave
+    from ..fmi.binding import LoadedSlave
 
 _LOG_LINES = 50
 
@@ -74,16 +75,14 @@ class Host:
             messages.CHANNEL: self._add_channel,
             messages.WATCH: self._watch,
             messages.VALUES: self._keep_values,
-            messages.RESTORE: self._restore,
-            messages.FORGET: self._forget,
         }
 
-    def instantiate(self, make: Callable[[deque[str]], Slave]) -> None:
+    def instantiate(self, make: Callable[[deque[str]], LoadedSlave]) -> None:
         """Make the instance, whose messages go where they outlive a crash, and tell how it went."""
         self._notes[NOTE_CALL] = note("instantiate")
         try:
-            self._slave = make(_Heard(maxlen=_LOG_LINES))
-            self._report({})
+            self._slave = made = make(_Heard(maxlen=_LOG_LINES))
+            self._report({"result": sorted(made.functions)})
         except Exception as error:
             self._report({"error": self._describe(error)})
 
@@ -138,12 +137,16 @@ class Host:
     def _do(self, operation: str, arguments: tuple[Any, ...]) -> Any:
         if not operation:
             return None
-        self._notes[NOTE_CALL] = note("step" if operation == "resume" else operation)
+        self._notes[NOTE_CALL] = note(_BEHIND.get(operation, operation))
         own: dict[str, Callable[..., Any]] = {
             "save": self._save,
+            "restore": self._restore,
+            "forget": self._forget,
             "serialize": self._serialize,
             "deserialize": self._deserialize,
             "board": self._board,
+            "come_back": self._come_back,
+            "give_back": self._give_back,
         }
         call = own[operation] if operation in own else getattr(self._instance, operation)
         return call(*arguments)
@@ -218,10 +221,11 @@ class Host:
     def _keep_values(self, content: tuple[int, Sequence[Any]]) -> None:
         self._texts[content[0]] = content[1]
 
-    def _board(self, table: Sequence[tuple[int, int]]) -> None:
+    def _board(self, table: Sequence[tuple[int, int, int]]) -> None:
         """Make ready for calls that come through the lane."""
-        channels = [self._channels[k] if k >= 0 else (None, None) for _, k in table]
-        self.service.board(self._instance, [(*entry, *found) for entry, found in zip(table, channels, strict=True)])
+        nothing = None, None
+        found = [self._channels[k] if kind in messages.LANE_VALUES else nothing for kind, k, _ in table]
+        self.service.board(self._instance, [(*entry, *channel) for entry, channel in zip(table, found, strict=True)])
 
     # ---------------------------------------------------------------- saved states
 
@@ -237,15 +241,24 @@ class Host:
         return time
 
     def _restore(self, number: int) -> None:
-        self._notes[NOTE_CALL] = note("restore")
         self._instance.restore(self._states[number])
 
     def _forget(self, number: int) -> None:
-        self._notes[NOTE_CALL] = note("forget")
         self._instance.forget(self._states.pop(number))
+
+    def _come_back(self, number: int, time: float) -> None:
+        self._instance.restore((time, self.service.states[number]))
+
+    def _give_back(self, number: int, time: float) -> None:
+        handle, self._instance.time = self.service.states[number], time
+        old, handle.value = ctypes.c_void_p(handle.value), None  # whatever comes of it
+        if old:
+            self._instance.forget((time, old))
 
 
 _STEPPING = note("step")
+_BEHIND = {"resume": "step", "come_back": "restore", "give_back": "forget"}
+"""What FMUs are asked to do by what the master asks for."""
 
 
 # -------------------------------------------------------------------- the process

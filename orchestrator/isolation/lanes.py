@@ -24,7 +24,7 @@ _LINE = 64
 
 
 def layout(rooms: Iterable[int]) -> list[int]:
-    """Where in their memory, in bytes, instances with room for so many values begin; and then the lane."""
+    """Where in their memory, in bytes, instances with room for so many numbers begin; and then the lane."""
     begins = [0]
     for cells in rooms:
         begins.append(begins[-1] + -(-(HEAD + 8 * cells) // _LINE) * _LINE)

@@ -24,8 +24,8 @@ if TYPE_CHECKING:
 
 A = TypeVar("A")
 T = TypeVar("T")
-STEP, CALL, CHANNEL, WATCH, VALUES, RESTORE, FORGET, SEAT, RIDE = range(9)
-"""Frames to the host. The first two are answered; what went wrong with one of those up to `FORGET` comes with the next
+STEP, CALL, CHANNEL, WATCH, VALUES, SEAT, RIDE = range(7)
+"""Frames to the host. The first two are answered; what went wrong with one of those up to `VALUES` comes with the next
 answer. `SEAT` says which instance the following are for, by its number; `RIDE`, to take calls from the lane."""
 READY, DONE, REPORT = range(16, 19)
 """Frames from the host: it has started; all went as asked; what there is to tell."""
@@ -44,8 +44,11 @@ NOTE_CALL, NOTE_MEMORY, NOTE_BASE, NOTE_LINE, NOTE_FAILED, NOTE_STATUS, NOTE_TIM
 KiB; whether it has lost its line to the master: these three of the whole process, at its first instance. Of calls
 through the lane: which one failed, counted from 1, and less than 0 unless that was one that reads; its status; and the
 time in s, a real number, that the master has got to."""
-SET_REALS, SET_INTEGERS, LANE_STEP, GET_REALS, GET_INTEGERS = range(5)
-"""What is called through the lane: see ``native/lane.h``."""
+SET_REALS, SET_INTEGERS, LANE_STEP, GET_REALS, GET_INTEGERS, SET_SLOPES, LANE_SAVE, LANE_RESTORE, LANE_FORGET = range(9)
+LANE_RESTORE_NOW = 9
+"""What is called through the lane: see ``native/lane.h``; and what waits until a state is restored."""
+LANE_VALUES = SET_REALS, SET_INTEGERS, GET_REALS, GET_INTEGERS
+"""Of these, what sets and reads channels."""
 CALLS = ("", "instantiate", "setup", "enter_initialization", "exit_initialization", "set", "step", "get", "save",
          "restore", "forget", "serialize", "deserialize", "directional_derivatives", "interpolate", "terminate",
          "roll_back", "reset", "free", "check", "board")  # fmt: skip

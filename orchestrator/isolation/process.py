@@ -71,13 +71,13 @@ class HostProcess:
         self._limit_given = memory_limit is not None
         self._limit: int | None = None
         self._folder = Path(world.mkdtemp(prefix="host_", dir=guests[0].folder.parent))
-        *self.begins, self._lane_offset = layout(guest.cells for guest in guests)
+        *self.begins, self._lane_offset = layout(guest.room for guest in guests)
         start = {
             "path": sys.path,
             "memory_limit": _default_limit() if memory_limit is None else memory_limit,
             "guests": [
                 {"name": name, "folder": str(folder), "interface": plain_interface(interface), "begin": begin}
-                for (name, interface, folder, _), begin in zip(guests, self.begins, strict=True)
+                for (name, interface, folder, *_), begin in zip(guests, self.begins, strict=True)
             ],
         }
         self._door: Door | None = None
@@ -202,7 +202,7 @@ class HostProcess:
         if self.lane is None:
             assert self._door is not None
             line, spin = self._door.number, spin_time(2)
-            self.lane = lane.Lane(self.memory, self._lane_offset, line, self._moment, spin)
+            self.lane = lane.Lane(self.memory, self._lane_offset, line, self._moment, spin, self.patience)
         return self.lane
 
     def enter_lane(self) -> None:

@@ -40,15 +40,16 @@ class IsolatedSlave:
     def __init__(self, guest: Guest, process: HostProcess) -> None:
         self.name = guest.name
         self.interface: Interface = guest.interface
-        self.time = 0.0
+        self.time, self.rolls_back = 0.0, False
         self.log: list[str] = []
         self.disturbed: dict[str, None] = {}
-        self.rolls_back = False
         self._ride: Ride | None = None
         self._process, self._seat = process, len(process.seated)
         process.seated.append(self)
         self._begin = process.begins[self._seat] + messages.HEAD
         self._room, self._used = guest.cells, 0
+        self.slopes = self._begin + 8 * guest.cells, guest.slopes  # where derivatives of inputs stand, and how many may
+        self.functions: frozenset[str] = frozenset()  # that its library has, once the process has told
         self._is_made = self._is_gone = False
         self._lost: FmuError | None = None
         self._channels: list[IsolatedChannel] = []
@@ -136,16 +137,12 @@ class IsolatedSlave:
 
     def restore(self, state: Saved) -> None:
         """Come back to a saved state; it stays saved."""
-        if self._dirty or self.end is not None:
-            self.ask("")  # what was set before must not come after
-        self.outdate()
-        self._queue += frame(messages.RESTORE, state.number)
-        self.time = state.time
+        self.ask("restore", state.number)
 
     def forget(self, state: Saved) -> None:
         """Give a saved state back."""
         if self._lost is None and not self._is_gone:
-            self._queue += frame(messages.FORGET, state.number)
+            self.ask("forget", state.number)
 
     def serialize(self, state: Saved) -> bytes:
         """A saved state as bytes, as they are without isolation."""
@@ -290,7 +287,7 @@ class IsolatedSlave:
         """Let the process do something that may change every value, as all but a few do."""
         if self.end is not None:
             self._finish()
-        if operation not in ("save", "serialize"):
+        if operation not in ("save", "forget", "serialize"):
             self.outdate()
         return self._call(operation, *arguments).result
 
@@ -314,7 +311,7 @@ class IsolatedSlave:
         with self._mourning():
             self._process.wait_until_ready()
         try:
-            self._checked(self._receive())
+            self.functions = frozenset(map(str, self._checked(self._receive()).result or ()))
         except FmuError as error:
             self._lost = error
             raise
@@ -357,12 +354,11 @@ class IsolatedSlave:
 
     def mourn(self, lost: HostLostError) -> FmuError:
         """The error that tells that it was lost, with its process."""
-        begin, length = (0.0, 0.0) if self._ride is None or not self._process.is_riding else self._ride.last_step
-        if length:  # the time that the master has for it may be that of a step of another's
-            self.time = begin
-        end = self.end if self._ride is None or self.end is not None else self._ride.last_end
-        if end is not None and self._process.last_call()[0] == "get":
-            self.time = end
+        call = self._process.last_call()[0]
+        if self._ride is not None and self._process.is_riding:  # the master's may be that of another's step
+            self.time = self._ride.time_of(call)
+        elif call == "get" and self.end is not None:
+            self.time = self.end
         self.log = lost.log
         return LostError(str(lost), instance=self.name, time=self.time if self._is_made else None, log=lost.log)
 

@@ -7,18 +7,39 @@ of them: see ``native/lane.h``. Where there is no such lane, or for what it does
 from __future__ import annotations
 
 from collections.abc import Iterable
+from contextlib import suppress
+from ctypes import c_void_p
 from typing import Any, Protocol
 
+from ..errors import FmuError, LostError
 from ..fmi import Interface
+from ..fmi.binding import FmuSlave
 from .channel import IsolatedChannel
 from .lanes import HAS_LANES, lane
-from .messages import GET_INTEGERS, GET_REALS, LANE_STEP, NOTE_FAILED, SET_INTEGERS, SET_REALS
+from .messages import (
+    GET_INTEGERS,
+    GET_REALS,
+    LANE_FORGET,
+    LANE_RESTORE,
+    LANE_RESTORE_NOW,
+    LANE_SAVE,
+    LANE_STEP,
+    NOTE_FAILED,
+    NOTE_STATUS,
+    SET_INTEGERS,
+    SET_REALS,
+    SET_SLOPES,
+)
 from .process import HostProcess
 
-_DISCARD = 2
+_DISCARD, _FATAL, _PENDING = 2, 4, 5
 _VERSION = "2.0"
 """Of FMI, whose functions the lane calls."""
-_CALLS = {SET_REALS: "set", SET_INTEGERS: "set", LANE_STEP: "step", GET_REALS: "get", GET_INTEGERS: "get"}
+_CALLS = {
+    SET_REALS: "set", SET_INTEGERS: "set", LANE_STEP: "step", GET_REALS: "get", GET_INTEGERS: "get",
+    SET_SLOPES: "interpolate", LANE_SAVE: "save", LANE_RESTORE: "restore", LANE_FORGET: "forget",
+}  # fmt: skip
+_STATE = LANE_SAVE, LANE_RESTORE, LANE_FORGET
 
 
 class Rider(Protocol):
@@ -28,6 +49,7 @@ class Rider(Protocol):
     interface: Interface
     time: float
     rolls_back: bool
+    slopes: tuple[int, int]
 
     @property
     def has_news(self) -> bool:
@@ -59,26 +81,60 @@ class Ride:
         slave: the instance. process: its process. seat: its number there.
     """
 
+    DO_STEP, INTERPOLATE, STATE = FmuSlave.DO_STEP, FmuSlave.INTERPOLATE, FmuSlave.STATE
+
     def __init__(self, slave: Rider, process: HostProcess, seat: int) -> None:
         self._slave, self.name = slave, slave.name
         self._process, self._lane = process, process.open_lane()
         self._seat = seat
         self._rider = lane.Rider(self._lane, process.begins[seat], seat)
-        self._table: list[tuple[int, int]] = []
+        self._table: list[tuple[int, int, int]] = []
+        self._made: dict[tuple[int, int], int] = {}
+        self._is_final = True
         self._is_on = False
 
-    def add_step(self) -> tuple[int, int]:
-        """The function that takes a step, and what stands for the instance in its calls, as addresses."""
-        self._table.append((LANE_STEP, -1))
-        return lane.FUNCTIONS[LANE_STEP], self._rider.add(LANE_STEP, 0, 0)
+    # ---------------------------------------------------------------- what the kernel calls
+
+    def add_step(self, *, final: bool) -> tuple[int, int]:
+        """The function that takes a step, ``final`` or not, and what stands for the instance there: addresses."""
+        self._is_final = final
+        return lane.FUNCTIONS[LANE_STEP], self._add(LANE_STEP)
 
     def add(self, channel: IsolatedChannel, *, is_get: bool) -> tuple[int, int]:
         """The same for a function that reads or sets variables."""
         assert channel.cells is not None
         kinds = (GET_REALS, GET_INTEGERS) if is_get else (SET_REALS, SET_INTEGERS)
         kind = kinds[channel.kind != "Real"]
-        self._table.append((kind, channel.index))
-        return lane.FUNCTIONS[kind], self._rider.add(kind, channel.cells.offset, channel.cells.count)
+        place = channel.cells.offset, channel.cells.count
+        return lane.FUNCTIONS[kind], self._add(kind, channel.index, place)
+
+    def add_slopes(self) -> int:
+        """The function that takes derivatives of inputs; what sets these inputs stands for the instance."""
+        offset, room = self._slave.slopes
+        self._add(SET_SLOPES, offset, (offset, room))
+        return lane.FUNCTIONS[SET_SLOPES]
+
+    def add_state(self, number: int, *, at_once: bool) -> tuple[int, int, int, int]:
+        """The functions that save, restore and give back the state of a number, and what stands for the instance.
+
+        ``at_once``: nothing is asked of the instance after it was restored that would tell how that went.
+        """
+        first, *_ = [self._add(kind, number) for kind in _STATE]
+        save, restore, forget = _STATE[0], LANE_RESTORE_NOW if at_once else _STATE[1], _STATE[2]
+        return lane.FUNCTIONS[save], lane.FUNCTIONS[restore], lane.FUNCTIONS[forget], first
+
+    def _add(self, kind: int, number: int = -1, place: tuple[int, int] = (0, 0)) -> int:
+        """What is called in several places of a plan is one: its values stand in one place of the memory."""
+        if (kind, number) not in self._made:
+            self._made[kind, number] = self._rider.add(kind, *place)
+            self._table.append((kind, number, place[1]))
+        return self._made[kind, number]
+
+    def references(self, names: Iterable[str]) -> list[int]:
+        """The value references of variables."""
+        return [self._slave.interface.variables[name].reference for name in names]
+
+    # ---------------------------------------------------------------- on and off the lane
 
     def board(self) -> None:
         """Tell the process what its calls are, unless it knows that.
@@ -87,8 +143,8 @@ class Ride:
             FmuError: it is lost, or what was set before is refused.
         """
         if not self._is_on or self._slave.has_news:
-            self._rider.begin()
             self._slave.ask("board", self._table)
+            self._rider.begin(self._slave.time)
             self._is_on = True
 
     def begin(self) -> None:
@@ -104,43 +160,92 @@ class Ride:
         self._is_on = False
         self._process.leave_lane()
 
-    @property
-    def last_step(self) -> tuple[float, float]:
-        """Time and length in s of the last step; of length 0 if there was none."""
-        begin, length = self._rider.last_step()
-        return float(begin), float(length)
+    def time_of(self, call: str) -> float:
+        """The time in s at which it was last asked for something, by its name in `messages.CALLS`."""
+        begin, length, left = self._rider.last_step()
+        if call in ("save", "restore", "forget"):
+            return left
+        return begin + length if call == "get" else begin
+
+    # ---------------------------------------------------------------- failures
 
     @property
-    def last_end(self) -> float | None:
-        """The end in s of the last step, if there was one."""
-        begin, length = self.last_step
-        return begin + length if length else None
+    def failed(self) -> str:
+        """What it has failed of since it boarded, by its name in `messages.CALLS`; empty if nothing."""
+        found = abs(self._process.note(NOTE_FAILED, self._seat))
+        return _CALLS[self._table[found - 1][0]] if found else ""
 
-    def recover(self, call: str, status: int, time: float) -> bool:
+    def recover(self, call: str, status: int, time: float, *, apart: bool) -> bool:
         """See to a call that failed: whether it is to be made again, because nothing is wrong in the end.
 
         Args:
             call: the function of the standard.
             status: what it returned; it may be that of an earlier call.
             time: what this call gives or takes is of this time in s.
+            apart: whether it is no part of a step, so that what was set before is of that time as well.
 
         Raises:
             FmuError: the instance failed, or is lost.
         """
         slave = self._slave
-        begin, length = self._rider.last_step()
         if status == lane.SILENT:
-            slave.time = begin
-            slave.await_lane(begin + length)
+            self._await()
             return True
-        kind, channel = self._table[abs(self._process.note(NOTE_FAILED, self._seat)) - 1]
-        if kind == LANE_STEP and status == _DISCARD:
-            slave.ask("resume", begin, length, status, True)
+        if self.failed == "step" and status == _DISCARD:
+            begin, length, _ = self._rider.last_step()
+            slave.ask("resume", begin, length, status, self._is_final)
             return not call.endswith("DoStep")
-        slave.time = time if _CALLS[kind] == "get" else begin
-        self.check(slave.name_call(_CALLS[kind], channel), status)
+        slave.time = self._time_of_failure(time, apart=apart)
+        self.check(self._failed_call(), status)
         return False
+
+    def leave(self, time: float, *, apart: bool) -> None:
+        """See to a step that is given up, to be taken in another way from restored states.
+
+        Args:
+            time: what the call that failed gives or takes is of this time in s.
+            apart: whether that is no part of a step.
+
+        Raises:
+            FmuError: the instance is lost, or cannot be called any more.
+        """
+        self._await()
+        status = self._process.note(NOTE_STATUS, self._seat)
+        if not self.failed:
+            return
+        self._slave.time = self._time_of_failure(time, apart=apart)
+        if status == _FATAL or self.failed == "forget":
+            self.check(self._failed_call(), status)
+        if status == _PENDING and self.failed == "step":
+            with suppress(FmuError):  # it is cancelled: no state may be restored before
+                self.check(self._failed_call(), status)
+
+    def _await(self) -> None:
+        self._slave.time = self.time_of("step")
+        self._slave.await_lane(self.time_of("get"))
+
+    def _failed_call(self) -> str:
+        _, channel, _ = self._table[abs(self._process.note(NOTE_FAILED, self._seat)) - 1]
+        return self._slave.name_call(self.failed, channel)
+
+    def _time_of_failure(self, time: float, *, apart: bool) -> float:
+        is_known = self.failed in ("save", "restore", "step") or (self.failed == "set" and not apart)
+        return self.time_of(self.failed) if is_known else time
 
     def check(self, call: str, status: int) -> None:
         """Raise unless the status of a call is ok or warning, and what was set before was taken."""
         self._slave.ask("check", call, status)
+
+    # ---------------------------------------------------------------- saved states that the kernel has left
+
+    def restore(self, state: tuple[float, c_void_p]) -> None:
+        """Come back to a state, of which the time in s is given, and what the kernel has for it."""
+        self._slave.ask("come_back", self._number_of(state), state[0])
+
+    def forget(self, state: tuple[float, c_void_p]) -> None:
+        """Give it back, unless the instance is lost with it."""
+        with suppress(LostError):
+            self._slave.ask("give_back", self._number_of(state), state[0])
+
+    def _number_of(self, state: tuple[float, c_void_p]) -> int:
+        return self._table[(state[1].value or 0) - 1][1]

@@ -33,6 +33,16 @@ class Guest(NamedTuple):
     folder: Path
     cells: int
 
+    @property
+    def slopes(self) -> int:
+        """For how many derivatives of inputs there is room behind the values: two orders of each."""
+        return 2 * len(self.interface.of("input")) if self.interface.interpolates_inputs else 0
+
+    @property
+    def room(self) -> int:
+        """How many numbers of 64 bits all that takes: see `Slopes` in ``native/lane.h``."""
+        return self.cells + 1 + 2 * self.slopes
+
 
 class Seated(Protocol):
     """What a process needs of an instance that lives in it."""

@@ -13,10 +13,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .. import world
-from ..errors import FmuError, RunError
+from ..errors import FmuError, LostError, RunError
 from ..fmi.binding import LoadedSlave
 from ..fmi.guard import GUARD, NOTE_SIZE, NOTES, own_note, said
-from ..isolation import Ride
+from ..isolation import IsolatedSlave, Ride
 from .algorithms import Programmed, Repeated
 from .coupling import Coupling
 from .observer import Observer, Table
@@ -85,6 +85,7 @@ class CompiledLoop:
         self._exchange = coupling.exchange
         is_shared = kernel.HAS_THREADS and algorithm.takes_threads and "String" not in self._exchange.kinds
         is_shared = is_shared and coupling.refresher is None and coupling.loops is None
+        is_shared = is_shared and not any(isinstance(slave, IsolatedSlave) for slave in coupling.slaves.values())
         threads = max(1, min(coupling.settings.threads, len(coupling.slaves))) if is_shared else 1
         self.plan = Plan(coupling, [algorithm.program()], threads=threads)
         self._under_way: tuple[Table, Observer, float, float] | None = None
@@ -233,7 +234,9 @@ class CompiledLoop:
             return self._recover(failed, status, time, step)
         except RunError as failure:
             told = failure
-            if failed in self.plan.rounds and isinstance(failure, FmuError):
+            slave = self.plan.culprits[failed][0]
+            is_before = isinstance(slave, Ride) and slave.failed in ("save", "restore")  # and told in the round
+            if failed in self.plan.rounds and isinstance(failure, FmuError) and not is_before:
                 told = self.plan.rounds[failed].explain(failure, time, step)
             self.plan.forget(time)
             if told is failure:
@@ -251,10 +254,7 @@ class CompiledLoop:
         is_late = self.plan.late[failed]
         is_of_end = "Get" in call if kind < Kind.SAVE else kind != Kind.SAVE
         when = time + (period - phase) * step if is_of_end or (kind == Kind.SET and is_late) else time
-        if isinstance(slave, Ride):
-            if not 0 <= status <= 1:
-                return slave.recover(call, status, when)
-        elif kind == Kind.STEP and 0 <= status <= _DISCARD:  # it was discarded, or ended early
+        if kind == Kind.STEP and 0 <= status <= _DISCARD and isinstance(slave, LoadedSlave):  # or it ended early
             slave.resume(time, period * step, status, final=not is_late)
             return False
         owner = self._coupling.slaves[slave.name]
@@ -265,9 +265,13 @@ class CompiledLoop:
         if status >> 32 > 0 and not isinstance(slave, Ride):  # a call that was left, how, and with which exit code
             raise slave.lose(said(call, status >> 32, (status & 0x7FFFFFFF) - (status & 0x80000000)))
         try:
+            if isinstance(slave, Ride) and not 0 <= status <= 1:
+                return slave.recover(call, status, when, apart=kind in (Kind.READ, Kind.SLOPES))
             slave.check(call, status)
         except FmuError as error:
-            if kind != Kind.SLOPES or error.status == "fatal" or self._coupling.extrapolator is None:
+            is_refusal = kind == Kind.SLOPES and (not isinstance(slave, Ride) or slave.failed == "interpolate")
+            is_over = error.status == "fatal" or isinstance(error, LostError)
+            if not is_refusal or is_over or self._coupling.extrapolator is None:
                 raise
             self._coupling.extrapolator.refuse(slave.name, error, time)
             self.plan.courses.load()

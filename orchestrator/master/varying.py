@@ -19,6 +19,7 @@ from .. import world
 from ..errors import FmuError, RunError
 from ..fmi.binding import LoadedSlave
 from ..fmi.guard import NOTES, own_note, said
+from ..isolation import Ride
 from ..times import slack
 from . import compiled
 from .algorithms import VariableStep
@@ -75,6 +76,8 @@ class VaryingLoop:
         self._coupling, self._algorithm = coupling, algorithm
         self._happen, self._next_time = happen, next_time
         self._blocks: Blocks | None = None
+        self._is_refused = False
+        """Whether the compiled loop cannot do all that is asked for."""
 
     def run(self, span: Span, end: float, observe: Observer) -> bool:
         """Take steps up to a time in s; True unless the observer stopped the run.
@@ -121,8 +124,10 @@ class VaryingLoop:
         self, span: Span, end: float, due: float, observe: Observer
     ) -> tuple[NDArray[np.float64], list[Any]] | None:
         """A block of compiled steps; None where the next step is to be taken in Python."""
-        if self._blocks is None:
-            self._blocks = Blocks.of(self._coupling, self._algorithm)
+        algorithm = self._algorithm
+        if self._blocks is None and isinstance(algorithm, Adaptive) and algorithm.is_decided and not self._is_refused:
+            self._blocks = Blocks.of(self._coupling, algorithm)
+            self._is_refused = self._blocks is None
         return None if self._blocks is None else self._blocks.take(span, end, due, observe)
 
     def _tell(self, span: Span, rows: NDArray[np.float64], observe: Observer) -> bool:
@@ -134,7 +139,7 @@ class VaryingLoop:
             coupling.steps += len(part)
             coupling.time, *coupling.exchange.values[:] = np.asarray(told[-1], dtype=object).tolist()
             if not observe(coupling.steps, told if is_due else ()):
-                return False
+                return False  # as Ctrl-C does, the FMUs being at the block's end: nothing but their own ends may follow
         return True
 
 
@@ -147,10 +152,8 @@ class Blocks:
     """
 
     @classmethod
-    def of(cls, coupling: Coupling, algorithm: VariableStep) -> Blocks | None:
+    def of(cls, coupling: Coupling, algorithm: Adaptive) -> Blocks | None:
         """Where the kernel is there, and can do all that is asked for."""
-        if not isinstance(algorithm, Adaptive) or not algorithm.is_decided:
-            return None
         if not compiled.is_there() or not is_able(coupling, coupling.slaves):
             return None
         return cls(coupling, algorithm)
@@ -207,6 +210,10 @@ class Blocks:
         rows = np.empty((count + 1, max(1, min(self._block, compiled.MOST_VALUES // (count + 1)))))
         places, disturbed = np.array([(0, -1, 0)], PLACE), np.zeros(len(plan.operations), np.int64)
         plan.courses.load()
+        for ride in plan.rides:
+            ride.board()
+        for ride in plan.rides:
+            ride.begin()
         self._note, self._under_way = own_note(), (span, rows, observe)
         begin = world.perf_counter()
         taken, *_ = compiled.run_kernel(
@@ -249,9 +256,15 @@ class Blocks:
         if slave is None:  # nothing was called: a loop has no solution
             return
         kind, late = self._plan.operations[failed][0], self._plan.late[failed]
-        assert isinstance(slave, LoadedSlave)
         is_of_end = kind in (Kind.GET, Kind.READ, Kind.ASK) or (kind == Kind.SET and late)
-        slave.time = float(self._control["called_at"][0] + is_of_end * self._control["called_for"][0])
+        when = float(self._control["called_at"][0] + is_of_end * self._control["called_for"][0])
+        if isinstance(slave, Ride):
+            for ride in (slave, *self._plan.rides):
+                ride.leave(when, apart=kind in (Kind.READ, Kind.SLOPES))
+            if kind == Kind.FORGET:  # others have given theirs back
+                raise FmuError(f"took too long in {call}", instance=slave.name, time=when)
+            return
+        slave.time = when
         if status >> 32 > 0:
             raise slave.lose(said(call, status >> 32, (status & 0x7FFFFFFF) - (status & 0x80000000)))
         if status == _FATAL or kind == Kind.FORGET:

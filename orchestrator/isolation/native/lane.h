@@ -25,13 +25,14 @@ enum { RING = 256 };
 /* What an entry says, beside the number of an operation. */
 enum { READ = 0xfffffffe, LEAVE = 0xffffffff };
 
-enum { SET_REALS, SET_INTEGERS, STEP, GET_REALS, GET_INTEGERS, N_KINDS };
+enum { SET_REALS, SET_INTEGERS, STEP, GET_REALS, GET_INTEGERS, SET_SLOPES, SAVE, RESTORE, FORGET, N_KINDS };
 
 typedef struct {
     uint32_t instance; /* of the lane, */
     uint32_t what;     /* one of its operations; or READ all that it gives, or LEAVE the lane */
     double time;       /* of a step, s */
     double length;
+    uint64_t is_final; /* whether no state from before it will be restored */
 } Entry;
 
 /* What one side writes, into a line of the cache of its own. */
@@ -51,6 +52,21 @@ typedef struct {
 
 /* Words of 64 bits at the head of an instance's memory: see messages.py. */
 enum { NOTE_CALL = 0, NOTE_FAILED = 4, NOTE_STATUS = 5 };
+
+/* Derivatives of inputs in the memory: how many there are, then room for so many values, references and orders. */
+typedef struct {
+    int64_t *count;
+    double *values;
+    unsigned *references;
+    int *orders;
+} Slopes;
+
+static inline Slopes slopes_in(void *memory, size_t room)
+{
+    double *values = (double *)memory + 1;
+    unsigned *references = (unsigned *)(values + room);
+    return (Slopes){memory, values, references, (int *)(references + room)};
+}
 
 /* How long somebody watches before it sleeps: as long as it may where the last wait was a short one, else hardly; and not at
    all where the other needs the same core. */

@@ -34,9 +34,9 @@ static PyObject *make_lane(PyTypeObject *type, PyObject *arguments, PyObject *na
     Py_buffer memory;
     Py_ssize_t offset;
     int line;
-    double moment, spin;
+    double moment, spin, patience;
     (void)names;
-    if (!PyArg_ParseTuple(arguments, "w*nidd:Lane", &memory, &offset, &line, &moment, &spin)) {
+    if (!PyArg_ParseTuple(arguments, "w*niddd:Lane", &memory, &offset, &line, &moment, &spin, &patience)) {
         return NULL;
     }
     Lane *lane = lane_in(&memory, offset);
@@ -49,6 +49,7 @@ static PyObject *make_lane(PyTypeObject *type, PyObject *arguments, PyObject *na
     road->lane = lane;
     road->line = line;
     road->moment = (int64_t)(moment * 1e9);
+    road->patience = (int64_t)(patience * 1e9);
     road->spin.most = road->spin.now = (int64_t)(spin * 1e9);
     return (PyObject *)road;
 }
@@ -154,25 +155,33 @@ static PyObject *add(PyObject *self, PyObject *arguments)
     if (!PyArg_ParseTuple(arguments, "inn:add", &kind, &offset, &count)) {
         return NULL;
     }
-    if (!has_room(rider->road, offset, count)) {
+    if (!has_room(rider->road, offset, count) ||
+        (kind == SET_SLOPES && !has_room(rider->road, offset, 2 * count + 1))) {
         return NULL;
     }
     Seat *seat = calloc(1, sizeof *seat);
     if (seat == NULL) {
         return PyErr_NoMemory();
     }
-    *seat = (Seat){rider, rider->operations++, atomic_load(&rider->road->lane->master.count), offset,
-                   rider->seats};
+    *seat = (Seat){.rider = rider, .number = rider->operations++, .posted = atomic_load(&rider->road->lane->master.count),
+                   .offset = offset, .count = count, .next = rider->seats};
     rider->seats = seat;
+    rider->slopes = kind == SET_SLOPES ? seat : rider->slopes;
     rider->gives |= kind == GET_REALS || kind == GET_INTEGERS;
     return PyLong_FromVoidPtr(seat);
 }
 
-static PyObject *begin(PyObject *self, PyObject *nothing)
+static PyObject *begin(PyObject *self, PyObject *arguments)
 {
     RiderObject *rider = (RiderObject *)self;
-    (void)nothing;
-    rider->is_read = rider->is_under_way = 0;
+    if (!PyArg_ParseTuple(arguments, "d:begin", &rider->time)) {
+        return NULL;
+    }
+    rider->length = 0.0;
+    rider->is_read = 0;
+    for (Seat *seat = rider->seats; seat != NULL; seat = seat->next) {
+        seat->is_under_way = 0;
+    }
     Py_RETURN_NONE;
 }
 
@@ -180,7 +189,7 @@ static PyObject *last_step(PyObject *self, PyObject *nothing)
 {
     RiderObject *rider = (RiderObject *)self;
     (void)nothing;
-    return Py_BuildValue("(dd)", rider->time, rider->length);
+    return Py_BuildValue("(ddd)", rider->time, rider->length, rider->left);
 }
 
 static PyMethodDef lane_methods[] = {
@@ -192,15 +201,18 @@ static PyMethodDef lane_methods[] = {
 };
 static PyType_Slot lane_slots[] = {
     {Py_tp_new, make_lane}, {Py_tp_dealloc, free_lane}, {Py_tp_methods, lane_methods},
-    {Py_tp_doc, "Lane(memory, offset, line, moment, spin): the master's side; the last two in s."}, {0, NULL},
+    {Py_tp_doc, "Lane(memory, offset, line, moment, spin, patience): the master's side; the last three in s."}, {0, NULL},
 };
 static PyType_Spec lane_spec = {"railcosim.orchestrator.isolation.lane.Lane", sizeof(LaneObject), 0, Py_TPFLAGS_DEFAULT,
                                 lane_slots};
 
 static PyMethodDef rider_methods[] = {
-    {"add", add, METH_VARARGS, "add(kind, offset, count) -> what stands for the instance in calls of an operation."},
-    {"begin", begin, METH_NOARGS, "begin(): what was read before is old."},
-    {"last_step", last_step, METH_NOARGS, "last_step() -> time and length of the last step, in s."},
+    {"add", add, METH_VARARGS,
+     "add(kind, offset, count) -> what stands for the instance in calls of an operation. Those on a state are added in\n"
+     "their order, and the first stands for all."},
+    {"begin", begin, METH_VARARGS, "begin(time): it is at a time in s, and what was read before is old."},
+    {"last_step", last_step, METH_NOARGS,
+     "last_step() -> time and length of the last step, and where states were last treated, in s."},
     {NULL, NULL, 0, NULL},
 };
 static PyType_Slot rider_slots[] = {
@@ -212,8 +224,8 @@ static PyType_Spec rider_spec = {"railcosim.orchestrator.isolation.lane.Rider", 
 
 int add_riding(PyObject *module)
 {
-    PyObject *addresses = PyTuple_New(N_KINDS);
-    for (int kind = 0; addresses != NULL && kind < N_KINDS; kind++) {
+    PyObject *addresses = PyTuple_New(N_FUNCTIONS);
+    for (int kind = 0; addresses != NULL && kind < N_FUNCTIONS; kind++) {
         PyTuple_SetItem(addresses, kind, PyLong_FromVoidPtr(lane_functions[kind]));
     }
     lane_type = (PyTypeObject *)PyType_FromSpec(&lane_spec);

@@ -2,7 +2,9 @@
 
    What stands for the FMU's instance is an operation of ours. What is set or stepped is posted and not waited for; what is
    read was read by the host after the step, in one go. So a step of an instance is one hand-over, and instances in several
-   processes step at the same time where nothing is read between. A call that failed is told by one that comes after. */
+   processes step at the same time where nothing is read between. A call that failed is told by one that comes after.
+   Waited for are only derivatives of inputs, which an FMU may refuse, and what comes last in a step that was repeated: a
+   state that is restored for good, and those that are given back. */
 
 #include "riding.h"
 
@@ -90,6 +92,18 @@ static int set(void *component, const void *values, size_t size)
     return post(road, (Entry){.instance = rider->number, .what = seat->number}, 0, &seat->posted) ? 0 : SILENT;
 }
 
+/* Wait for what was posted; it is not posted again after it was waited for in vain. */
+static int finish(Seat *seat, int64_t most)
+{
+    seat->is_under_way = await(seat->rider->road, seat->posted, most) != CAME;
+    return seat->is_under_way ? SILENT : status_of(seat);
+}
+
+static int carry_out(Seat *seat, Entry entry, int64_t most)
+{
+    return seat->is_under_way || post(seat->rider->road, entry, 1, &seat->posted) ? finish(seat, most) : SILENT;
+}
+
 static int set_reals(void *component, const unsigned *references, size_t count, const double *values)
 {
     (void)references;
@@ -107,12 +121,11 @@ static int step(void *component, double time, double length, int is_final)
     Seat *seat = component;
     RiderObject *rider = seat->rider;
     LaneObject *road = rider->road;
-    (void)is_final;
     if (road->lane == NULL) {
         return SILENT;
     }
-    if (!rider->is_under_way) {
-        Entry entry = {.instance = rider->number, .what = seat->number, .time = time, .length = length};
+    if (!seat->is_under_way) {
+        Entry entry = {rider->number, seat->number, time, length, (uint64_t)is_final};
         if (!post(road, entry, 1, &seat->posted)) {
             return SILENT;
         }
@@ -121,11 +134,72 @@ static int step(void *component, double time, double length, int is_final)
         rider->wanted = seat->posted;
         rider->is_read = 1;
     }
-    if (rider->gives) {
-        return 0;
+    return rider->gives ? 0 : finish(seat, road->moment);
+}
+
+static int set_slopes(void *component, const unsigned *references, size_t count, const int *orders,
+                      const double *values)
+{
+    RiderObject *rider = ((Seat *)component)->rider; /* what stands for the instance is what sets these inputs */
+    Seat *seat = rider->slopes;
+    if (rider->road->lane == NULL) {
+        return SILENT;
     }
-    rider->is_under_way = await(road, seat->posted, road->moment) != CAME;
-    return rider->is_under_way ? SILENT : status_of(seat);
+    if (!seat->is_under_way) {
+        Slopes to = slopes_in(values_of(seat), (size_t)seat->count);
+        *to.count = (int64_t)count;
+        memcpy(to.values, values, count * sizeof *values);
+        memcpy(to.references, references, count * sizeof *references);
+        memcpy(to.orders, orders, count * sizeof *orders);
+        rider->is_read = 0;
+    }
+    return carry_out(seat, (Entry){.instance = rider->number, .what = seat->number}, rider->road->moment);
+}
+
+/* Post one of the operations on a state, by how many numbers it stands behind that which saves it. */
+static Entry of_state(const Seat *seat, uint32_t which)
+{
+    seat->rider->left = seat->rider->time + seat->rider->length;
+    return (Entry){.instance = seat->rider->number, .what = seat->number + which};
+}
+
+static int save(void *component, void **handle)
+{
+    Seat *seat = component;
+    if (seat->rider->road->lane == NULL || !post(seat->rider->road, of_state(seat, 0), 0, &seat->posted)) {
+        return SILENT;
+    }
+    *handle = (void *)(uintptr_t)(seat->number + 1);
+    return 0;
+}
+
+static int restore(void *component, void *handle)
+{
+    Seat *seat = component;
+    (void)handle;
+    if (seat->rider->road->lane == NULL || !post(seat->rider->road, of_state(seat, 1), 0, &seat->posted)) {
+        return SILENT;
+    }
+    seat->rider->is_read = 0;
+    return 0;
+}
+
+static int restore_now(void *component, void *handle)
+{
+    Seat *seat = component;
+    LaneObject *road = seat->rider->road;
+    (void)handle;
+    seat->rider->is_read = 0;
+    return road->lane == NULL ? SILENT : carry_out(seat, of_state(seat, 1), road->moment);
+}
+
+/* Waited for as long as it may take: once others have given theirs back, nobody can come back to the step's begin. */
+static int forget(void *component, void **handle)
+{
+    Seat *seat = component;
+    LaneObject *road = seat->rider->road;
+    *handle = NULL;
+    return road->lane == NULL ? SILENT : carry_out(seat, of_state(seat, 2), road->patience);
 }
 
 static int get(void *component, void *values, size_t size)
@@ -164,9 +238,11 @@ static int get_integers(void *component, const unsigned *references, size_t coun
     return get(component, values, count * sizeof *values);
 }
 
-void *const lane_functions[N_KINDS] = {
+void *const lane_functions[N_FUNCTIONS] = {
     [SET_REALS] = (void *)set_reals, [SET_INTEGERS] = (void *)set_integers, [STEP] = (void *)step,
-    [GET_REALS] = (void *)get_reals, [GET_INTEGERS] = (void *)get_integers,
+    [GET_REALS] = (void *)get_reals, [GET_INTEGERS] = (void *)get_integers, [SET_SLOPES] = (void *)set_slopes,
+    [SAVE] = (void *)save, [RESTORE] = (void *)restore, [FORGET] = (void *)forget,
+    [RESTORE_NOW] = (void *)restore_now,
 };
 
 #endif

@@ -23,7 +23,8 @@ typedef struct {
     Py_buffer memory;
     Lane *lane; /* NULL once it is closed */
     int line;   /* the socket, whose end tells of that of the process */
-    int64_t moment;
+    int64_t moment;   /* ns that a call is waited for in the loop, */
+    int64_t patience; /* and one of which nothing may be left undone */
     Spin spin;
 } LaneObject;
 
@@ -36,23 +37,27 @@ typedef struct {
     uint32_t wanted; /* how many entries must be done for what is read to be there */
     int is_read;     /* whether they read it: nothing was set since */
     int gives;       /* whether there is anything to read */
-    int is_under_way; /* whether a step was waited for in vain */
-    double time;     /* of the last step, s */
+    double time;     /* of the last step, s; or when it boarded, with no length */
     double length;
+    double left;     /* where it was when a state was last saved, restored or given back, s */
     struct Seat *seats;
+    struct Seat *slopes; /* of the operation that takes derivatives of inputs */
 } RiderObject;
 
-/* An operation, in the place of an FMU's instance. */
+/* An operation, in the place of an FMU's instance; of those that save a state, restore it and give it back, the first. */
 typedef struct Seat {
     RiderObject *rider;
     uint32_t number;
     uint32_t posted;   /* how many entries must be done for the last of this to be done */
-    Py_ssize_t offset; /* of its values in the memory */
+    int is_under_way;  /* whether it was waited for in vain */
+    Py_ssize_t offset; /* of its values in the memory, */
+    Py_ssize_t count;  /* and how many there is room for */
     struct Seat *next;
 } Seat;
 
-/* Functions in the place of those of an FMU, by kind of operation. */
-extern void *const lane_functions[N_KINDS];
+/* Functions in the place of those of an FMU, by kind of operation; and one that waits until a state is restored. */
+enum { RESTORE_NOW = N_KINDS, N_FUNCTIONS };
+extern void *const lane_functions[N_FUNCTIONS];
 
 /* Wait for so many entries to be done, for so many ns at most. */
 int await(LaneObject *road, uint32_t ticket, int64_t most);

@@ -14,13 +14,17 @@ typedef int (*SetReal)(void *component, const unsigned *references, size_t count
 typedef int (*GetReal)(void *component, const unsigned *references, size_t count, double *values);
 typedef int (*SetInteger)(void *component, const unsigned *references, size_t count, const int *values);
 typedef int (*GetInteger)(void *component, const unsigned *references, size_t count, int *values);
+typedef int (*SetSlopes)(void *component, const unsigned *references, size_t count, const int *orders,
+                         const double *values);
+typedef int (*Save)(void *component, void **handle);
+typedef int (*Restore)(void *component, void *handle);
 
 /* An operation, as Python writes it. */
 typedef struct {
     int64_t kind;
     uint64_t function;
     uint64_t component;
-    uint64_t references;
+    uint64_t references; /* of a state: where its handle stands */
     uint64_t count;
     uint64_t offset; /* of its values in the memory */
     int64_t note;
@@ -42,6 +46,11 @@ typedef struct {
     fenv_t floats;    /* and all that belongs to it */
 } Service;
 
+static int is_failure(int status)
+{
+    return status < 0 || status > 1;
+}
+
 static int is_a_copy; /* this process is one that an FMU has forked */
 
 static void note_copy(void) /* uncovered: in a process that an FMU has forked */
@@ -59,19 +68,48 @@ static size_t length(const Guest *guest)
     return (size_t)guest->operations.len / sizeof(Operation);
 }
 
+static int set_slopes(SetSlopes set, void *component, void *memory, size_t room)
+{
+    Slopes given = slopes_in(memory, room);
+    size_t count = (uint64_t)*given.count < room ? (size_t)*given.count : room;
+    return set(component, given.references, count, given.orders, given.values);
+}
+
+static int save(Save get, void *component, void **handle)
+{
+    *handle = NULL;
+    int status = get(component, handle);
+    if (is_failure(status)) {
+        *handle = NULL;
+    }
+    return status;
+}
+
+static int forget(Save give_back, void *component, void **handle)
+{
+    void *old = *handle;
+    *handle = NULL; /* whatever comes of it */
+    return give_back(component, &old);
+}
+
 static int do_one(const Guest *guest, const Operation *it, const Entry *entry)
 {
     void *component = (void *)(uintptr_t)it->component;
     void *values = guest->memory + it->offset;
     const unsigned *references = (const unsigned *)(uintptr_t)it->references;
+    void **handle = (void **)(uintptr_t)it->references;
     uintptr_t function = (uintptr_t)it->function;
     put(guest->notes + NOTE_CALL, it->note);
     switch (it->kind) {
     case SET_REALS: return ((SetReal)function)(component, references, it->count, values);
     case SET_INTEGERS: return ((SetInteger)function)(component, references, it->count, values);
-    case STEP: return ((DoStep)function)(component, entry->time, entry->length, 1);
+    case STEP: return ((DoStep)function)(component, entry->time, entry->length, (int)entry->is_final);
     case GET_REALS: return ((GetReal)function)(component, references, it->count, values);
-    default: return ((GetInteger)function)(component, references, it->count, values);
+    case GET_INTEGERS: return ((GetInteger)function)(component, references, it->count, values);
+    case SET_SLOPES: return set_slopes((SetSlopes)function, component, values, it->count);
+    case SAVE: return save((Save)function, component, handle);
+    case RESTORE: return ((Restore)function)(component, *handle);
+    default: return forget((Save)function, component, handle);
     }
 }
 
@@ -86,12 +124,12 @@ static int take(const Service *service, const Guest *guest, size_t number, const
     if (float_control() != service->control) { /* an FMU must not change the numbers of its next calls */
         fesetenv(&service->floats);
     }
-    if (status < 0 || status > 1) {
+    if (is_failure(status)) {
         put(guest->notes + NOTE_STATUS, status);
         int is_get = it->kind == GET_REALS || it->kind == GET_INTEGERS;
         put(guest->notes + NOTE_FAILED, is_get ? (int64_t)number + 1 : -1 - (int64_t)number);
     }
-    return status == 0 || status == 1;
+    return !is_failure(status);
 }
 
 /* All that an instance gives. */
@@ -152,8 +190,10 @@ static int is_sound(const Service *service, const Guest *guest, Py_ssize_t head)
                   guest->operations.len % (Py_ssize_t)sizeof *operations == 0;
     for (size_t n = 0; is_fine && n < length(guest); n++) {
         const Operation *it = operations + n;
+        uint64_t rest = it->offset <= size ? (size - it->offset) / sizeof(double) : 0;
         is_fine = it->kind >= 0 && it->kind < N_KINDS && it->function != 0 && it->offset <= size &&
-                  it->count <= (size - it->offset) / sizeof(double);
+                  (it->kind == SET_SLOPES ? it->count < (rest + 1) / 2 : it->count <= rest) &&
+                  (it->kind < SAVE || it->references != 0);
     }
     return is_fine;
 }

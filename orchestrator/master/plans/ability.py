@@ -5,15 +5,12 @@ from __future__ import annotations
 from collections.abc import Iterable
 
 from ...fmi import Slave
-from ...fmi.binding import LoadedSlave
-from ...isolation import IsolatedSlave, Ride, may_ride
+from ...fmi.binding import LoadedSlave, call_name
+from ...isolation import IsolatedSlave, may_ride
 from ..coupling import Coupling
 from ..exchange import Exchange
-from .courses import Courses
+from .courses import Called
 from .flattening import can_exchange
-
-Called = LoadedSlave | Ride
-"""What the kernel calls."""
 
 
 def is_able(coupling: Coupling, repeated: Iterable[str]) -> bool:
@@ -22,9 +19,10 @@ def is_able(coupling: Coupling, repeated: Iterable[str]) -> bool:
     able = all(_can_be_called(x, exchange) for x in slaves.values())
     able = able and not any(link.mapping is not None for link in exchange.every_link)
     able = able and all(can_be_restored(slaves[name]) for name in repeated)
-    able = able and Courses.are_able(coupling.extrapolator, exchange)
+    continued = coupling.extrapolator.courses if coupling.extrapolator else ()
+    able = able and all(_has(slaves[name], "interpolate") for name in continued)
+    able = able and (refresher is None or refresher.is_decided)
     here = not any(isinstance(slave, IsolatedSlave) for slave in slaves.values())
-    able = able and (refresher is None or (here and refresher.is_decided))
     return able and (here or coupling.loops is None) and can_exchange(exchange)
 
 
@@ -44,14 +42,13 @@ def called(slave: Slave) -> Called:
     return slave
 
 
-def slopes_call(slave: Called) -> str:
-    """The function that takes the slopes of an instance's inputs."""
-    assert isinstance(slave, LoadedSlave)
-    return slave.INTERPOLATE
-
-
 def can_be_restored(slave: Slave) -> bool:
     """Whether the kernel can save an instance's state and come back to it."""
-    if not isinstance(slave, LoadedSlave) or not slave.interface.can_save_state:
+    return slave.interface.can_save_state and all(_has(slave, call) for call in ("save", "restore", "forget"))
+
+
+def _has(slave: Slave, call: str) -> bool:
+    """Whether an instance's library has the function behind one of its methods."""
+    if not isinstance(slave, LoadedSlave | IsolatedSlave):
         return False
-    return all(call in slave.functions for call in slave.STATE[:3])
+    return call_name(slave.interface, call, "Real", ()) in slave.functions

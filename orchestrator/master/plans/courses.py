@@ -2,18 +2,25 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+
 import numpy as np
 
 from ...fmi.binding import LoadedSlave
+from ...isolation import Ride
 from ..exchange import Exchange
 from ..extrapolation import Extrapolator
 from .layout import AS_NOTED, AT_END, AT_STAMP, COURSE, POINTS
+
+Called = LoadedSlave | Ride
+"""What the kernel calls."""
 
 
 class Courses:
     """The inputs of instances that are continued.
 
     Args:
+        slaves: all that the kernel calls.
         extrapolator: what continues them; None where all are held.
         exchange: what values there are.
         in_every_way: whether there is a course for values of a step's begin, of its end, and for those that were noted;
@@ -24,7 +31,14 @@ class Courses:
         count: how many points there are beside those that are noted.
     """
 
-    def __init__(self, extrapolator: Extrapolator | None, exchange: Exchange, *, in_every_way: bool = False) -> None:
+    def __init__(
+        self,
+        slaves: Mapping[str, Called],
+        extrapolator: Extrapolator | None,
+        exchange: Exchange,
+        *,
+        in_every_way: bool = False,
+    ) -> None:
         self._extrapolator, self._exchange = extrapolator, exchange
         of = {} if extrapolator is None else extrapolator.courses
         self._names = list(of)
@@ -37,10 +51,9 @@ class Courses:
         self.stamps = np.zeros(len(exchange.stamps))
         begin = 0
         for name, course in of.items():
-            slave, end = exchange.slaves[name], begin + len(course.members)
+            slave, end = slaves[name], begin + len(course.members)
             assert extrapolator is not None
-            assert isinstance(slave, LoadedSlave)
-            function = slave.addresses(slave.INTERPOLATE)[0]
+            function = slave.add_slopes() if isinstance(slave, Ride) else slave.addresses(slave.INTERPOLATE)[0]
             for way in ways:
                 own = begin + self.count * (way == AS_NOTED)
                 row = function, -1, own, len(course.members), extrapolator.order, 0, way
@@ -48,12 +61,6 @@ class Courses:
                 self.points["place"][own : own + end - begin] = course.members
                 self.points["reference"][own : own + end - begin] = list(slave.references(course.names))
             begin = end
-
-    @staticmethod
-    def are_able(extrapolator: Extrapolator | None, exchange: Exchange) -> bool:
-        """Whether the kernel can call for them all."""
-        slaves = [exchange.slaves[name] for name in (extrapolator.courses if extrapolator else ())]
-        return all(isinstance(slave, LoadedSlave) and slave.INTERPOLATE in slave.functions for slave in slaves)
 
     def widen(self, cells: int) -> None:
         """There are so many numbers more behind the values."""

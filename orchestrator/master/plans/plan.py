@@ -9,14 +9,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...fmi import Channel, Type
-from ...fmi.binding import ElementsChannel, Fmi3Slave, FmuSlave, LoadedSlave, is_watched
+from ...fmi.binding import ElementsChannel, Fmi3Slave, LoadedSlave, is_watched
 from ...isolation import IsolatedChannel, Ride
 from ..algebraic import LoopSolver
 from ..algorithms import Batch, Iteration, Operation, Repeated
 from ..coupling import Coupling
 from ..exchange import Change, Yield
-from .ability import Called, called, slopes_call
-from .courses import Courses
+from .ability import called
+from .courses import Called, Courses
 from .flattening import Entry, Wide, noted, parts_of, type_of
 from .layout import (
     AS_IT_IS,
@@ -86,7 +86,6 @@ class Plan:
         self._coupling = coupling
         self.exchange = coupling.exchange
         self.wide = Wide(coupling.exchange)
-        self.courses = Courses(coupling.extrapolator, coupling.exchange, in_every_way=len(sections) > 1)
         self._channels: list[tuple[int, ...]] = []
         self.channels: list[ElementsChannel] = []
         self._entries: list[Entry] = []
@@ -100,6 +99,8 @@ class Plan:
         self.changes: list[tuple[Change, int, Type]] = []
         self.slaves = {name: called(slave) for name, slave in coupling.slaves.items()}
         self.rides = [slave for slave in self.slaves.values() if isinstance(slave, Ride)]
+        way = len(sections) > 1
+        self.courses = Courses(self.slaves, coupling.extrapolator, coupling.exchange, in_every_way=way)
         self.rounds: dict[int, Iteration] = {}
         self.iterations: dict[int, Iteration] = {}
         self.loops: list[tuple[float, ...]] = []
@@ -165,7 +166,6 @@ class Plan:
             handle, slave = int(self._handles[n]), self.slaves[name]
             self._handles[n] = 0
             if handle:
-                assert isinstance(slave, LoadedSlave)
                 slave.forget((time, c_void_p(handle)))
 
     def forget_arrays(self) -> None:
@@ -183,7 +183,6 @@ class Plan:
         for (name, which), n in self.states.items():
             handle, slave = int(self._handles[n]), self.slaves[name]
             if handle and not which:
-                assert isinstance(slave, LoadedSlave)
                 slave.restore((time, c_void_p(handle)))
         self.forget(time)
 
@@ -246,17 +245,17 @@ class Plan:
     def _add_state(self, names: Sequence[str], kind: Kind, which: int = 0) -> None:
         for name in names:
             slave = self.slaves[name]
-            assert isinstance(slave, LoadedSlave)
             index = self.states.setdefault((name, which), len(self.states))
             self.add_operation(kind, index, (slave, slave.STATE[kind - Kind.SAVE]), (1, 0))
 
     def _made_states(self) -> NDArray[np.void]:
         made = np.zeros(len(self.states), STATE)
-        for (name, _), n in self.states.items():
+        for (name, which), n in self.states.items():
             slave = self.slaves[name]
-            assert isinstance(slave, LoadedSlave)
-            functions = [slave.addresses(call)[0] for call in slave.STATE[:3]]
-            made[n] = (*functions, slave.pointer, 0)
+            if isinstance(slave, Ride):
+                made[n] = (*slave.add_state(n, at_once=bool(which)), 0)
+            else:
+                made[n] = (*(slave.addresses(call)[0] for call in slave.STATE[:3]), slave.pointer, 0)
         self._handles = made["handle"]
         return made
 
@@ -298,7 +297,7 @@ class Plan:
             made += self._add_channels(
                 Kind.EXTEND, slave, feed.channel, entries, feed.is_real, due=(rate, 0), index=number
             )
-            self.add_operation(Kind.SLOPES, number, (slave, slopes_call(slave)), (rate, 0))
+            self.add_operation(Kind.SLOPES, number, (slave, slave.INTERPOLATE), (rate, 0))
 
     def _add_notes(self, slave: Called) -> None:
         """Note the inputs that have just been set, behind the values."""
@@ -325,7 +324,7 @@ class Plan:
                 self.add_operation(Kind.SET, channel, (slave, call), (1, 0))
                 continue
             self.add_operation(Kind.EXTEND, course, (slave, call), (1, 0))
-            self.add_operation(Kind.SLOPES, course, (slave, slopes_call(slave)), (1, 0))
+            self.add_operation(Kind.SLOPES, course, (slave, slave.INTERPOLATE), (1, 0))
 
     def add_gets(self, slave: Called, rate: int, direct: bool | None, kind: Kind = Kind.GET) -> None:
         """Read outputs, all or those that are ``direct`` or not; with what events make of them."""
@@ -374,7 +373,7 @@ class Plan:
             self.add_operation(kind, len(self._channels) if index is None else index, (slave, call), due, late=late)
             if isinstance(slave, Ride):
                 assert isinstance(own, IsolatedChannel)
-                addresses = slave.add(own, is_get=kind == Kind.GET)
+                addresses = slave.add(own, is_get=kind not in (Kind.SET, Kind.EXTEND))
             else:
                 addresses = slave.addresses(call)
             what = len(self._entries), len(places), int(is_real), type_of(slave, own.kind)
@@ -384,7 +383,6 @@ class Plan:
         return made
 
     def _add_step(self, slave: Called, rate: int, *, final: bool) -> None:
-        call = FmuSlave.DO_STEP if isinstance(slave, Ride) else slave.DO_STEP
-        self.add_operation(Kind.STEP, len(self._instances), (slave, call), (rate, 0), late=not final)
-        addresses = slave.add_step() if isinstance(slave, Ride) else slave.addresses(call)
+        self.add_operation(Kind.STEP, len(self._instances), (slave, slave.DO_STEP), (rate, 0), late=not final)
+        addresses = slave.add_step(final=final) if isinstance(slave, Ride) else slave.addresses(slave.DO_STEP)
         self._instances.append((*addresses, addressof(slave.told) if isinstance(slave, Fmi3Slave) else 0))

@@ -1,8 +1,9 @@
 /* One of two species, dx/dt = x (a + b u) + c u by RK4 in parts no longer than 1 ms, with u held over the step. By value
    reference: 0 u (input); 1 y (output: x + d u, with -DHELD the u of the last step, else the one that is set); 2 a; 3 b;
-   4 c; 5 d; 6 start (parameters). The description may say of y's dependencies what it likes. With -DSHY it cannot be read
-   between being set and the next step; with -DROUGH its solver is off by 1e-5, in another way for each u; with
-   -DORDER=n it refuses derivatives of u of a higher order than n, and follows the first. */
+   4 c; 5 d; 6 start (parameters); 7 states (output: how many there are in the process, saved and not given back). The
+   description may say of y's dependencies what it likes. With -DSHY it cannot be read between being set and the next
+   step; with -DROUGH its solver is off by 1e-5, in another way for each u; with -DORDER=n it refuses derivatives of u of a
+   higher order than n, and follows the first. */
 
 #include "fmi2.h"
 
@@ -10,6 +11,8 @@ typedef struct {
     double v[7], x, held, time, rate;
     int steps, is_set;
 } Species;
+
+static int states;
 
 void *fmi2Instantiate(const char *name, int kind, const char *guid, const char *place, const Callbacks *callbacks,
                       int visible, int logging)
@@ -69,6 +72,13 @@ int fmi2GetReal(void *c, const unsigned *vr, size_t count, double *values)
     return 0;
 }
 
+int fmi2GetInteger(void *c, const unsigned *vr, size_t count, int *values)
+{
+    (void)c, (void)vr, (void)count;
+    values[0] = states;
+    return 0;
+}
+
 #ifdef ORDER
 int fmi2SetRealInputDerivatives(void *c, const unsigned *vr, size_t count, const int *orders, const double *values)
 {
@@ -112,6 +122,7 @@ int fmi2DoStep(void *c, double time, double step, int final)
 int fmi2GetFMUstate(void *c, void **state)
 {
     *state = malloc(sizeof(Species));
+    states++;
     memcpy(*state, c, sizeof(Species));
     return 0;
 }
@@ -127,6 +138,7 @@ int fmi2FreeFMUstate(void *c, void **state)
     (void)c;
     free(*state);
     *state = NULL;
+    states--;
     return 0;
 }
 

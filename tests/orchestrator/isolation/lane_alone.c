@@ -1,8 +1,10 @@
 /* Both sides of a lane in one process, as threads, so that a sanitizer sees them: two instances in one lane hand on what
-   they count. The argument is how long either side watches, in ns. */
+   they count. Each step is taken twice, from a state that is saved before and given back; what the first one gives is wrong
+   by a derivative of the input. The argument is how long either side watches, in ns. */
 
 #include "serving.c"
 
+#include <math.h>
 #include <stdio.h>
 #include <string.h>
 
@@ -19,18 +21,45 @@ int add_riding(PyObject *made)
     return 0;
 }
 
-enum { STEPS = 20000, INSTANCES = 2, HEAD = 64, ROOM = 64 };
+enum { STEPS = 10000, INSTANCES = 2, HEAD = 64, ROOM = 128, AT_SLOPES = 8 };
 
 typedef struct {
-    double u, x;
+    double u, x, slope;
     int m, n;
 } Model;
+
+static atomic_int states;
 
 static int set_real(void *c, const unsigned *vr, size_t count, const double *values)
 {
     (void)vr;
     (void)count;
     ((Model *)c)->u = values[0];
+    ((Model *)c)->slope = 0.0;
+    return 0;
+}
+static int set_slope(void *c, const unsigned *vr, size_t count, const int *orders, const double *values)
+{
+    ((Model *)c)->slope = count == 2 && vr[1] == 7 && orders[1] == 2 ? values[1] : NAN;
+    return 0;
+}
+static int get_state(void *c, void **state)
+{
+    atomic_fetch_add(&states, 1);
+    *state = malloc(sizeof(Model));
+    memcpy(*state, c, sizeof(Model));
+    return 0;
+}
+static int set_state(void *c, void *state)
+{
+    memcpy(c, state, sizeof(Model));
+    return 0;
+}
+static int free_state(void *c, void **state)
+{
+    (void)c;
+    atomic_fetch_sub(&states, 1);
+    free(*state);
     return 0;
 }
 static int get_real(void *c, const unsigned *vr, size_t count, double *values)
@@ -57,8 +86,10 @@ static int get_whole(void *c, const unsigned *vr, size_t count, int *values)
 static int do_step(void *c, double time, double length, int is_final)
 {
     Model *it = c;
-    (void)is_final;
-    it->x = it->u + 1.0;
+    if (is_final) {
+        return 4;
+    }
+    it->x = it->u + 1.0 + it->slope;
     it->n = it->m + 1;
     return time + length > STEPS + 1.0 ? 3 : 0; /* one step more than there are */
 }
@@ -79,6 +110,9 @@ typedef int (*SetR)(void *, const unsigned *, size_t, const double *);
 typedef int (*GetR)(void *, const unsigned *, size_t, double *);
 typedef int (*SetI)(void *, const unsigned *, size_t, const int *);
 typedef int (*GetI)(void *, const unsigned *, size_t, int *);
+typedef int (*SetS)(void *, const unsigned *, size_t, const int *, const double *);
+typedef int (*Get)(void *, void **);
+typedef int (*Put)(void *, void *);
 
 #define UNTIL_HEARD(call) \
     do { \
@@ -90,10 +124,12 @@ int main(int count, char **arguments)
     Model models[INSTANCES] = {{0}};
     Operation operations[INSTANCES][N_KINDS];
     Guest guests[INSTANCES];
-    uintptr_t functions[N_KINDS] = {(uintptr_t)set_real, (uintptr_t)set_whole, (uintptr_t)do_step, (uintptr_t)get_real,
-                                    (uintptr_t)get_whole};
+    uintptr_t functions[N_KINDS] = {(uintptr_t)set_real,  (uintptr_t)set_whole, (uintptr_t)do_step,
+                                    (uintptr_t)get_real,  (uintptr_t)get_whole, (uintptr_t)set_slope,
+                                    (uintptr_t)get_state, (uintptr_t)set_state, (uintptr_t)free_state};
+    void *handles[INSTANCES];
     int64_t spin = count > 1 ? atol(arguments[1]) : 0;
-    LaneObject road = {.lane = &shared.lane, .line = -1, .moment = spin < 1000 ? 5000 : 1000000000};
+    LaneObject road = {.lane = &shared.lane, .line = -1, .moment = spin < 1000 ? 5000 : 1000000000, .patience = 1000000000};
     RiderObject riders[INSTANCES];
     Seat seats[INSTANCES][N_KINDS];
     road.memory.buf = &shared;
@@ -105,31 +141,48 @@ int main(int count, char **arguments)
         guests[k].operations.len = sizeof operations[k];
         riders[k] = (RiderObject){.road = &road, .head = head, .number = k, .gives = 1};
         for (uint32_t n = 0; n < N_KINDS; n++) {
-            uint64_t offset = (uint64_t)head + HEAD + 8 * n;
-            operations[k][n] = (Operation){n, functions[n], (uintptr_t)&models[k], 0, 1, offset, n + 1};
-            seats[k][n] = (Seat){.rider = &riders[k], .number = n, .offset = (Py_ssize_t)offset};
+            uint64_t offset = (uint64_t)head + HEAD + 8 * (n == SET_SLOPES ? AT_SLOPES : n), many = n == SET_SLOPES ? 2 : 1;
+            uintptr_t where = n >= SAVE ? (uintptr_t)&handles[k] : 0;
+            operations[k][n] = (Operation){n, functions[n], (uintptr_t)&models[k], where, many, offset, n + 1};
+            seats[k][n] = (Seat){.rider = &riders[k], .number = n, .offset = (Py_ssize_t)offset, .count = (Py_ssize_t)many};
         }
+        riders[k].slopes = &seats[k][SET_SLOPES];
     }
     Service service = {.lane = &shared.lane, .guests = guests, .count = INSTANCES, .spin = {spin, spin}};
     pthread_t thread;
     pthread_create(&thread, NULL, host, &service);
     double x = 0.0;
-    int n = 0, status;
+    int n = 0, misses = 0, status;
     for (int k = 0; k < STEPS; k++) {
         for (int j = 0; j < INSTANCES; j++) {
+            const unsigned references[] = {7, 7};
+            const int orders[] = {1, 2};
+            const double slopes[] = {1.0, 2.0};
+            double wrong = 0.0;
+            void *handle = NULL;
+            UNTIL_HEARD(((Get)lane_functions[SAVE])(&seats[j][SAVE], &handle));
+            UNTIL_HEARD(((SetR)lane_functions[SET_REALS])(&seats[j][SET_REALS], NULL, 1, &x));
+            UNTIL_HEARD(((SetS)lane_functions[SET_SLOPES])(&seats[j][SET_REALS], references, 2, orders, slopes));
+            UNTIL_HEARD(((Step)lane_functions[STEP])(&seats[j][STEP], k, 1.0, 0));
+            if (k % 2 == 0) {
+                UNTIL_HEARD(((GetR)lane_functions[GET_REALS])(&seats[j][GET_REALS], NULL, 1, &wrong));
+                misses += wrong != x + 3.0;
+            }
+            UNTIL_HEARD(((Put)lane_functions[k % 3 ? RESTORE : RESTORE_NOW])(&seats[j][SAVE], handle));
             UNTIL_HEARD(((SetR)lane_functions[SET_REALS])(&seats[j][SET_REALS], NULL, 1, &x));
             UNTIL_HEARD(((SetI)lane_functions[SET_INTEGERS])(&seats[j][SET_INTEGERS], NULL, 1, &n));
-            UNTIL_HEARD(((Step)lane_functions[STEP])(&seats[j][STEP], k, 1.0, 1));
+            UNTIL_HEARD(((Step)lane_functions[STEP])(&seats[j][STEP], k, 1.0, 0));
+            UNTIL_HEARD(((Get)lane_functions[FORGET])(&seats[j][SAVE], &handle));
             UNTIL_HEARD(((GetR)lane_functions[GET_REALS])(&seats[j][GET_REALS], NULL, 1, &x));
             UNTIL_HEARD(((GetI)lane_functions[GET_INTEGERS])(&seats[j][GET_INTEGERS], NULL, 1, &n));
         }
     }
-    UNTIL_HEARD(((Step)lane_functions[STEP])(&seats[1][STEP], STEPS + 1.0, 1.0, 1));
+    UNTIL_HEARD(((Step)lane_functions[STEP])(&seats[1][STEP], STEPS + 1.0, 1.0, 0));
     UNTIL_HEARD(((GetR)lane_functions[GET_REALS])(&seats[1][GET_REALS], NULL, 1, &x));
     uint32_t ticket;
     while (!post(&road, (Entry){.what = LEAVE}, 1, &ticket)) {
     }
     pthread_join(thread, NULL);
     printf("%g %d %d\n", x, n, status);
-    return !(x == INSTANCES * STEPS && n == INSTANCES * STEPS && status == 3);
+    return !(x == INSTANCES * STEPS && n == INSTANCES * STEPS && status == 3 && misses == 0 && states == 0);
 }

@@ -184,12 +184,17 @@ def able(odd_fmu, tmp_path):
 
 @pytest.fixture
 def species(compile_c, xml, tmp_path):
-    """The FMU of species.c, whose y is said to depend on the inputs given; None says nothing."""
+    """The FMU of species.c, whose y is said to depend on the inputs given; None says nothing.
 
-    def make(on, *options, able="", tolerance=None, **of):
+    One that is ``counted`` tells how many states there are of all its instances.
+    """
+
+    def make(on, *options, able="", tolerance=None, counted=False, **of):
         v = xml["variable"]
         shown = [v("u", "input", start=0.0), v("y", "output", dependencies=on, **of)]
         shown += [v(name, "parameter", start=0.0) for name in ("a", "b", "c", "d", "start")]
+        if counted:
+            shown.append(v("states", "output", "Integer", dependencies=[], variability="discrete"))
         all_able = f"canGetAndSetFMUstate canHandleVariableCommunicationStepSize {able}".split()
         said = " ".join(f'{name}="true"' for name in all_able)
         text = xml["description"](shown, identifier="Species", simulation=said)

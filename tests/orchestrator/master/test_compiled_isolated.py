@@ -4,6 +4,7 @@ import re
 import shutil
 import sys
 from dataclasses import replace
+from itertools import product
 from types import SimpleNamespace
 
 import fmpy
@@ -30,8 +31,9 @@ def apart(used, contents):
     """Run a system with some instances isolated, compiled, and without isolation; gives the first result."""
 
     def go(system, *names):
-        found, known = attempt(isolate(system, names)), attempt(system)
-        assert len(used) >= 2
+        found = attempt(isolate(system, names))
+        assert used
+        known = attempt(system)
         assert contents(found) == contents(known)
         assert described(found.error) == described(known.error)
         return found
@@ -51,12 +53,21 @@ def described(error):
 
 
 @pytest.fixture
-def hurried(monkeypatch):
-    """Nobody waits long for a call in the loop: most come to be waited for outside."""
-    made = process.lane.Lane
-    changed = SimpleNamespace(**vars(process.lane))
-    changed.Lane = lambda memory, offset, line, moment, spin: made(memory, offset, line, 2e-6, spin)
-    monkeypatch.setattr(process, "lane", changed)
+def hurry(monkeypatch):
+    """Let nobody wait longer for a call in the loop than this, in s, nor for a state to be given back."""
+    made, changed = process.lane.Lane, SimpleNamespace(**vars(process.lane))
+
+    def go(moment, patience):
+        changed.Lane = lambda memory, offset, line, _, spin, __: made(memory, offset, line, moment, spin, patience)
+        monkeypatch.setattr(process, "lane", changed)
+
+    return go
+
+
+@pytest.fixture
+def hurried(hurry):
+    """Most calls come to be waited for outside the loop."""
+    hurry(2e-6, 60.0)
 
 
 # -------------------------------------------------------------------- the same bits
@@ -214,18 +225,30 @@ ENDS = {
 
 @pytest.mark.sample(5)
 @pytest.mark.parametrize(
-    ("where", "what"),
-    [("step", what) for what in ENDS] + [("get", "null"), ("set", "null"), ("get", "hang"), ("set", "hang")],
+    ("where", "what", "algorithm"),
+    [
+        *(("step", what, "gauss-seidel") for what in ENDS),
+        *((where, what, "gauss-seidel") for where in ("get", "set") for what in ("null", "hang")),
+        ("save", "null", "iterative"),
+        ("step", "exit", "iterative"),
+        ("save", "hang", "adaptive"),
+        ("get", "null", "adaptive"),
+    ],
 )
-def test_a_process_that_is_lost(used, hostile, where, what):
-    system = System(stop_time=4.0, step=0.5)
+def test_a_process_that_is_lost(used, hostile, where, what, algorithm):
+    system = System(stop_time=4.0, step=0.5, algorithm=algorithm, tolerance=1e-2)
     system.add("it", hostile(mute=True), deed=f"{where} {what} 1")
     system.instances["it"] = replace(system.instances["it"], isolate=True, step_timeout=1.0)
     system.add("other", hostile(mute=True))
     system.connect("other.x", "it.u")
+    if algorithm != "gauss-seidel":
+        system.connect("it.x", "other.u", offset=1.0)
+        system.stepping = replace(
+            system.stepping, tolerances={f"{name}.calls": [1.0, 1e9] for name in system.instances}
+        )
     result = attempt(system)
     assert used
-    call = {"step": "DoStep", "get": "GetReal", "set": "SetReal"}[where]
+    call = {"step": "DoStep", "get": "GetReal", "set": "SetReal", "save": "GetFMUstate"}[where]
     assert result.error.instance == "it"
     assert re.match(rf"it, t = [0-9.]+ s: {ENDS[what].format(f'fmi2{call}')}", str(result.error))
 
@@ -244,8 +267,8 @@ def test_slow_is_not_hanging_and_what_was_forked_does_not_go_on(hostile):
 def test_what_does_not_fit_the_memory_is_refused():
     memory = bytearray(lane.SIZE + 128)
     with pytest.raises(ValueError, match="it does not fit into the memory"):
-        lane.Lane(memory, 192, 0, 1.0, 0.0)
-    road = lane.Lane(memory, 128, 0, 1.0, 0.0)
+        lane.Lane(memory, 192, 0, 1.0, 0.0, 1.0)
+    road = lane.Lane(memory, 128, 0, 1.0, 0.0, 1.0)
     for wrong in (lambda: lane.Rider(road, -8, 0), lambda: lane.Rider(road, 0, 0).add(0, 64, 1 << 60)):
         with pytest.raises(ValueError, match="does not stand in the memory"):
             wrong()
@@ -264,3 +287,91 @@ def test_what_does_not_fit_the_memory_is_refused():
 def test_it_is_watched_for_only_where_a_core_is_left():
     assert lanes.spin_time(1) > 0.0
     assert lanes.spin_time(10_000) == 0.0
+
+
+# -------------------------------------------------------------------- what is repeated, refreshed and continued
+
+
+def coupled(path, algorithm, mode=0, **how):
+    """a and b of odd.c in a cycle, each with what the other gives, in every type; b does what its mode says."""
+    system = System(**{"stop_time": 8.0, "step": 0.25, "algorithm": algorithm, "tolerance": 1e-3} | how)
+    for name in ("a", "b"):
+        system.add(name, path, v=0.5, u=1.0)
+    system.connect("a.x", "b.u", scale=0.5)
+    system.connect("b.x", "a.u", offset=1.0)
+    system.connect("b.y", "a.v", scale=0.2)
+    system.connect("b.n", "a.m")
+    system.connect("a.off", "b.on")
+    system.instances["b"].start["mode"] = mode
+    return system
+
+
+@pytest.mark.parametrize("isolated", [["all"], ["together"], ["b"]])
+@pytest.mark.parametrize("how", [{}, {"extrapolation": 2}], ids=str)
+@pytest.mark.parametrize("algorithm", ["iterative", "adaptive"])
+def test_from_saved_states(apart, able, isolated, how, algorithm):
+    assert apart(coupled(able, algorithm, stop_time=3.0, **how), *isolated).status == "completed"
+
+
+STEPS = 1, 2, 3, 4, 5, 10, 23, 33, 40, 41, 42, 44, 63, 73
+STATES = 103, 104, 113, 114, 123, 124
+QUICK = ("gauss-seidel", 84), ("gauss-seidel", 92), ("iterative", 40), ("iterative", 103), ("iterative", 113)
+QUICK += ("iterative", 123), ("adaptive", 5), ("adaptive", 104), ("adaptive", 113), ("adaptive", 124)
+MODES = [("gauss-seidel", mode) for mode in (83, 84, 91, 92)]
+MODES += [(algorithm, mode) for algorithm in ("iterative", "adaptive") for mode in (*STEPS, *STATES, 83, 84, 91, 92)]
+
+
+@pytest.mark.parametrize(
+    ("algorithm", "mode"),
+    [pytest.param(*each, marks=[pytest.mark.long] * (each not in QUICK), id=f"{each[0]}-{each[1]}") for each in MODES],
+)
+def test_whatever_it_does_in_a_step_that_is_repeated(apart, able, mode, algorithm):
+    """As above, and of derivatives and states."""
+    result = apart(coupled(able, algorithm, mode, extrapolation=2 * (80 < mode < 100)), "b")
+    assert 4.5 < result.time[-1] <= 8.0
+
+
+@pytest.mark.parametrize("algorithm", ["iterative", "adaptive"])
+def test_of_what_is_repeated_nobody_waits_long_in_the_loop(apart, able, algorithm, hurried):
+    """Steps of varying length are Python's then."""
+    result = apart(coupled(able, algorithm, stop_time=1.0, extrapolation=1), "together")
+    assert result.status == "completed"
+
+
+def test_a_state_that_is_not_given_back_in_time(able, hurry):
+    hurry(0.25, 0.0)
+    error = attempt(isolate(coupled(able, "adaptive"), ["b"])).error
+    assert "b" in error.instance
+    assert "took too long in fmi2FreeFMUstate" in str(error)
+
+
+@pytest.mark.parametrize(
+    ("algorithm", "mode"),
+    [
+        *(("jacobi", mode) for mode in (0, 23, 33)),
+        *(pytest.param(*each, marks=pytest.mark.long) for each in product(["gauss-seidel", "adaptive"], [0, 23, 33])),
+    ],
+)
+def test_feed_through_is_refreshed(apart, able, mode, algorithm):
+    """In a circle; set and read at the end of a step, which may fail."""
+    system = coupled(able, algorithm, mode, refresh=True, tolerance=1e-2)
+    system.connect("a.y", "b.v", scale=0.5)
+    result = apart(system, "together")
+    assert (result.status == "completed") == (mode == 0)
+    assert result["b.y"][5:] == pytest.approx((result["b.x"] + 0.5 * result["a.y"])[5:], abs=1e-9)
+
+
+@pytest.mark.parametrize("isolated", [[], ["together"]])
+@pytest.mark.parametrize("algorithm", ["iterative", "adaptive"])
+def test_states_are_given_back(used, species, isolated, algorithm):
+    """At no time are there more than two of each instance."""
+    system = System(stop_time=1.0, step=0.05, algorithm=algorithm, tolerance=1e-4)
+    path = species([], counted=True)
+    system.add("prey", path, a=1.0, b=-0.1, start=20.0)
+    system.add("predator", path, a=-0.4, b=0.02, start=5.0)
+    system.connect("predator.y", "prey.u")
+    system.connect("prey.y", "predator.u")
+    result = run(isolate(system, isolated))
+    assert used
+    assert len(result.time) > 20
+    assert 1.0 <= result["prey.states"][2:].max() <= 4.0
