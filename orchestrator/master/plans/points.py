@@ -11,7 +11,7 @@ from ..algorithms import HEAD
 from ..coupling import Coupling
 from ..exchange import Exchange, Yield
 from ..refresh import Refresher
-from .ability import Called
+from .courses import Called
 from .flattening import parts_of
 from .layout import CIRCLE, NOBODY, Kind
 
