@@ -124,8 +124,11 @@ class VaryingLoop:
         self, span: Span, end: float, due: float, observe: Observer
     ) -> tuple[NDArray[np.float64], list[Any]] | None:
         """A block of compiled steps; None where the next step is to be taken in Python."""
-        algorithm = self._algorithm
-        if self._blocks is None and isinstance(algorithm, Adaptive) and algorithm.is_decided and not self._is_refused:
+        algorithm, refresher = self._algorithm, self._coupling.refresher
+        is_decided = isinstance(algorithm, Adaptive) and algorithm.is_decided
+        is_decided = is_decided and (refresher is None or refresher.is_decided)
+        if self._blocks is None and is_decided and not self._is_refused:
+            assert isinstance(algorithm, Adaptive)
             self._blocks = Blocks.of(self._coupling, algorithm)
             self._is_refused = self._blocks is None
         return None if self._blocks is None else self._blocks.take(span, end, due, observe)

@@ -44,7 +44,7 @@ def called(slave: Slave) -> Called:
 
 def can_be_restored(slave: Slave) -> bool:
     """Whether the kernel can save an instance's state and come back to it."""
-    return slave.interface.can_save_state and all(_has(slave, call) for call in ("save", "restore", "forget"))
+    return all(_has(slave, call) for call in ("save", "restore", "forget")) and slave.interface.can_save_state
 
 
 def _has(slave: Slave, call: str) -> bool:
