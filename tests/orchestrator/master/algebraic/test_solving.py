@@ -257,3 +257,15 @@ def test_steps_that_vary_and_no_solution(both, mine):
     system.connect("switch.y", "lag.u")
     result = both(system, kind="native")
     assert isinstance(result.error, CouplingError)
+
+
+@pytest.mark.parametrize("seed", [1, 2, 3, 4, 5, 7])
+def test_drawn_ones_that_jump(told, bent, seed):
+    """What is added to them grows by 5 in each step, so that every start is a poor one; some end without a solution."""
+    rng = np.random.default_rng(seed)
+    start = [
+        {name: float(value) for name, value in zip("abc", rng.normal(size=3) * [2.0, 2.0, 1.0], strict=True)}
+        | {"f": int(rng.integers(1, 6))}
+        for _ in range(2)
+    ]
+    told(coupled(bent(derives=seed % 2 == 0), *start, stop=50.0, step=5.0))
