@@ -31,11 +31,7 @@ def layout(rooms: Iterable[int]) -> list[int]:
     return begins
 
 
-def spin_time(processes: int) -> float:
-    """How long to watch, in s: not at all where that would keep a core from one that has something to do.
-
-    Args:
-        processes: how many may watch at the same time, the master included.
-    """
+def spin_time() -> float:
+    """How long to watch, in s: not at all on a single core, which that would keep from the other."""
     cores = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else 1
-    return _SPIN if processes <= cores else 0.0
+    return _SPIN if cores > 1 else 0.0

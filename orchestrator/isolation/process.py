@@ -201,7 +201,7 @@ class HostProcess:
         """The way by which the compiled step loop calls it, once it is ready."""
         if self.lane is None:
             assert self._door is not None
-            line, spin = self._door.number, spin_time(2)
+            line, spin = self._door.number, spin_time()
             self.lane = lane.Lane(self.memory, self._lane_offset, line, self._moment, spin, self.patience)
         return self.lane
 

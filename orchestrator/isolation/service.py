@@ -96,4 +96,4 @@ class Service:
 def serve(memory: mmap.mmap, services: Sequence[Service]) -> None:
     """Take calls of all instances of a process from its lane until told to leave."""
     guests = [(service.begin, service.operations) for service in services]
-    lane.serve(memory, len(memory) - LANE_SIZE, guests, spin_time(2))
+    lane.serve(memory, len(memory) - LANE_SIZE, guests, spin_time())

@@ -284,9 +284,10 @@ def test_what_does_not_fit_the_memory_is_refused():
     assert not road.leave()
 
 
-def test_it_is_watched_for_only_where_a_core_is_left():
-    assert lanes.spin_time(1) > 0.0
-    assert lanes.spin_time(10_000) == 0.0
+def test_it_is_watched_for_only_where_a_core_is_left(monkeypatch):
+    for cores, is_watched in (({0}, False), ({0, 3}, True)):
+        monkeypatch.setattr(lanes.os, "sched_getaffinity", lambda _, cores=cores: cores)
+        assert (lanes.spin_time() > 0.0) == is_watched
 
 
 # -------------------------------------------------------------------- what is repeated, refreshed and continued
