@@ -210,7 +210,7 @@ def test_a_crash_is_at_the_begin_of_a_step_of_its_own(shared):
     """In the lane, where it is seen when others have gone on, and the master with them."""
     a, b = shared("a", "b", deeds={"b": "step null 5"})
     rides = [one.ride() for one in (a, b)]
-    calls = [ride.add_step() for ride in rides]
+    calls = [ride.add_step(final=True) for ride in rides]
     for ride in rides:
         ride.board()
     for ride in rides:
