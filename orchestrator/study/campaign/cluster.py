@@ -23,6 +23,8 @@ from .parcel import Parcel
 _LOG = logging.getLogger(__name__)
 _PATIENCE = 30.0
 """How long, in s, a scheduler may be away, or the end of workers may take."""
+_START = 120.0
+"""How long, in s, a worker may take to be started; then it is given up, and another one is."""
 _LOOK = 1.0
 """How often, in s, workers are counted."""
 _KEPT = 256 << 20
@@ -91,6 +93,9 @@ class Cluster:
                 self._count = len(self._client.nthreads())
             # One that dies before its nanny has seen it run is not started again, and with none the runs would wait.
             if self._own is not None and self._count < (wanted := len(self._own.worker_spec)):
+                for name, nanny in list(self._own.workers.items()):
+                    if nanny.status.name in ("closed", "failed"):  # while there is one of that name, none is started
+                        self._own.workers.pop(name, None)
                 self._own.scale(wanted)
         return self._count
 
@@ -152,6 +157,7 @@ class Cluster:
                 dashboard_address="127.0.0.1:0",  # None would take port 8787 all the same
                 local_directory=str(folder),
                 silence_logs=logging.CRITICAL,
+                death_timeout=f"{_START:g}s",
                 env={"TMPDIR": str(folder)},
             )
         held.callback(self._close_own)

@@ -7,6 +7,7 @@ import signal
 import socket
 import subprocess
 import sys
+import threading
 import time
 
 import dask
@@ -15,7 +16,7 @@ import pytest
 from distributed.core import Status
 from railcosim.orchestrator import Study, load
 from railcosim.orchestrator.errors import RunError
-from railcosim.orchestrator.study.campaign import run_study
+from railcosim.orchestrator.study.campaign import cluster, run_study
 from railcosim.orchestrator.study.campaign.cluster import Cluster
 
 from .conftest import plan_of, same
@@ -69,6 +70,34 @@ def test_a_killed_study_goes_on_as_often_as_it_is_killed(native, system, scenari
         study.wait()
     assert subprocess.run([*command, "--resume"], check=False, timeout=300).returncode in (0, 1)
     assert same(Study.load(tmp_path / "out"), undisturbed)
+
+
+def test_a_worker_that_does_not_come_up_is_given_up_and_another_one_is_started(native, system, tmp_path, monkeypatch):
+    """The only one there is, twice: stopped, it never says that it runs, like one killed while it is being started."""
+    monkeypatch.setattr(cluster, "_START", 10.0)
+    how, undisturbed = native
+    me, over, stopped = psutil.Process(), threading.Event(), []
+
+    def disturb(first):
+        first.kill()
+        while len(stopped) < 2 and not over.is_set():
+            for one in [one for one in workers_of(me) if one not in {first, *stopped}]:
+                one.suspend()
+                stopped.append(one)
+            time.sleep(0.005)
+
+    def begin(done, count, failed):
+        if done == 3:
+            threading.Thread(target=disturb, args=workers_of(me)).start()
+
+    try:
+        study = run_study(plan_of(system, runs=RUNS), how, tmp_path / "out", workers=1, progress=begin)
+    finally:
+        over.set()
+        for one in stopped:  # Dask does so at the end of the process
+            one.kill()
+    assert len(stopped) == 2
+    assert same(study, undisturbed)
 
 
 def test_workers_that_die_before_they_are_seen_to_run_are_started_again(native, system, tmp_path, monkeypatch):

@@ -5,11 +5,13 @@ import os
 import signal
 import threading
 from contextlib import suppress
+from types import SimpleNamespace
 from typing import ClassVar
 
 import psutil
 import pytest
 from distributed import LocalCluster
+from distributed.core import Status
 from railcosim.orchestrator import Study, world
 from railcosim.orchestrator.errors import RailcosimError, RunError
 from railcosim.orchestrator.study.campaign import cluster as cluster_module
@@ -64,6 +66,7 @@ def test_a_worker_that_was_given_up_is_started_again(system, how, there):
 
     class Own:
         worker_spec = (0, 1)
+        workers: ClassVar = {name: SimpleNamespace(status=status) for name, status in enumerate(Status)}
         asked: ClassVar = []
 
         def scale(self, count):
@@ -73,6 +76,8 @@ def test_a_worker_that_was_given_up_is_started_again(system, how, there):
     made._client, made._own = Client(), Own()
     assert made.workers == there
     assert Own.asked == ([2] if there < 2 else [])
+    ended = {nanny.status for nanny in Own.workers.values()} & {Status.closed, Status.failed}
+    assert bool(ended) == (there == 2)
 
 
 def test_a_cluster_is_closed_whole_whatever_a_user_presses(system, how, scheduler, monkeypatch):
