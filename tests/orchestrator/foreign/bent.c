@@ -2,7 +2,7 @@
    1 v (real inputs); 2 y, 3 z (outputs); 4 a, 5 b, 6 c (parameters); 7 f (0 f(x) = x, 1 tanh x, 2 x^3, 3 x between -2 and 2,
    4 exp x, 5 cos x, 6 root of x, which is no number below 0); 8 mode; 9 m (integer input); 10 n (integer output). From t = 1 s on
    mode says what is odd: 100 + s the status of being asked for derivatives, 200 + s of being set, 300 + s of being read;
-   400 rounds upward when asked. */
+   400 rounds upward when asked; 401: y = u + 1; 402 and 403 refuse a u that is near the last one, or far. */
 
 #include "fmi2.h"
 
@@ -67,10 +67,14 @@ int fmi2SetupExperiment(void *c, int has_tolerance, double tolerance, double sta
 
 int fmi2SetReal(void *c, const unsigned *vr, size_t count, const double *values)
 {
+    Bent *s = c;
+    int how = s->time >= 1.0 ? s->whole[8] : 0, is_refused = 0;
     for (size_t k = 0; k < count; k++) {
-        ((Bent *)c)->v[vr[k]] = values[k];
+        double by = fabs(values[k] - s->v[vr[k]]);
+        is_refused |= vr[k] == 0 && ((how == 402 && by > 0.0 && by < 1e-4) || (how == 403 && by > 1e-3));
+        s->v[vr[k]] = values[k];
     }
-    return odd(c, 200);
+    return is_refused ? 3 : odd(c, 200);
 }
 
 int fmi2GetReal(void *c, const unsigned *vr, size_t count, double *values)
@@ -78,6 +82,7 @@ int fmi2GetReal(void *c, const unsigned *vr, size_t count, double *values)
     Bent *s = c;
     s->v[2] = s->v[6] + s->v[4] * f(s->whole[7], s->v[0]) + s->v[5] * f(s->whole[7], s->v[1]) + s->time;
     s->v[3] = s->v[0] * s->v[1];
+    s->v[2] = s->time >= 1.0 && s->whole[8] == 401 ? s->v[0] + 1.0 : s->v[2];
     for (size_t k = 0; k < count; k++) {
         values[k] = s->v[vr[k]];
     }

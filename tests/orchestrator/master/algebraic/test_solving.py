@@ -5,7 +5,7 @@ import sys
 import fmpy
 import numpy as np
 import pytest
-from railcosim.orchestrator.errors import CouplingError
+from railcosim.orchestrator.errors import CouplingError, FmuError
 from railcosim.orchestrator.master import compiled
 from railcosim.orchestrator.run.execution import run
 from railcosim.orchestrator.system import Connection, Event, System
@@ -269,3 +269,14 @@ def test_drawn_ones_that_jump(told, bent, seed):
         for _ in range(2)
     ]
     told(coupled(bent(derives=seed % 2 == 0), *start, stop=50.0, step=5.0))
+
+
+@pytest.mark.parametrize("mode", [401, 402, 403])
+def test_what_ends_a_solution(told, bent, mode):
+    """From 1 s on y = u + 1, or the FMU refuses what is tried to find slopes, or a step."""
+    system = System(stop_time=2.0, step=0.25, algebraic_loops="solve")
+    system.add("p", bent(derives=False), a=-3.0, c=1.0, mode=mode)
+    system.connect("p.y", "p.u")
+    result = told(system)
+    assert isinstance(result.error, CouplingError if mode == 401 else FmuError)
+    assert result.time[-1] == 0.75
