@@ -71,7 +71,7 @@ int fmi2SetReal(void *c, const unsigned *vr, size_t count, const double *values)
     int how = s->time >= 1.0 ? s->whole[8] : 0, is_refused = 0;
     for (size_t k = 0; k < count; k++) {
         double by = fabs(values[k] - s->v[vr[k]]);
-        is_refused |= vr[k] == 0 && ((how == 402 && by > 0.0 && by < 1e-4) || (how == 403 && by > 1e-3));
+        is_refused |= vr[k] == 0 && ((how == 402 && by > 0.0 && by < 1e-4) || (how == 403 && by > 1.0));
         s->v[vr[k]] = values[k];
     }
     return is_refused ? 3 : odd(c, 200);
