@@ -329,7 +329,8 @@ static Status find_indicators(Instance *s, double *result)
     relate(s);
     for (int k = 0; k < N_MODES; k++) {
         if (model_indicated[k]) {
-            double first = s->relations[2 * k] / (1.0 + fabs(s->relations[2 * k + 1]));
+            double first = s->relations[2 * k], size = 1.0 + fabs(s->relations[2 * k + 1]);
+            first = isinf(first) ? copysign(1.0, first) : first / size; /* nothing comes near to infinity */
             result[n++] = first + (model_modes[k] == MODE_PIECE || s->modes[k] != 0.0 ? HYSTERESIS : -HYSTERESIS);
         }
     }

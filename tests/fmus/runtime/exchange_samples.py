@@ -166,3 +166,16 @@ class Rooted(Component):
     def derivatives(self):
         beyond = self.x > 1.0
         return {"x": where(beyond, log(where(beyond, self.x - 1.0, 1.0)), -self.x)}
+
+
+class Unbounded(Component):
+    """A comparison with a place that is nowhere, as that after the last stop of a line is."""
+
+    x = State("1", 0.0)
+    before = Output("1", bool)
+
+    def derivatives(self):
+        return {"x": 1.0}
+
+    def outputs(self):
+        return {"before": self.x < float("inf")}

@@ -58,6 +58,13 @@ def test_at_rest_of_a_comparison_its_indicator_is_a_hair_away_on_the_side_where_
         assert 0.0 < abs(indicator) < 1e-8
 
 
+def test_what_is_compared_with_infinity_is_as_far_as_can_be(exchanged):
+    fmu = exchanged("Unbounded").initialize()
+    fmu.event()
+    assert fmu.numbers("EventIndicators") == [pytest.approx(1.0)]
+    assert fmu.get("before") == 1
+
+
 def test_indicators_are_in_the_order_of_one(choices):
     choices.event(0.1, level=1e9)
     assert 0.9 < max(map(abs, choices.numbers("EventIndicators"))) < 2.0
