@@ -43,6 +43,8 @@ LOOP_TESTS = [
 ]
 RUNTIME_TESTS = ["tests/fmus/runtime"]
 SCARCE = ROOT / "tests" / "scarce.h"
+_CHOSEN = "not campaign and (not long or sample)"
+"""Of tests of which a sample is in the quick tier, all cases."""
 MARK = re.compile(r"/\* uncovered: \w.*\*/")
 COMPILER = """#!/bin/sh
 exec gcc "$@" -O0 -DALWAYS_INLINE="static inline" --coverage -fprofile-update=atomic \\
@@ -140,11 +142,12 @@ def measure_c() -> None:
     command += [f"-I{sysconfig.get_paths()['include']}", "-dumpdir", f"{notes / 'kernel'}/", *map(str, KERNEL)]
     subprocess.run([*command, "-o", str(library)], check=True)
     plugin = str(ROOT / "tests" / "orchestrator" / "master")
-    run_tests(["-p", "own_kernel", "-n", "2", *LOOP_TESTS], KERNEL=str(library), PYTHONPATH=plugin)
+    seen = {"KERNEL": str(library), "PYTHONPATH": plugin, "COVERAGE_NOTES": str(notes)}
+    run_tests(["-p", "own_kernel", "-n", "2", "-m", _CHOSEN, *LOOP_TESTS], **seen)
     compiler = notes / "cc"
     compiler.write_text(COMPILER)
     compiler.chmod(0o755)
-    run_tests(["-n", "2", *RUNTIME_TESTS], CC=str(compiler), COVERAGE_NOTES=str(notes))
+    run_tests(["-n", "2", "-m", _CHOSEN, *RUNTIME_TESTS], CC=str(compiler), COVERAGE_NOTES=str(notes))
 
 
 @dataclass

@@ -1,7 +1,7 @@
 """Components for the tests of model exchange: every kind of choice, and a sampled block with a standstill."""
 
 from railcosim.components import Component, Input, Memory, Output, Parameter, State
-from railcosim.components.maths import floor, log, maximum, piecewise_constant, sin, where
+from railcosim.components.maths import floor, log, maximum, piecewise_constant, sin, sqrt, where
 
 
 class Choices(Component):
@@ -117,7 +117,7 @@ class Stairs(Component):
 
 
 class Inverse(Component):
-    """A sampled block whose output, or comparison, has no value where its state or input is zero; its rate has one."""
+    """A sampled block whose output has no value where its state is zero, and its comparison where an input is negative."""
 
     u = Input("1", 1.0)
     w = Input("1", 1.0)
@@ -126,7 +126,7 @@ class Inverse(Component):
     y = Output("1")
 
     def derivatives(self):
-        return {"x": where(self.x > self.u, 1.0, -1.0) * where(1.0 / self.w > 0.5, 1.0, 0.5)}
+        return {"x": where(self.x > self.u, 1.0, -1.0) * where(sqrt(self.w) > 0.5, 1.0, 0.5)}
 
     def outputs(self):
         return {"y": 1.0 / self.x}

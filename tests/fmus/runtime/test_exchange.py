@@ -167,7 +167,7 @@ def test_an_output_without_a_value_stops_no_integration(exchanged):
     assert "'y' is inf" in fmu.said
     assert fmu.numbers("Derivatives") == [-1.0]
     assert fmu.numbers("ContinuousStates") == [0.0]
-    assert fmu.set("w", 0.0) == OK
+    assert fmu.set("w", -1.0) == OK
     assert fmu.numbers("EventIndicators") == DISCARD
     assert "event indicator 2 is" in fmu.said
 

@@ -111,7 +111,7 @@ def test_the_event_indicators_are_a_variable_to_be_read(exchanged):
 def test_an_event_indicator_without_a_value_is_none(exchanged):
     fmu = exchanged("Inverse").initialize()
     fmu.event()
-    assert fmu.set("w", 0.0) == OK
+    assert fmu.set("w", -1.0) == OK
     assert fmu.numbers("EventIndicators") == 2  # discarded
     fmu.get("event.indicators", count=2, status=ERROR)
     assert "event indicator 2 is" in fmu.said

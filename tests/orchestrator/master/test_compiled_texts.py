@@ -5,7 +5,6 @@ import shutil
 import sys
 
 import pytest
-import railcosim.orchestrator.master as room
 from railcosim.orchestrator.master import compiled
 from railcosim.orchestrator.master.compiled import CompiledLoop
 from railcosim.orchestrator.master.plans import texts
@@ -132,7 +131,7 @@ def test_memory_for_texts_that_cannot_be_had(scarce_kernel, arrays, instantiated
     """Each request in turn is refused: that is told, and what was there stays."""
     kernel, left = scarce_kernel
     monkeypatch.setattr(compiled, "kernel", kernel)
-    monkeypatch.setattr(room, "kernel", kernel)
+    monkeypatch.setattr(texts, "kernel", kernel)
     system = System(stop_time=1.0, step=0.25)
     system.add("a", str(arrays()), words=["é" * 60, "x"])
     system.add("b", str(arrays()))

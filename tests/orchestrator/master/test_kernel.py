@@ -316,6 +316,11 @@ def test_what_is_not_an_array_is_refused(arguments):
         call(arguments, count=2**64)
 
 
+def test_texts_that_are_none_are_refused(arguments):
+    with pytest.raises(ValueError, match="PyCapsule"):
+        call(arguments, texts="one")
+
+
 def test_swings_are_those_of_a_signal():
     """By hand: up to 2, down to -1, up to 4, where it stays; what is not finite is none of it."""
     swings = np.zeros(2, SWING)
