@@ -117,7 +117,7 @@ class Stairs(Component):
 
 
 class Inverse(Component):
-    """A sampled block whose output has no value where its state is zero, and its comparison where an input is negative."""
+    """A sampled block: its output has no value where its state is zero, nor its comparison below an input of zero."""
 
     u = Input("1", 1.0)
     w = Input("1", 1.0)
