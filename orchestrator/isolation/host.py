@@ -247,7 +247,9 @@ class Host:
         self._instance.forget(self._states.pop(number))
 
     def _come_back(self, number: int, time: float) -> None:
-        self._instance.restore((time, self.service.states[number]))
+        handle, self._instance.time = self.service.states[number], time
+        if handle:  # else it was refused, and nothing has been called since
+            self._instance.restore((time, handle))
 
     def _give_back(self, number: int, time: float) -> None:
         handle, self._instance.time = self.service.states[number], time

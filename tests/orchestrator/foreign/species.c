@@ -3,7 +3,7 @@
    4 c; 5 d; 6 start (parameters); 7 states (output: how many there are in the process, saved and not given back). The
    description may say of y's dependencies what it likes. With -DSHY it cannot be read between being set and the next
    step; with -DROUGH its solver is off by 1e-5, in another way for each u; with -DORDER=n it refuses derivatives of u of a
-   higher order than n, and follows the first. */
+   higher order than n, and follows the first; with -DREFUSED=n its states cannot be saved from the nth on. */
 
 #include "fmi2.h"
 
@@ -121,6 +121,12 @@ int fmi2DoStep(void *c, double time, double step, int final)
 
 int fmi2GetFMUstate(void *c, void **state)
 {
+#ifdef REFUSED
+    static int saved;
+    if (++saved >= REFUSED) {
+        return 3;
+    }
+#endif
     *state = malloc(sizeof(Species));
     states++;
     memcpy(*state, c, sizeof(Species));

@@ -362,6 +362,18 @@ def test_feed_through_is_refreshed(apart, able, mode, algorithm):
     assert result["b.y"][5:] == pytest.approx((result["b.x"] + 0.5 * result["a.y"])[5:], abs=1e-9)
 
 
+@pytest.mark.parametrize("refused", [30, 31])
+def test_a_state_that_cannot_be_saved(apart, species, refused):
+    """At the begin of a step or at its end, before or after its neighbour's was saved."""
+    path = species([], f"-DREFUSED={refused}")
+    system = System(stop_time=1.0, step=0.05, algorithm="adaptive", tolerance=1e-4)
+    system.add("prey", path, a=1.0, b=-0.1, start=20.0)
+    system.add("predator", species([]), a=-0.4, b=0.02, start=5.0)
+    system.connect("predator.y", "prey.u")
+    system.connect("prey.y", "predator.u")
+    assert "fmi2GetFMUstate failed" in str(apart(system, "prey").error)
+
+
 @pytest.mark.parametrize("isolated", [[], ["together"]])
 @pytest.mark.parametrize("algorithm", ["iterative", "adaptive"])
 def test_states_are_given_back(used, species, isolated, algorithm):
