@@ -9,6 +9,7 @@ it is asked first is left alone from then on, and told.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
 from typing import Any, TypeAlias
 
@@ -71,7 +72,7 @@ class Refresher:
                 last = list(values)
                 for name in stage:
                     self._visit(name, time)
-                if not is_circle or values == last:
+                if not is_circle or all(map(_is_same, values, last)):
                     break
             else:
                 values[:] = before
@@ -101,6 +102,13 @@ class Refresher:
         refused = "".join(f"; not that of {name}, which refuses ({said})" for name, said in self.refused.items())
         summary = f"feed-through of {len(names)} instance{'s' * (len(names) != 1)} refreshed at each point{refused}"
         return {"refreshed": names, "refused": dict(self.refused), "summary": summary}
+
+
+def _is_same(value: Any, last: Any) -> bool:
+    """Whether a value has not changed: nor has one that is no number, which settles nothing else any more."""
+    if isinstance(value, float) and isinstance(last, float) and math.isnan(value):
+        return math.isnan(last)
+    return bool(value == last)
 
 
 def _stages(interfaces: Mapping[str, Interface], links: Sequence[Link]) -> list[tuple[list[str], bool]]:

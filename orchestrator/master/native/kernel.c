@@ -1,6 +1,6 @@
 /* The step loop, compiled: whole blocks of communication steps from a flat plan, without the interpreter.
 
-   A plan is a list of operations on channels and instances, exactly those of the loop in master.py, in the same order. A
+   A plan is a list of operations on channels and instances, exactly those of the loop in loop.py, in the same order. A
    channel is some variables of one type of one instance: where their value references stand, and where their values come
    from or go to. All values are real numbers here; integers and truth values are exact in them, and texts have numbers
    (types/texts.c). Python builds the plan,

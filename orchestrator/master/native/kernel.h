@@ -307,7 +307,7 @@ static inline int is_plain(const Entry *entry)
     return entry->scale == 1.0 && entry->offset == 0.0 && entry->whole == AS_IT_IS && entry->change < 0;
 }
 
-int are_same(double a, double b); /* the bits of a whole number may be no number */
+int is_same(const Plan *plan, int64_t place, double a, double b);
 
 /* What an entry makes of the value that it reads. */
 double read_entry(const Plan *plan, const Entry *entry, double time);

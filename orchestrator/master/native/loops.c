@@ -84,9 +84,13 @@ void begin_round(const Plan *plan, const Loop *loop)
     }
 }
 
-int are_same(double a, double b)
+int is_same(const Plan *plan, int64_t place, double a, double b)
 {
-    return a == b || memcmp(&a, &b, sizeof a) == 0;
+    int64_t form = plan->forms == NULL ? NUMBER : plan->forms[place];
+    if (form == SIGNED_BITS || form == UNSIGNED_BITS) { /* which may look like no number, or like another 0 */
+        return memcmp(&a, &b, sizeof a) == 0;
+    }
+    return a == b || (isnan(a) && isnan(b));
 }
 
 static Way_on end_circle(const Plan *plan, const Loop *loop)
@@ -94,7 +98,7 @@ static Way_on end_circle(const Plan *plan, const Loop *loop)
     double *head = plan->work + loop->work, *before = head + HEAD, *last = before + plan->value_count;
     int has_changed = 0;
     for (size_t k = 0; k < plan->value_count; k++) {
-        has_changed |= !are_same(plan->values[k], last[k]);
+        has_changed |= !is_same(plan, (int64_t)k, plan->values[k], last[k]);
     }
     if (!has_changed) {
         return ON;
@@ -128,7 +132,8 @@ static int compare(const Plan *plan, const Loop *loop, Numbers of, double *head,
         agree &= !(of.error[k] > 1.0);
     }
     for (int64_t k = 0; k < loop->other_count; k++) {
-        of.differ[k] = !are_same(of.others[k], plan->values[places[loop->real_count + k]]);
+        int64_t place = places[loop->real_count + k];
+        of.differ[k] = !is_same(plan, place, of.others[k], plan->values[place]);
         agree &= of.differ[k] == 0.0;
     }
     of.sizes[(int64_t)head[COMPARED]] = size;

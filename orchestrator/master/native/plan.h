@@ -10,7 +10,7 @@
 #include "adaptive.h"
 #include "kernel.h"
 
-/* Buffers in the sequence of the arguments; `points` and what follows is written. */
+/* Buffers in the sequence of the arguments; `points` and what follows is written, but for `changes` and `kept`. */
 enum {
     OPERATIONS, PARTS, CHANNELS, INSTANCES, ENTRIES, REFERENCES, FORMS, COURSES, NOTES, LOOPS, SOLVERS, PARTIES, TERMS, PASSED, POINTS, STATES, WORK, STAMPS,
     CHANGES, KEPT, VALUES, HISTORY, TABLE, PLACES, DISTURBED, CONTROL,

@@ -195,7 +195,7 @@ static const Call *take_group(const Hand *hand, const Group *group, const Advanc
     case SLOPES: return set_slopes(hand, group, status);
     case SAVE: case RESTORE: case FORGET: return treat_states(hand, group, status);
     case NOTE: note_inputs(hand->plan, group, time); return group->end;
-    case ASK: return group->end; /* it is called by who solves */
+    case ASK: return group->end; /* uncovered: it is called by who solves */
     default: return change_values(group, time + step);
     }
 }
@@ -233,7 +233,7 @@ static const Call *take_some(Hand *hand, const Group *group, Call *from, Call *t
 {
     Group some;
     const Group *taken = group;
-    if (group->begin < from || to < group->end) {
+    if (group->begin < from || to < group->end) { /* uncovered: no group goes on behind the calls that are taken */
         some = *group;
         some.begin = from < group->begin ? group->begin : from;
         some.end = to < group->end ? to : group->end;
@@ -269,7 +269,7 @@ void take_part(Hand *hand, int part, const Advance *it, Place *place)
     Call *from = plan->calls + place->begin;
     hand->note->time = it->time;
     for (const Group *group = plan->groups + plan->bounds[part]; group < end; group++) {
-        if ((group->end <= from && end_of(plan, group) <= from) ||
+        if ((group->end <= from && end_of(plan, group) <= from) || /* uncovered: what fails in a solution ends the run */
             (group->period > 1 && it->number % group->period != group->phase)) {
             continue;
         }

@@ -24,8 +24,8 @@ class Texts:
         self.table: Any = kernel.texts()
 
     def number(self, text: str) -> float:
-        """The number of a text."""
-        return float(kernel.number(self.table, text.encode()))
+        """The number of a text, of which C sees what comes before a NUL."""
+        return float(kernel.number(self.table, text.encode().partition(b"\0")[0]))
 
     def text(self, number: float) -> str:
         """The text of a number."""

@@ -59,6 +59,10 @@ def test_what_is_held_answers_to_nothing_until_a_sample_is_due(exchanged):
     assert fmu.directional(("y", "z", "der(v)"), known, direction) == [2.0, 3.0, 1.0]
     fmu.event()
     assert fmu.directional(("y", "z", "der(v)"), known, direction) == [0.0, 3.0, 1.0]
+    assert fmu.SetTime(c_double(0.25)) == OK
+    assert fmu.EnterEventMode() == OK
+    assert fmu.directional(("y",), known, direction) == [0.0], "an event at which no sample is due"
+    fmu.event()
     assert fmu.SetTime(c_double(0.5)) == OK
     assert fmu.directional(("y",), known, direction) == [0.0]
     assert fmu.EnterEventMode() == OK

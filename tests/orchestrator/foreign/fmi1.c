@@ -1,8 +1,8 @@
 /* An FMI 1.0 FMU by hand: der(x) = u - x, solved exactly over a step, and an input and an output of every type, which
    gives what the input was a step ago. It insists on the order of calls. From t = 5 s on its parameter `mode` rules:
    1 to 5 and 9: the step gives that status (9: -1); 6: a step takes 0.05 s at most, and says how far it came; 7: a step of
-   more than 0.05 s is refused, and the next must be told to be a repetition; 10: numbers are rounded upward; 20 + s: the status of getting reals. At any
-   time 40: initialization fails. Value references: reals 0 u, 1 x, 2 y = x + gain * u, 3 gain, 4 guess, 5 pi, 6 twice the
+   more than 0.05 s is refused, and the next must be told to be a repetition; 10: numbers are rounded upward; 20 + s: the status of getting reals, 30 + s: of getting texts, 40 + s: of setting them. At any
+   time 90: initialization fails. Value references: reals 0 u, 1 x, 2 y = x + gain * u, 3 gain, 4 guess, 5 pi, 6 twice the
    gain, 7 switch; whole numbers 0 n, 1 m, 2 gear, 3 shown, 4 mode; booleans 0 on, 1 off; texts 0 word, 1 said. */
 
 #include <fenv.h>
@@ -112,7 +112,7 @@ int EXPORT(fmiGetReal)(void *c, const unsigned *vr, size_t count, double *values
     for (size_t k = 0; k < count; k++) {
         values[k] = s->reals[vr[k]];
     }
-    int status = !s->ready ? 3 : mode(s) >= 20 ? mode(s) - 20 : 0;
+    int status = !s->ready ? 3 : mode(s) >= 20 && mode(s) < 30 ? mode(s) - 20 : 0;
     return tell(s, status, "reading");
 }
 
@@ -153,7 +153,7 @@ int EXPORT(fmiSetString)(void *c, const unsigned *vr, size_t count, const char *
     for (size_t k = 0; k < count; k++) {
         strncpy(((First *)c)->texts[vr[k]], values[k], 99);
     }
-    return 0;
+    return mode(c) >= 40 && mode(c) < 50 ? tell(c, mode(c) - 40, "setting texts") : 0;
 }
 
 int EXPORT(fmiGetString)(void *c, const unsigned *vr, size_t count, const char **values)
@@ -161,7 +161,7 @@ int EXPORT(fmiGetString)(void *c, const unsigned *vr, size_t count, const char *
     for (size_t k = 0; k < count; k++) {
         values[k] = ((First *)c)->texts[vr[k]];
     }
-    return 0;
+    return mode(c) >= 30 && mode(c) < 40 ? tell(c, mode(c) - 30, "reading texts") : 0;
 }
 
 int EXPORT(fmiSetRealInputDerivatives)(void *c, const unsigned *vr, size_t count, const int *order, const double *values)

@@ -1,6 +1,5 @@
 """Texts in the compiled loop, where each has a number: the same as in Python, whoever gives them."""
 
-import contextlib
 import shutil
 import sys
 
@@ -76,16 +75,20 @@ def test_what_is_cut_in_the_middle_of_a_letter(both, arrays):
     assert [result[f"b.copies[{k}]"][-1] for k in (1, 2)] == ["é" * 49 + "\ufffd", "x"]
 
 
-def test_texts_that_nobody_needs_any_more_are_forgotten(both, mine, monkeypatch):
+@pytest.fixture
+def begun(monkeypatch):
+    """How often texts that nobody needs any more were forgotten, which they are at once."""
+    times, anew = [], texts.Texts.begin_anew
+    monkeypatch.setattr(texts, "_MANY", 2)
+    monkeypatch.setattr(texts.Texts, "begin_anew", lambda self: (times.append(1), anew(self)))
+    return times
+
+
+def test_texts_that_nobody_needs_any_more_are_forgotten(both, mine, begun):
     system = ring(mine("EveryType"), stop_time=10.0)
     system.add("late", mine("EveryType"))
     system.connect("a.said", "late.word", delay=3)
     system.events.append(Event("b.said", "override", 1.0, value="ü", duration=8.0))
-    monkeypatch.setattr(texts, "_MANY", 2)
-    begun = []
-    monkeypatch.setattr(
-        texts.Texts, "begin_anew", lambda self, anew=texts.Texts.begin_anew: (begun.append(1), anew(self))
-    )
     both(system, kind="python")
     assert begun
 
@@ -98,7 +101,7 @@ WITHOUT_BINARY = (
 
 
 @pytest.mark.parametrize("algorithm", ["gauss-seidel", "iterative", "adaptive"])
-def test_texts_of_fmi_3_under_every_kind_of_algorithm(both, by_hand, algorithm):
+def test_texts_of_fmi_3_under_every_kind_of_algorithm(both, by_hand, begun, algorithm):
     model = str(by_hand(3, *WITHOUT_BINARY))
     system = System(stop_time=3.0, step=0.25, algorithm=algorithm)
     system.add("a", model, word="é", x=2.0)
@@ -106,8 +109,12 @@ def test_texts_of_fmi_3_under_every_kind_of_algorithm(both, by_hand, algorithm):
     for one, other in ("ab", "ba"):
         system.connect(f"{one}.x", f"{other}.u")
     system.connect("a.said", "b.word")
-    system.events += [Event("a.word", "set", 1.0, value="ü"), Event("b.word", "override", 2.0, value="x", duration=0.5)]
+    system.events += [
+        Event("a.word", "set", 1.0, value="ü"),
+        Event("b.word", "override", 2.0, value="x\0y", duration=0.5),
+    ]
     assert {"é", "ü", "x"} <= set(both(system)["b.said"])
+    assert begun
 
 
 def test_texts_by_number():
@@ -127,27 +134,44 @@ def test_texts_by_number():
         kernel.text(table, "1")
 
 
+@pytest.mark.parametrize("mode", [33, 43])
+def test_texts_that_cannot_be_read_or_set(both, by_hand, mode):
+    model = str(by_hand(1, (' alias="negatedAlias"', ' alias="alias"'), SAID))
+    system = System(stop_time=6.0, step=0.25)
+    system.add("first", model, word="é", mode=mode)
+    system.add("second", model)
+    system.connect("second.said", "first.word")
+    error = both(system).error
+    assert (error.instance, error.time) == ("first", 5.0)
+
+
 def test_memory_for_texts_that_cannot_be_had(scarce_kernel, arrays, instantiated, monkeypatch):
     """Each request in turn is refused: that is told, and what was there stays."""
     kernel, left = scarce_kernel
     monkeypatch.setattr(compiled, "kernel", kernel)
     monkeypatch.setattr(texts, "kernel", kernel)
-    system = System(stop_time=1.0, step=0.25)
-    system.add("a", str(arrays()), words=["é" * 60, "x"])
+    table = kernel.texts()
+    for k in range(63):
+        kernel.number(table, b"%d" % k)
+    for granted, ask in [
+        *((n, lambda: kernel.number(table, b"new")) for n in range(3)),
+        *((n, kernel.texts) for n in range(4)),
+    ]:
+        left.value = granted
+        with pytest.raises(MemoryError):
+            ask()
+    left.value = -1
+    assert (kernel.count(table), kernel.number(table, b"new")) == (64, 64)
+    system, refused = System(stop_time=1.0, step=0.25), 0
+    system.add("a", str(arrays()))
     system.add("b", str(arrays()))
     system.connect("a.copies", "b.words")
-    master, refused = instantiated(system), 0
-    loop = CompiledLoop(master.coupling, master.algorithm)
-    table = kernel.texts()
-    for ask in (lambda: [kernel.number(table, b"%d" % k) for k in range(200)], kernel.texts):
-        for left.value in range(300):
-            with contextlib.suppress(MemoryError):
-                ask()
-                break
-            refused += 1
+    master = instantiated(system)
+    loop, words = CompiledLoop(master.coupling, master.algorithm), master.slaves["a"].channel("String", ["words[1]"])
+    for granted in range(100):
         left.value = -1
-    assert kernel.count(table) == 201
-    for left.value in range(300):
+        words.set([f"{granted} é"])
+        left.value = granted
         try:
             assert loop.run(0.0, 0.25, (0, 4, 4), 1, lambda steps, rows: True)
             break
@@ -155,4 +179,4 @@ def test_memory_for_texts_that_cannot_be_had(scarce_kernel, arrays, instantiated
             refused += 1
     left.value = -1
     assert refused > 10
-    assert master.values[-1] == "x"
+    assert master.values[master.exchange.places["b", "copies[1]"]] == f"{refused} é"

@@ -316,6 +316,20 @@ def test_what_is_not_an_array_is_refused(arguments):
         call(arguments, count=2**64)
 
 
+@pytest.mark.parametrize(("value", "kind"), [(np.nan, "get"), (np.inf, "set")])
+def test_what_is_no_number_becomes_whole(arguments, value, kind):
+    """None is 0, which the next input takes; what is infinite is too large for every type."""
+    operations, entries, channels = arguments["operations"], arguments["entries"].copy(), arguments["channels"]
+    whole = next(k for k, row in enumerate(operations) if row["kind"] == 0 and not channels[row["index"]]["is_real"])
+    entry = int(channels[operations[whole]["index"]]["begin"])
+    place = int(channels[operations[0]["index"]]["begin"])
+    entries["whole"][entry], entries["age"][entry], entries["place"][entry] = 2, -1, entries["place"][place]
+    arguments["values"][entries["place"][place]] = value
+    assert call(arguments, entries=entries)[0] == 0
+    failed = int(arguments["places"]["failed"][0])
+    assert (failed == whole) == (kind == "set")
+
+
 def test_texts_that_are_none_are_refused(arguments):
     with pytest.raises(ValueError, match="PyCapsule"):
         call(arguments, texts="one")

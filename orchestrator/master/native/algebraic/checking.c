@@ -16,7 +16,7 @@ static int is_term(const Term *term, int64_t limit, int64_t width)
 static int is_party(Plan *plan, const Py_buffer *buffers, const Party *party, const Solver *of)
 {
     size_t terms = length(buffers, TERMS), room = 0, whole = 0;
-    if (!is_within(party->term, party->known_count, terms) || party->known_count < 0 || party->row_count < 0 ||
+    if (!is_within(party->term, party->known_count, terms) || party->row_count < 0 ||
         party->whole_count < 0 || !is_within(party->term + party->known_count, party->row_count, terms) ||
         !is_within(party->term + party->known_count + party->row_count, party->whole_count, terms)) {
         return 0;

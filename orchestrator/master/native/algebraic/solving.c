@@ -200,7 +200,7 @@ static int solve_reals(Solving *s, double *left)
     int is_shown = 1;
     for (size_t k = 0; k < n; k++) {
         double value = s->hand->plan->values[places_of(s)[k]];
-        s->here[k] = isfinite(value) ? value : 0.0;
+        s->here[k] = isfinite(value) ? value : 0.0; /* uncovered: a value that is none has ended the run before */
     }
     if (!evaluate(s, s->here, s->mismatch)) {
         return 0;
@@ -249,7 +249,7 @@ const Call *solve(Hand *hand, const Group *group, const Advance *it, int *status
         is_fine = solve_reals(&s, &left);
         is_fixed = 1;
         for (int64_t k = 0; k < of->other_count; k++) {
-            is_fixed &= are_same(s.fixed[k], plan->values[others[k]]);
+            is_fixed &= is_same(plan, others[k], s.fixed[k], plan->values[others[k]]);
         }
     }
     if (!is_fine) {

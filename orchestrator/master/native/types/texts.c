@@ -82,17 +82,19 @@ static size_t number_from_1(Texts *texts, const char *text)
 
 static int is_ascii(const char *text)
 {
-    while (*text > 0) {
-        text++;
+    const unsigned char *c = (const unsigned char *)text; /* char has no sign on Arm */
+    while (*c != 0 && *c < 0x80) {
+        c++;
     }
-    return *text == '\0';
+    return *c == 0;
 }
 
 /* The same for a text as an FMU gives it. */
 static size_t number_of_given(Texts *texts, const char *given)
 {
-    if (is_ascii(given)) {
-        return number_from_1(texts, given);
+    size_t known = *slot_of(texts, given);
+    if (known != 0 || is_ascii(given)) {
+        return known != 0 ? known : number_from_1(texts, given);
     }
     PyGILState_STATE state = PyGILState_Ensure();
     PyObject *text = PyUnicode_DecodeUTF8(given, (Py_ssize_t)strlen(given), "replace");
@@ -184,6 +186,9 @@ static void free_capsule(PyObject *capsule)
 int find_texts(PyObject *object, Texts **texts)
 {
     *texts = object == Py_None ? NULL : PyCapsule_GetPointer(object, capsule_name);
+    if (*texts != NULL) {
+        (*texts)->is_full = 0;
+    }
     return object == Py_None || *texts != NULL;
 }
 

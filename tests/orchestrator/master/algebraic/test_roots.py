@@ -174,3 +174,43 @@ def test_the_same_bits_in_c(compiled_roots, shape):
         (here, *rest), (found, *others) = find_root(*given), compiled_roots(*given)
         assert here.tobytes() == found.tobytes(), seed
         assert rest == others, seed
+
+
+def _constant(value):
+    return lambda x: value
+
+
+ONE, TWO = np.ones(1), np.ones(2)
+EDGES = {
+    "slopes that are no numbers": (_constant(ONE), _constant(np.full((1, 1), np.nan)), ONE, ONE),
+    "a mismatch that is none": (_constant(ONE), _constant(-np.eye(1)), ONE, np.nan * ONE),
+    "nothing to be done": (_constant(0.0 * ONE), _constant(-np.eye(1)), ONE, 0.0 * ONE),
+    "no slope": (_constant(ONE), _constant(np.zeros((1, 1))), 1e15 * ONE, ONE),
+    "a slope of which the square is none": (
+        _constant(1e-20 * ONE),
+        _constant(np.full((1, 1), 1e-310)),
+        ONE,
+        1e-20 * ONE,
+    ),
+    "a slope in one direction": (_constant(TWO), _constant(np.diag([1.0, 0.0])), TWO, TWO),
+    "less than was hoped for": (lambda x: ONE - 1e-6 * (x != 0.0), _constant(-np.eye(1)), 0.0 * ONE, ONE),
+}
+
+
+@pytest.mark.parametrize("edge", EDGES)
+@np.errstate(all="ignore")
+def test_the_same_bits_in_c_at_the_edges(compiled_roots, edge):
+    (here, *rest), (found, *others) = find_root(*EDGES[edge]), compiled_roots(*EDGES[edge])
+    assert here.tobytes() == found.tobytes()
+    assert rest == others
+
+
+@np.errstate(all="ignore")
+def test_the_same_bits_in_c_of_matrices_that_overflow(compiled_roots):
+    rng = np.random.default_rng(1)
+    for _ in range(300):
+        matrix = rng.choice([0.0, 1.0, -1.0, 1e308, -1e308, 1e-308], size=(4, 4))
+        given = _constant(np.ones(4)), _constant(matrix), np.ones(4), rng.choice([0.0, 1.0, -1.0], size=4)
+        (here, *rest), (found, *others) = find_root(*given), compiled_roots(*given)
+        assert here.tobytes() == found.tobytes()
+        assert rest == others

@@ -5,6 +5,7 @@ import sys
 import fmpy
 import numpy as np
 import pytest
+from railcosim.fmus.build import build
 from railcosim.orchestrator.errors import CouplingError, FmuError
 from railcosim.orchestrator.master import compiled
 from railcosim.orchestrator.run.execution import run
@@ -271,7 +272,7 @@ def test_drawn_ones_that_jump(told, bent, seed):
     told(coupled(bent(derives=seed % 2 == 0), *start, stop=50.0, step=5.0))
 
 
-@pytest.mark.parametrize("mode", [401, 402, 403])
+@pytest.mark.parametrize("mode", [401, 402, 403, 404])
 def test_what_ends_a_solution(told, bent, mode):
     """From 1 s on y = u + 1, or the FMU refuses what is tried to find slopes, or a step."""
     system = System(stop_time=2.0, step=0.25, algebraic_loops="solve")
@@ -280,3 +281,62 @@ def test_what_ends_a_solution(told, bent, mode):
     result = told(system)
     assert isinstance(result.error, CouplingError if mode == 401 else FmuError)
     assert result.time[-1] == 0.75
+
+
+def test_a_solution_beyond_which_nothing_is_a_number(told, bent):
+    """y = t + root of (2 - y) is begun at 1.75 s with what the step leads to, of which the root is none."""
+    system = System(stop_time=3.0, step=0.25, algebraic_loops="solve")
+    system.add("p", bent(), a=1.0, f=6)
+    system.connect("p.y", "p.u", scale=-1.0, offset=2.0)
+    result = told(system)
+    assert isinstance(result.error, CouplingError)
+    assert result.time[-1] == 1.5
+
+
+@pytest.mark.parametrize("mode", [405, 406])
+def test_a_value_that_is_refused_late(told, bent, mode):
+    """Where nothing is left to be tried, it is begun once more with what came last, or what fits best is set again."""
+    system = System(stop_time=2.0, step=0.25, algebraic_loops="solve")
+    system.add("p", bent(), a=1.0, c=-2.1, f=4, mode=mode)
+    system.connect("p.y", "p.u")
+    assert isinstance(told(system).error, FmuError)
+
+
+def test_an_older_value_of_the_loop_is_none_of_it(told, bent):
+    """y = 3 y - 2 + t and the y of a point ago, which is given and not solved for."""
+    system = System(stop_time=1.0, step=0.25, algebraic_loops="solve")
+    system.add("p", bent(), a=3.0, b=0.5, c=-2.0)
+    system.connect("p.y", "p.u")
+    system.connect("p.y", "p.v", delay=1)
+    y, t = (result := told(system))["p.y"], result.time
+    assert y[1:] == pytest.approx(3.0 * y[1:] - 2.0 + t[1:] + 0.5 * y[:-1], rel=1e-9)
+
+
+TWO_ROWS = """
+class TwoRows(Component):
+    u = Input("1", shape=(2,))
+    v = Input("1", shape=(2,))
+    y = Output("1")
+
+    def outputs(self):
+        return {"y": 0.25 * self.u[0] - 2.5 * self.v[1] + 1.0}
+"""
+
+
+def test_a_value_that_moves_two_arrays(told, components):
+    system = System(stop_time=1.0, step=0.25, algebraic_loops="solve")
+    system.add("it", str(build(components(TWO_ROWS)("TwoRows"), kind="native", fmi="3")))
+    for name in ("u[1]", "u[2]", "v[1]", "v[2]"):
+        system.connect("it.y", f"it.{name}")
+    assert told(system)["it.y"] == pytest.approx(np.full(5, 1.0 / 3.25), rel=1e-9)
+
+
+def test_what_is_no_number_in_a_circle_of_feed_through_ends_it_at_once(both, bent):
+    """z = root of (1 - t) at last, which goes round."""
+    system = System(stop_time=3.0, step=0.25, algorithm="jacobi", refresh=True)
+    for name, start in (("p", {"a": 1.0, "f": 6}), ("q", {"a": 0.5}), ("clock", {})):
+        system.add(name, bent(), **start)
+    system.connect("p.y", "q.u")
+    system.connect("q.y", "p.v")
+    system.connect("clock.y", "p.u", scale=-1.0, offset=1.0)
+    assert "output 'y' is nan" in str(both(system).error)
