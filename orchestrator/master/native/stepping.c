@@ -177,7 +177,7 @@ static const Call *change_values(const Group *group, double time)
 static const Call *take_group(const Hand *hand, const Group *group, const Advance *it, int *status)
 {
     double time = it->time, step = it->step, when = group->is_late ? time + step : time;
-    switch (group->kind) {
+    switch (group->kind) { /* uncovered: who solves makes the call of ASK */
     case STEP: return take_steps(hand, group, time, (double)group->period * step, status);
     case SET_REALS_IN_PLACE: return set_reals_in_place(hand, group, status);
     case SET_REALS: return set_reals(hand, group, when, status);

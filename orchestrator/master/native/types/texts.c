@@ -98,8 +98,8 @@ static size_t number_of_given(Texts *texts, const char *given)
     }
     PyGILState_STATE state = PyGILState_Ensure();
     PyObject *text = PyUnicode_DecodeUTF8(given, (Py_ssize_t)strlen(given), "replace");
-    PyObject *bytes = text == NULL ? NULL : PyUnicode_AsUTF8String(text);
-    size_t number = bytes == NULL ? 0 : number_from_1(texts, PyBytes_AsString(bytes));
+    PyObject *bytes = text == NULL ? NULL : PyUnicode_AsUTF8String(text); /* uncovered: memory of Python's */
+    size_t number = bytes == NULL ? 0 : number_from_1(texts, PyBytes_AsString(bytes)); /* uncovered: memory of Python's */
     Py_XDECREF(bytes);
     Py_XDECREF(text);
     PyErr_Clear();
