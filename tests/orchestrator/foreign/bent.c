@@ -3,15 +3,15 @@
    4 exp x, 5 cos x, 6 root of x, which is no number below 0); 8 mode; 9 m (integer input); 10 n (integer output). From t = 1 s on
    mode says what is odd: 100 + s the status of being asked for derivatives, 200 + s of being set, 300 + s of being read;
    400 rounds upward when asked; 401: y = u + 1; 402 and 403 refuse a u that is near the last one, or
-   far, 404 to be read where it is near; 405 a u that is the last y, once it was set five times in this step; 406 a u that was there before in this step. */
+   far, 404 to be read where it is near; 405 a u that is the last y, once it was set five times in this step. */
 
 #include "fmi2.h"
 
 #include <fenv.h>
 
 typedef struct {
-    double v[8], read, seen[200];
-    int whole[11], seen_count;
+    double v[8], read;
+    int whole[11], set_count;
     double time;
 } Bent;
 
@@ -72,13 +72,7 @@ int fmi2SetReal(void *c, const unsigned *vr, size_t count, const double *values)
     int how = s->time >= 1.0 ? s->whole[8] : 0, is_refused = 0;
     for (size_t k = 0; k < count; k++) {
         double by = fabs(values[k] - s->v[vr[k]]);
-        for (int n = 0; how == 406 && vr[k] == 0 && by > 0.0 && n < s->seen_count; n++) {
-            is_refused |= s->seen[n] == values[k];
-        }
-        is_refused |= how == 405 && vr[k] == 0 && s->seen_count > 5 && values[k] == s->v[2];
-        if (vr[k] == 0 && s->seen_count < 200) {
-            s->seen[s->seen_count++] = values[k];
-        }
+        is_refused |= how == 405 && vr[k] == 0 && ++s->set_count > 5 && values[k] == s->v[2];
         is_refused |= vr[k] == 0 && ((how == 402 && by > 0.0 && by < 1e-4) || (how == 403 && by > 1.0));
         s->v[vr[k]] = values[k];
     }
@@ -97,7 +91,7 @@ int fmi2GetReal(void *c, const unsigned *vr, size_t count, double *values)
     double by = fabs(s->v[0] - s->read);
     s->read = s->v[0];
     int how = s->time >= 1.0 ? s->whole[8] : 0;
-    return how == 404 && by > 0.0 && by < 1e-4 ? 3 : odd(c, 300);
+    return how == 404 && by > 1e-9 && by < 1e-4 ? 3 : odd(c, 300);
 }
 
 int fmi2SetInteger(void *c, const unsigned *vr, size_t count, const int *values)
@@ -141,7 +135,7 @@ int fmi2DoStep(void *c, double time, double step, int final)
 {
     (void)final;
     ((Bent *)c)->time = time + step;
-    ((Bent *)c)->seen_count = 0;
+    ((Bent *)c)->set_count = 0;
     return 0;
 }
 

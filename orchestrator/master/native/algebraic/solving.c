@@ -223,7 +223,7 @@ static int solve_reals(Solving *s, double *left)
             }
         }
         if (!find_root(&s->equations, s->here, s->mismatch, left, &is_shown) ||
-            (!is_shown && !evaluate(s, s->here, s->mismatch))) {
+            (!is_shown && !evaluate(s, s->here, s->mismatch))) { /* uncovered: an FMU refuses what it has taken before */
             return 0;
         }
     }

@@ -293,11 +293,10 @@ def test_a_solution_beyond_which_nothing_is_a_number(told, bent):
     assert result.time[-1] == 1.5
 
 
-@pytest.mark.parametrize("mode", [405, 406])
-def test_a_value_that_is_refused_late(told, bent, mode):
-    """Where nothing is left to be tried, it is begun once more with what came last, or what fits best is set again."""
+def test_a_value_that_is_refused_late(told, bent):
+    """Where nothing is left to be tried, it is begun once more with what came last."""
     system = System(stop_time=2.0, step=0.25, algebraic_loops="solve")
-    system.add("p", bent(), a=1.0, c=-2.1, f=4, mode=mode)
+    system.add("p", bent(), a=1.0, c=-2.1, f=4, mode=405)
     system.connect("p.y", "p.u")
     assert isinstance(told(system).error, FmuError)
 
@@ -319,7 +318,7 @@ class TwoRows(Component):
     y = Output("1")
 
     def outputs(self):
-        return {"y": 0.25 * self.u[0] - 2.5 * self.v[1] + 1.0}
+        return {"y": 0.25 * self.u[0] - 2.5 * self.v[1] + self.time}
 """
 
 
@@ -328,7 +327,8 @@ def test_a_value_that_moves_two_arrays(told, components):
     system.add("it", str(build(components(TWO_ROWS)("TwoRows"), kind="native", fmi="3")))
     for name in ("u[1]", "u[2]", "v[1]", "v[2]"):
         system.connect("it.y", f"it.{name}")
-    assert told(system)["it.y"] == pytest.approx(np.full(5, 1.0 / 3.25), rel=1e-9)
+    result = told(system)
+    assert result["it.y"] == pytest.approx(result.time / 3.25, rel=1e-9)
 
 
 def test_what_is_no_number_in_a_circle_of_feed_through_ends_it_at_once(both, bent):
