@@ -24,7 +24,7 @@ from .. import world
 from . import guard, messages
 from .guard import Look
 from .line import Line
-from .messages import NOTE_BASE, NOTE_CALL, NOTE_MEMORY, Cells, Door, note
+from .messages import NOTE_BASE, NOTE_CALL, NOTE_FAILED, NOTE_MEMORY, NOTE_STATUS, Cells, Door, note
 from .service import Service, serve
 
 if TYPE_CHECKING:
@@ -32,6 +32,7 @@ if TYPE_CHECKING:
     from ..fmi.binding import LoadedSlave
 
 _LOG_LINES = 50
+_FATAL = 4
 
 
 class _Heard(deque[str]):
@@ -103,6 +104,9 @@ class Host:
         """Go on by messages, at the time that the master has got to by calls through the lane."""
         if self._slave is not None and self.service.operations:
             self._slave.time = self.service.time
+            if self._notes[NOTE_FAILED] and self._notes[NOTE_STATUS] == _FATAL:
+                with contextlib.suppress(Exception):  # a neighbour may have failed first, and be told of
+                    self._slave.check("", _FATAL)
 
     # ---------------------------------------------------------------- answered
 

@@ -5,7 +5,8 @@
    status of getting, of setting; 40 to 43 discarded steps: 40 refuses more than 0.1 s, 41 gets 0.15 s of them done, 42
    half of one and asks for the end, 43 is 40 and goes on only when it was restored; 44: rounds upward from then on;
    60 + s, 70 + s: the status of getting, of setting whole numbers; 80 + s: of setting derivatives of inputs, of which 91
-   refuses the second and 92 all; 100 + s, 110 + s, 120 + s: of saving a state, of coming back to one, of giving it back. */
+   refuses the second and 92 all; 100 + s, 110 + s, 120 + s: of saving a state, of coming back to one, of giving it back.
+   Once one of these was fatal, it aborts as it is given back. */
 
 #include "fmi2.h"
 
@@ -16,7 +17,7 @@ typedef struct {
     int whole[9];
     double slopes[2][2]; /* of u and v */
     double time, reached;
-    int stuck, ends, pends;
+    int stuck, ends, pends, is_dead;
     Logger logger;
     void *environment;
     char name[100];
@@ -25,6 +26,7 @@ typedef struct {
 static int tell(Odd *s, int status)
 {
     if (status) {
+        s->is_dead = status == 4;
         s->logger(s->environment, s->name, status, "odd", "%s does as it was told: %d", s->name, status);
     }
     return status;
@@ -48,6 +50,9 @@ void *fmi2Instantiate(const char *name, int kind, const char *guid, const char *
 
 void fmi2FreeInstance(void *c)
 {
+    if (((Odd *)c)->is_dead) {
+        abort();
+    }
     free(c);
 }
 

@@ -118,6 +118,17 @@ def test_of_isolated_neighbours_the_first_that_fails_is_named(apart, odd_fmu, tm
     assert (result.error is None) == (modes == (41, 41))
 
 
+def test_a_neighbour_that_is_fatal_as_well_is_not_given_back(apart, odd, caplog):
+    """They step at once, and only the first is told of."""
+    system = System(stop_time=9.0, step=0.25)
+    for name, mode in zip("abc", (3, 4, 0), strict=True):
+        system.add(name, odd, u=1.0, mode=mode)
+    for source, target in zip("abcc", ("c.u", "c.v", "a.u", "b.u"), strict=True):
+        system.connect(f"{source}.x", target)
+    assert apart(system, "together").error.instance == "a"
+    assert not caplog.records
+
+
 @ALGORITHMS
 def test_whoever_is_not_waited_for_in_the_loop_is_waited_for_outside(apart, odd, ring, algorithm, hurried):
     assert apart(ring(odd, 2, algorithm=algorithm), "all").status == "completed"
