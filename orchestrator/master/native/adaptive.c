@@ -17,6 +17,7 @@ static const int64_t most_in_a_row = 8;
 typedef struct {
     double *values, *stamps;
     Points *points;
+    double head[SOLVER_HEAD]; /* what is counted of algebraic loops */
 } Memory;
 
 typedef struct {
@@ -102,6 +103,9 @@ static void sweep(Doubling *it, int program, double time, double length)
 
 static void keep_memory(const Doubling *it, Memory *memory)
 {
+    if (it->plan->head != NULL) {
+        memcpy(memory->head, it->plan->head, sizeof memory->head);
+    }
     copy(it, memory->values, it->plan->values);
     if (it->plan->stamps != NULL) {
         copy(it, memory->stamps, it->plan->stamps);
@@ -291,9 +295,12 @@ static int choose(Doubling *it, double until)
     }
 }
 
-/* All but the FMUs is again as it was at the begin of the step. */
+/* All but the FMUs is again as it was at the begin of the step; what Python solves anew is not counted twice. */
 static void undo(Doubling *it)
 {
+    if (it->plan->head != NULL) {
+        memcpy(it->plan->head, it->begin.head, sizeof it->begin.head);
+    }
     recall(it, &it->begin);
     copy(it, it->plan->values, it->begin.values);
 }

@@ -213,6 +213,7 @@ typedef struct {
     Loop *loops;
     size_t *loop_groups; /* of each loop those of BEGIN and MARK, from 1 */
     const Solver *solvers;
+    double *head; /* what is counted of algebraic loops; NULL where none are solved */
     const Party *parties;
     const Term *terms;
     size_t *group_of; /* of each operation its group */

@@ -90,6 +90,7 @@ int resolve_solver(Plan *plan, const Py_buffer *buffers, const Operation *operat
     }
     group->kind = SOLVE;
     call->solver = of;
+    plan->head = plan->work + of->work;
     return 1;
 }
 
