@@ -164,7 +164,7 @@ static Status advance(Instance *s, double begin, double length)
     move_inputs(s, length);
     stop_inputs(s);
     s->fresh = false;
-#if IS_SAMPLED && HAS_HELD
+#if HAS_HELD
     if (refresh(s) != STATUS_OK) {
         return STATUS_ERROR;
     }

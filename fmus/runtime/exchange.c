@@ -126,7 +126,7 @@ static Status evaluate_frozen(Instance *s)
 #else
     call_equations(s, MODEL_OUTPUTS, s->scratch);
 #endif
-#if IS_SAMPLED && HAS_HELD
+#if HAS_HELD
     for (int k = 0; k < N_OUTPUTS; k++) {
         s->scratch[k] = model_held[k] ? s->held[k] : s->scratch[k];
     }
