@@ -79,6 +79,47 @@ static void move_results(Instance *s)
 }
 #endif
 
+/* What the unknowns follow from, up to date. A solver is told of a rate without a value, and of no output it does not ask
+   for. */
+static Status refresh_unknowns(Instance *s, const Reference unknowns[], size_t count)
+{
+#if MODEL_EXCHANGE
+    if (s->exchanges) {
+        bool outputs = false, rated = false;
+        for (size_t k = 0; k < count; k++) {
+            int place = unknown_place(unknowns[k]);
+            rated = rated || place >= N_OUTPUTS;
+            outputs = outputs || (place >= 0 && place < N_OUTPUTS);
+        }
+        Status status = outputs ? refresh(s) : refresh_all_but_outputs(s);
+        return status == STATUS_OK && rated && rates(s) != STATUS_OK ? STATUS_DISCARD : status;
+    }
+#else
+    (void)unknowns;
+    (void)count;
+#endif
+    return refresh(s);
+}
+
+/* A solver is told of a derivative without a value as of a rate. */
+static Status check_sensitivity(Instance *s, const double sensitivity[], size_t count, const char *call)
+{
+#if MODEL_EXCHANGE
+    for (size_t k = 0; k < count && s->exchanges; k++) {
+        if (!isfinite(sensitivity[k])) {
+            fail(s, "%s: derivative %lu is %g at t = %.17g s", call, (unsigned long)k + 1, sensitivity[k], s->time);
+            return STATUS_DISCARD;
+        }
+    }
+#else
+    (void)s;
+    (void)sensitivity;
+    (void)count;
+    (void)call;
+#endif
+    return STATUS_OK;
+}
+
 /* How the unknowns move when the knowns move along the seed. */
 static Status directional_derivative(void *c, const Reference unknowns[], size_t n_unknowns, const Reference knowns[],
                                      size_t n_knowns, const double seed[], size_t n_seed, double sensitivity[],
@@ -93,7 +134,11 @@ static Status directional_derivative(void *c, const Reference unknowns[], size_t
         (n_knowns > 0 && (knowns == NULL || seed == NULL))) {
         return fail(s, "%s: NULL for an array", call);
     }
-    if (refresh(s) != STATUS_OK || take_direction(s, knowns, n_knowns, seed, n_seed, call) != STATUS_OK) {
+    Status status = refresh_unknowns(s, unknowns, n_unknowns);
+    if (status != STATUS_OK) {
+        return status;
+    }
+    if (take_direction(s, knowns, n_knowns, seed, n_seed, call) != STATUS_OK) {
         return STATUS_ERROR;
     }
     complete_direction(s);
@@ -114,5 +159,8 @@ static Status directional_derivative(void *c, const Reference unknowns[], size_t
             sensitivity[used++] = from[n];
         }
     }
-    return HAS_ARRAYS && used != n_sensitivity ? miscounted(s, n_sensitivity, call) : STATUS_OK;
+    if (HAS_ARRAYS && used != n_sensitivity) {
+        return miscounted(s, n_sensitivity, call);
+    }
+    return check_sensitivity(s, sensitivity, used, call);
 }

@@ -106,6 +106,15 @@ static Status set_continuous_states(void *c, const double x[], size_t nx, const 
 
 /* ---------------------------------------------------------------------------------------------------------- reading */
 
+/* What may be read but the outputs: where they are not asked for, one without a value is in the way of nothing else. */
+static Status refresh_all_but_outputs(Instance *s)
+{
+    if (s->phase == PHASE_INITIALIZATION) {
+        return prepare(s);
+    }
+    return s->phase == PHASE_RUNNING && s->regime == REGIME_EVENT ? look(s) : STATUS_OK;
+}
+
 /* NULL unless something of an instance for model exchange may be read in these phases, of which there are `count` numbers. */
 static Instance *enter_to_read(void *c, unsigned phases, const double *numbers, size_t given, int count, const char *call)
 {
@@ -121,14 +130,7 @@ static Instance *enter_to_read(void *c, unsigned phases, const double *numbers, 
         fail(s, "%s: there are %d numbers, not %lu", call, count, (unsigned long)given);
         return NULL;
     }
-    /* Outputs are not asked for, and one without a value is in the way of nothing else. */
-    Status status = STATUS_OK;
-    if (s->phase == PHASE_INITIALIZATION) {
-        status = prepare(s);
-    } else if (s->phase == PHASE_RUNNING && s->regime == REGIME_EVENT) {
-        status = look(s);
-    }
-    return status == STATUS_OK ? s : NULL;
+    return refresh_all_but_outputs(s) == STATUS_OK ? s : NULL;
 }
 
 static Status read_rates(void *c, double derivatives[], size_t nx, const char *call)

@@ -215,8 +215,9 @@ fmi2Status fmi2GetDirectionalDerivative(fmi2Component c, const fmi2ValueReferenc
                                         const fmi2ValueReference vKnown_ref[], size_t nKnown, const fmi2Real dvKnown[],
                                         fmi2Real dvUnknown[])
 {
-    return directional_derivative(c, vUnknown_ref, nUnknown, vKnown_ref, nKnown, dvKnown, nKnown, dvUnknown, nUnknown,
-                                  "fmi2GetDirectionalDerivative");
+    fmi2Status status = directional_derivative(c, vUnknown_ref, nUnknown, vKnown_ref, nKnown, dvKnown, nKnown, dvUnknown,
+                                               nUnknown, "fmi2GetDirectionalDerivative");
+    return status == fmi2Discard ? fmi2Error : status; /* this version lists what may be discarded: not this */
 }
 
 /* ----------------------------------------------------------------------------------------------------------- states */

@@ -6,7 +6,7 @@ from ctypes import byref, c_bool, c_char_p, c_double, c_int32, c_size_t, c_uint3
 import fmpy
 from fmpy.fmi3 import fmi3LogMessageCallback
 
-OK, ERROR, NULL = 0, 3, None
+OK, DISCARD, ERROR, NULL = 0, 2, 3, None
 STEP = 0.25
 CELLS = {"Float64": c_double, "Int32": c_int32, "Boolean": c_bool, "String": c_char_p}
 

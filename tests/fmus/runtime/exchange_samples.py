@@ -179,3 +179,27 @@ class Unbounded(Component):
 
     def outputs(self):
         return {"before": self.x < float("inf")}
+
+
+class Blind(Component):
+    """An output that has no value where its state is negative, and a rate that has one everywhere."""
+
+    u = Input("1", 1.0)
+    x = State("1", 1.0)
+    y = Output("1")
+
+    def derivatives(self):
+        return {"x": self.u - 3.0 * self.x}
+
+    def outputs(self):
+        return {"y": log(self.x)}
+
+
+class Draining(Component):
+    """A rate that has no value where the state is negative, and one whose slope alone has none at its end."""
+
+    x = State("1", 1.0)
+    z = State("1", 1.0)
+
+    def derivatives(self):
+        return {"x": -log(self.x), "z": -sqrt(self.z)}

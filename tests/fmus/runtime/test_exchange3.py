@@ -14,7 +14,7 @@ import fmpy
 import pytest
 from railcosim.fmus.build import build
 
-from .bare3 import ERROR, NULL, OK, Fmu
+from .bare3 import DISCARD, ERROR, NULL, OK, Fmu
 
 HERE = Path(__file__).parent
 EXCHANGE = f"{HERE / 'exchange_samples.py'}:"
@@ -273,6 +273,15 @@ def test_what_is_still_missing_says_so_in_words_that_fit(exchanged):
     make.restype = c_void_p
     assert make(b"it", NULL, NULL, c_bool(False), c_bool(False), c_void_p(7), fmu._logger, NULL, NULL, NULL) is None
     assert "an FMU for co-simulation and model exchange" in fmu.said
+
+
+def test_a_derivative_without_a_value_is_discarded_as_a_rate_is(exchanged):
+    """Of der(x) = -log(x) and der(z) = -sqrt(z): of FMI 2.0 it is an error, which lets nobody discard it."""
+    fmu = exchanged("Draining").initialize()
+    fmu.event()
+    for z, expected in ((-1.0, DISCARD), (0.0, DISCARD), (0.25, [-1.0])):
+        assert fmu.put(1.0, z) == OK
+        assert fmu.derivative(["der(z)"], ["z"], [1.0], 1) == expected
 
 
 # ---------------------------------------------------------------- everything at once

@@ -1,10 +1,11 @@
 """exchange.c: directional derivatives are of the choices that are kept, as central differences of reading have them."""
 
+import math
 from ctypes import c_double
 
 import pytest
 
-OK = 0
+OK, ERROR = 0, 3
 NAMES = ("branch", "piece", "timed", "root", "der(x)")
 WIDTH = 1e-6
 
@@ -108,3 +109,37 @@ def test_a_rate_that_is_found_as_it_stands_moves_as_it_stands(exchanged):
         assert fmu.put(x) == OK
         assert fmu.numbers("Derivatives") == [rate]
         assert fmu.directional(("der(x)",), ("x",), (1.0,)) == [slope]
+
+
+def test_an_output_without_a_value_is_in_the_way_of_its_own_derivative_only(exchanged):
+    """y = log(x), der(x) = u - 3 x: also while an event is handled, and in initialization mode."""
+    fmu = exchanged("Blind").enter()
+
+    def check(known):
+        assert fmu.directional(("der(x)", "x"), (known, "u"), (1.0, 1.0)) == [-2.0, 1.0], fmu.said
+        assert fmu.directional(("der(x)", "y"), (known,), (1.0,)) == ERROR
+        assert "'y' is" in fmu.said
+
+    assert fmu.set("x_start", -1.0) == OK
+    check("x_start")
+    assert fmu.ExitInitializationMode() == OK
+    check("x")
+    fmu.event()
+    check("x")
+    assert fmu.put(2.0) == OK
+    assert fmu.directional(("der(x)", "y"), ("x",), (1.0,)) == [-3.0, 0.5]
+
+
+def test_where_a_rate_or_its_slope_has_no_value_there_is_no_derivative(exchanged):
+    """der(x) = -log(x), whose slope has one also below zero, and der(z) = -sqrt(z), whose slope has none at zero."""
+    fmu = exchanged("Draining").initialize()
+    fmu.event()
+    for x, z, why in ((-1.0, 1.0, "'der(x)' is"), (1.0, -1.0, "'der(z)' is"), (1.0, 0.0, "is -inf at t = 0 s")):
+        assert fmu.put(x, z) == OK
+        assert fmu.directional(("der(x)", "der(z)"), ("x", "z"), (1.0, 1.0)) == ERROR
+        assert why in fmu.said
+        assert fmu.directional(("x",), ("x",), (1.0,)) == [1.0]
+    assert fmu.put(0.5, 0.25) == OK
+    assert fmu.directional(("der(x)", "der(z)"), ("x", "z"), (1.0, 1.0)) == [-2.0, -1.0]
+    slave = exchanged("Draining", kind=1).initialize(z=0.0)
+    assert slave.directional(("der(z)",), ("z",), (1.0,)) == [-math.inf], "of co-simulation they are as they are"
