@@ -28,8 +28,9 @@ class Base(Component):
 
 @pytest.hookimpl(tryfirst=True)
 def pytest_collection_modifyitems(items):
-    """Of a test with very many cases a sample is in the quick tier, its first and last among them, the rest in the long
-    one. Where only some of the cases are asked for, it is a sample of these."""
+    """Of a test with very many cases a sample is in the quick tier, spread from the first to the last, the rest in the
+    long one. It is one of the cases that are collected: a single one that is asked for by its node id is quick then,
+    and ``-m long`` leaves it out. What `few` keeps of tests of every model are certain models instead."""
     families = defaultdict(list)
     for item in items:
         if item.get_closest_marker("sample") and not (_LATER & {mark.name for mark in item.iter_markers()}):
