@@ -286,9 +286,9 @@ def _ready(expression: Expression, plan: Plan) -> tuple[tuple[int | None, ...], 
         if len(several) > 1 and expression.stands_in_rows:
             with suppress(ExpressionError):  # it says so for each
                 together = expression.bound(plan, several).term(expression.tree)
-        plan.bindings[key] = indices, together
-    found: tuple[tuple[int | None, ...], Term | None] = plan.bindings[key]
-    return found
+        plan.bindings[key] = expression.functions, indices, together  # the first, lest another gets its id
+    _, indices, together = plan.bindings[key]
+    return indices, together
 
 
 def _rows(together: Term, run: Prepared, count: int) -> Array | None:

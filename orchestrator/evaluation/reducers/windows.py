@@ -229,10 +229,10 @@ def span_of(
     Args:
         ends: the first and the last time of the run, in s.
         step: its communication step, in s.
-        after: as it was given, or None.
-        until: likewise.
-        outside: likewise.
-        half_open: as `Span` has it.
+        after: the first time in s that counts, as an argument's value, or None: then the first of the run.
+        until: the last one, likewise.
+        outside: a window [from, to] in s that does not count, or a list of them, or None.
+        half_open: whether the point at `until` does not count either.
 
     Raises:
         ExpressionError: the arguments are not of the right kind.
