@@ -148,18 +148,24 @@ class Cluster:
         sweep(folder)
         held.enter_context(dask.dask.config.set({"temporary-directory": str(folder)}))
         dask.utils.get_mp_context().Lock()  # its tracker makes the thread that starts it hear again
-        with _deaf():
-            self._own = dask.LocalCluster(
-                n_workers=self._wanted,
-                threads_per_worker=1,
-                processes=True,
-                host="127.0.0.1",
-                dashboard_address="127.0.0.1:0",  # None would take port 8787 all the same
-                local_directory=str(folder),
-                silence_logs=logging.CRITICAL,
-                death_timeout=f"{_START:g}s",
-                env={"TMPDIR": str(folder)},
-            )
+        try:
+            with _deaf():
+                self._own = dask.LocalCluster(
+                    n_workers=self._wanted,
+                    threads_per_worker=1,
+                    worker_class=_nanny(dask),
+                    processes=True,
+                    host="127.0.0.1",
+                    dashboard_address="127.0.0.1:0",  # None would take port 8787 all the same
+                    local_directory=str(folder),
+                    silence_logs=logging.CRITICAL,
+                    death_timeout=f"{_START:g}s",
+                    env={"TMPDIR": str(folder)},
+                )
+        except (TimeoutError, RuntimeError) as error:
+            raise RailcosimError(
+                f"not all workers came up within {_START:g} s on this machine ({error}); ask for fewer by --workers"
+            ) from error
         held.callback(self._close_own)
         return dask.Client(self._own, set_as_default=False, timeout=_PATIENCE)
 
@@ -192,6 +198,24 @@ class Cluster:
 def _dask() -> Any:
     """Dask, an extra without types."""
     return importlib.import_module("distributed")
+
+
+def _nanny(dask: Any) -> Any:
+    """What starts and ends a worker, which Dask's leaves alive, and itself half closed, when it gives up its start."""
+
+    class Nanny(dask.Nanny):  # type: ignore[misc]
+        async def close(self, timeout: float = 5, reason: str = "nanny-close") -> str:
+            started = self.process and self.process.process
+            try:
+                with suppress(AssertionError):  # of a process that is still coming up
+                    await super().close(timeout=timeout, reason=reason)
+            finally:
+                with suppress(ValueError):  # of one that has ended, and is closed
+                    if started and started.is_alive():
+                        await started.kill()
+            return "OK"
+
+    return Nanny
 
 
 @contextmanager

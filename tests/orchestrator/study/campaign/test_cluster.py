@@ -8,9 +8,10 @@ from contextlib import suppress
 from types import SimpleNamespace
 from typing import ClassVar
 
+import distributed
 import psutil
 import pytest
-from distributed import LocalCluster
+from distributed import LocalCluster, Nanny
 from distributed.core import Status
 from railcosim.orchestrator import Study, world
 from railcosim.orchestrator.errors import RailcosimError, RunError
@@ -119,6 +120,41 @@ def test_what_is_started_does_not_hear_the_terminal():
     assert cluster_module._can_show() in (True, False)
 
 
+@pytest.mark.parametrize("error", [TimeoutError("start timed out"), RuntimeError("Cluster failed to start")])
+def test_workers_that_do_not_come_up_at_first_end_the_study_in_a_sentence(system, how, tmp_path, monkeypatch, error):
+    def start(**_):
+        raise error
+
+    monkeypatch.setattr("distributed.LocalCluster", start)
+    with pytest.raises(RailcosimError, match=rf"came up within 120 s .* \({error}\); ask for fewer by --workers"):
+        run_study(plan_of(system, runs=2), how, tmp_path / "out", workers=2)
+
+
+@pytest.mark.parametrize("state", ["alive", "ended", "closed", "none"])
+def test_a_worker_that_is_given_up_is_ended(state, monkeypatch):
+    """Of one that is still coming up Dask's nanny asserts that it is not, and forgets it."""
+    killed = []
+
+    class Process:
+        def is_alive(self):
+            if state == "closed":
+                raise ValueError
+            return state == "alive"
+
+        async def kill(self):
+            killed.append(self)
+
+    async def close(self, timeout, reason):
+        self.process = None
+        assert state != "alive", Status.starting
+
+    monkeypatch.setattr(Nanny, "close", close)
+    made = object.__new__(cluster_module._nanny(distributed))
+    made.process = None if state == "none" else SimpleNamespace(process=Process())
+    assert asyncio.run(made.close()) == "OK"
+    assert len(killed) == (state == "alive")
+
+
 @pytest.fixture
 def started(monkeypatch):
     """How a local cluster is started, in this process instead of others."""
@@ -126,7 +162,7 @@ def started(monkeypatch):
 
     def start(**how):
         found.update(how)
-        kept = {name: value for name, value in how.items() if name not in ("processes", "env", "host")}
+        kept = {name: value for name, value in how.items() if name not in ("processes", "env", "host", "worker_class")}
         return LocalCluster(**kept, processes=False)
 
     class Dask:
