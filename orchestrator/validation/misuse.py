@@ -12,6 +12,7 @@ from .probes import STEPS, DoubtfulError, Probe, Task
 
 State = Literal["instantiated", "running", "terminated"]
 _UNKNOWN_REFERENCE = 4_000_000_000
+_COMING = "instantiation"
 
 
 class Wrong(NamedTuple):
@@ -31,6 +32,7 @@ def _of_fmi2(task: Task) -> Iterator[Wrong]:
     yield Wrong("fmi2DoStep with a negative step", "running", "fmi2DoStep", (0.0, -task.step, True))
     for name in ("fmi2GetReal", "fmi2SetReal"):
         yield Wrong(f"{name} of a value reference that is not there", "running", name, (unknown, 1, value))
+    yield Wrong("fmi2DoStep after fmi2Terminate", "terminated", "fmi2DoStep", (0.0, task.step, True))
 
 
 def _of_fmi3(task: Task) -> Iterator[Wrong]:
@@ -43,7 +45,9 @@ def _of_fmi3(task: Task) -> Iterator[Wrong]:
     yield Wrong("fmi3ExitInitializationMode out of turn", "instantiated", "fmi3ExitInitializationMode")
     yield Wrong("fmi3EnterStepMode before initialization", "instantiated", "fmi3EnterStepMode")
     yield Wrong("fmi3EnterInitializationMode while running", "running", "fmi3EnterInitializationMode", begin)
-    yield Wrong("fmi3EnterConfigurationMode while running", "running", "fmi3EnterConfigurationMode")
+    # In step mode it is reconfiguration mode, which one with tunable structural parameters has.
+    if not any(v.variability == "tunable" for v in task.interface.of("structuralParameter")):
+        yield Wrong("fmi3EnterConfigurationMode while running", "running", "fmi3EnterConfigurationMode")
     yield Wrong("fmi3UpdateDiscreteStates outside of event mode", "running", "fmi3UpdateDiscreteStates", events)
     yield Wrong("fmi3EnterStepMode outside of event mode", "running", "fmi3EnterStepMode")
     if not task.interface.event_mode:
@@ -94,6 +98,7 @@ def order(task: Task) -> str:
     for wrong in calls:
         if wrong.what in tried:
             continue
+        task.record.trying(_COMING)  # what ends the process there is none of the wrong calls
         slave = _brought(task, wrong.state)
         task.record.trying(wrong.what)
         task.record.add(call=wrong.what, accepted=_accepts(slave, wrong))

@@ -36,9 +36,8 @@ TIMEOUT = 60.0
 """How long one probe may take by default, in s."""
 _DEFAULT_STEP = 0.1
 _SAID = "output.txt"
-_RESUMED = ("dependencies", "order")
-"""Probes that do what importers must not: what takes their process down is left out by the next one."""
-_MOST_LIVES = 20
+_LIVES = {"dependencies": 10, "order": 20}
+"""Processes that a probe may take which does what FMUs may not stand: what takes one down is left out by the next."""
 _MOMENT = 0.25
 """How often a probe that takes long is asked whether it is still wanted, in s."""
 _HANGS = "not finished after"
@@ -90,7 +89,7 @@ def _probe(
     step = interface.default_step or interface.recommended_step or _DEFAULT_STEP
     task = Task(probe, interface, folder, step, answer=place / "answer.jsonl")
     task.write(place / "task.json")
-    for _ in range(_MOST_LIVES if probe in _RESUMED else 1):
+    for _ in range(_LIVES.get(probe, 1)):
         death = _live(place, timeout, stopped)
         if task.record.last("verdict") is not None:
             return task.record.last("verdict"), str(task.record.last("detail"))

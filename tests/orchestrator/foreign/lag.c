@@ -33,7 +33,7 @@ fmi2Status fmi2SetupExperiment(fmi2Component c, fmi2Boolean a, fmi2Real b, fmi2R
 static fmi2Status go(fmi2Component c, int from) { if (M->phase != from) return fmi2Error; M->phase++; return fmi2OK; }
 fmi2Status fmi2EnterInitializationMode(fmi2Component c) { return go(c, 0); }
 fmi2Status fmi2ExitInitializationMode(fmi2Component c) { return go(c, 1); }
-fmi2Status fmi2Terminate(fmi2Component c) { return fmi2OK; }
+fmi2Status fmi2Terminate(fmi2Component c) { M->phase = 3; return fmi2OK; }
 fmi2Status fmi2Reset(fmi2Component c) { ON_RESET M->phase = 0; M->t = 0.0; M->u = 0.0; M->k = 1.0; return fmi2OK; }
 fmi2Status fmi2GetReal(fmi2Component c, const fmi2ValueReference vr[], size_t n, fmi2Real v[])
 {

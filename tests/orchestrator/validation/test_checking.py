@@ -109,6 +109,18 @@ def test_a_wrong_call_that_takes_the_process_down_is_named_and_the_others_are_ma
     )
 
 
+@needs_compiler
+def test_a_death_between_two_wrong_calls_is_none_of_theirs(found):
+    """Every third instance of a process ends it, which counts them by open files; the next process goes on."""
+    code = "int dup2(int, int); if (dup2(91, 92) == 92) abort(); if (dup2(90, 92) == 92) dup2(0, 91); dup2(0, 90);"
+    verdict, detail = found("order", on_instantiate=code, on_step="return fmi2OK;")
+    assert verdict == "warning"
+    assert detail.startswith(
+        "accepted without an error: fmi2DoStep before initialization, fmi2DoStep with a negative step, "
+        "fmi2DoStep after fmi2Terminate\ntook the process down: instantiation (SIGABRT)\n"
+    )
+
+
 @pytest.mark.long
 @needs_compiler
 def test_an_fmu_that_hangs_is_ended(lag):

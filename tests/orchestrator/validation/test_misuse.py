@@ -72,5 +72,11 @@ def test_what_it_says_it_does_not_have_it_should_refuse(tried):
     assert "fmi3EnterEventMode, which it says it does not have" in told
 
 
+def test_one_with_tunable_structural_parameters_is_reconfigured_by_right(tried):
+    size, call = 'structuralParameter" variability="', "fmi3EnterConfigurationMode while running"
+    assert call in tried("order", options=["-DANY_ORDER"])[1]
+    assert call not in tried("order", 3, (f"{size}fixed", f"{size}tunable"), options=["-DANY_ORDER"])[1]
+
+
 def test_of_fmi_1_wrong_calls_are_not_made(tried):
     assert tried("order", 1) == ("skipped", "tried with FMI 2.0 and 3.0 only")
