@@ -38,7 +38,9 @@ class Drive(Component):
     weight for traction and on all of it for braking; what is beyond is cut, the friction brake's part first.
 
     Energies count the force that was held over each step times the way made in it, which is exact for a train that
-    holds its input. A train that is elsewhere than it can have come to has been put there: that way counts nothing.
+    holds its input. A position that stands still while the train drives is one that is not told: the way made since it
+    was counts once it is told again, with the force held then. A train that is elsewhere than it can have come to since
+    its position last changed has been put there: that way counts nothing.
     """
 
     source = "envelopes and efficiencies: the train's data; adhesion: Curtius & Kniffler 1944; shares of it chosen"
@@ -89,6 +91,7 @@ class Drive(Component):
     sample = Memory("s", 0.0, description="length of the last sample")
     last_position = Memory("m", 0.0, description="position at the last sample")
     last_speed = Memory("m/s", 0.0, description="speed at the last sample")
+    untold = Memory("m", 0.0, description="furthest it can have come since its position last changed")
     held = Memory("N", 0.0, shape=(3,), description="traction, regeneration and friction held since then")
     drawn_energy = Memory("J", 0.0, output=True, description="energy drawn for traction, losses included")
     recovered_energy = Memory("J", 0.0, output=True, description="energy given back by the regenerative brake")
@@ -127,7 +130,7 @@ class Drive(Component):
     def update(self) -> Values:
         made = abs(self.position - self.last_position)
         # Between two samples a speed stays between what it was and what it is, but for what grades do within one.
-        furthest = 2.0 * self.sample * maximum(abs(self.speed), abs(self.last_speed))
+        furthest = self.untold + 2.0 * self.sample * maximum(abs(self.speed), abs(self.last_speed))
         way = where(made <= furthest + _PUT, made, 0.0)
         traction, regeneration, friction = self.held
         return {
@@ -135,6 +138,7 @@ class Drive(Component):
             "sample": self.step,
             "last_position": self.position,
             "last_speed": self.speed,
+            "untold": where(made > 0.0, 0.0, furthest),
             "held": list(self._passed(self._built_up())),
             "drawn_energy": self.drawn_energy + traction * way / self.train.traction.efficiency,
             "recovered_energy": self.recovered_energy + regeneration * way * self.train.regeneration.efficiency,

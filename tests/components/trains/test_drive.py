@@ -179,6 +179,27 @@ def test_a_train_that_is_put_elsewhere_has_made_no_way():
     assert drawn == pytest.approx([0.0, metre, 2 * metre, 2 * metre, 3 * metre, 3 * metre, 4 * metre])
 
 
+def test_a_way_that_is_told_late_counts_and_a_jump_then_does_not():
+    """20 m/s and 10 kN, 0.8 of what is drawn, for 10 s; for one of them the position stands."""
+    drive = Simulation(Drive(**AT_ONCE, speed=20.0, demanded_force=10e3))
+    drive.initialize()
+    drive.start()
+
+    def after(position, speed=20.0):
+        drive.set("position", position)
+        drive.set("speed", speed)
+        drive.step(0.1)
+        return drive.get("drawn_energy")
+
+    found = [after(2.0 * (40 if 40 < k <= 50 else k)) for k in range(101)]
+    assert found[50] == found[40]
+    assert found[100] == pytest.approx(200.0 * 10e3 / 0.8, rel=1e-12)
+    frozen = [after(200.0) for _ in range(10)]  # not told again, and then it is put back
+    assert {after(0.0), *frozen} == {found[100]}
+    standing = [after(0.0, speed=0.0) for _ in range(100)]
+    assert {after(30.0, speed=1.0), *standing} == {found[100]}
+
+
 CONTROLLERS = sorted(
     name
     for name, kind in CATALOGUE.items()
