@@ -64,7 +64,7 @@ class Host:
         self._notes = _notes(memory, begin)
         self._before = before
         self._limit = limit
-        self._slave: Slave | None = None
+        self._slave: LoadedSlave | None = None
         self._channels: list[tuple[Channel, Cells | None]] = []
         self._texts: dict[int, Sequence[Any]] = {}
         self._watched: list[int] = []
