@@ -170,7 +170,7 @@ static void move_frozen_results(Instance *s)
 #else
     MODEL_DIRECTIONAL(clock, s->values, s->direction, s->scratch);
 #endif
-#if IS_SAMPLED && HAS_HELD
+#if HAS_HELD
     for (int k = 0; k < N_OUTPUTS; k++) {
         s->scratch[k] = model_held[k] && !samples ? 0.0 : s->scratch[k];
     }

@@ -68,6 +68,8 @@ def test_what_is_held_answers_to_nothing_until_a_sample_is_due(exchanged):
     assert fmu.directional(("y",), known, direction) == [0.0]
     assert fmu.EnterEventMode() == OK
     assert fmu.directional(("y",), known, direction) == [2.0]
+    fmu.event(integrate=False)
+    assert fmu.directional(("y", "z"), known, direction) == [0.0, 3.0], "the sample is taken, the event is not over"
     slave = exchanged("Sampler", kind=1).initialize(sample_time=0.5)
     assert slave.step(0.1) == OK
     assert slave.directional(("y",), known, direction) == [2.0], "of co-simulation they are of the equations"
