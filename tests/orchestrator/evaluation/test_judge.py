@@ -49,6 +49,15 @@ def test_the_culprit_of_what_is_infinite_is_found_without_a_warning():
     assert (verdict.verdict, verdict.blame) == ("pass", ("s.x",))
 
 
+def test_conditions_within_a_choice():
+    """By hand: at 1 it is 1 above 0; below 3 both count, then neither may hold, of which one is missed by 2."""
+    text = "always ((0 < s.x and s.x < s.limit) if s.x < 3 else not (s.x < 2 or s.x > 9))"
+    (verdict,) = Judge({}, {"r": text}, NAMES, {"s.limit"}).verdicts(run([1.0, 2.0, 4.0]))
+    assert (verdict.verdict, verdict.margin, verdict.time) == ("pass", 1.0, 0.0)
+    (verdict,) = Judge({}, {"r": text}, NAMES, {"s.limit"}).verdicts(run([2.5, 4.0, 8.5]))
+    assert (verdict.verdict, verdict.margin, verdict.time) == ("pass", 0.5, 1.0)
+
+
 def test_a_run_that_lacks_a_value_has_nan_by_its_name():
     judge = Judge({"late": "max(s.x, until = 9)", **METRICS}, {}, NAMES)
     values = judge.values(run([1.0, 2.0, 3.0]))
