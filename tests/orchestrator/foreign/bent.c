@@ -3,7 +3,7 @@
    4 exp x, 5 cos x, 6 root of x, which is no number below 0); 8 mode; 9 m (integer input); 10 n (integer output). From t = 1 s on
    mode says what is odd: 100 + s the status of being asked for derivatives, 200 + s of being set, 300 + s of being read;
    400 rounds upward when asked; 401: y = u + 1; 402 and 403 refuse a u that is near the last one, or
-   far, 404 to be read where it is near; 405 a u that is the last y, once it was set five times in this step. */
+   far, 404 to be read where it is near; 405 a u that is the last y and another, once it was set five times in a step. */
 
 #include "fmi2.h"
 
@@ -72,7 +72,7 @@ int fmi2SetReal(void *c, const unsigned *vr, size_t count, const double *values)
     int how = s->time >= 1.0 ? s->whole[8] : 0, is_refused = 0;
     for (size_t k = 0; k < count; k++) {
         double by = fabs(values[k] - s->v[vr[k]]);
-        is_refused |= how == 405 && vr[k] == 0 && ++s->set_count > 5 && values[k] == s->v[2];
+        is_refused |= how == 405 && vr[k] == 0 && ++s->set_count > 5 && values[k] == s->v[2] && by > 1e-3;
         is_refused |= vr[k] == 0 && ((how == 402 && by > 0.0 && by < 1e-4) || (how == 403 && by > 1.0));
         s->v[vr[k]] = values[k];
     }
