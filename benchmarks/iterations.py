@@ -263,9 +263,7 @@ def varying(ring: Ring, repetitions: int) -> None:
     bare, ours = all_of[0], all_of[1]
     assert bare.taken == taken(ours), (bare.taken, taken(ours))
     assert np.allclose(bare.values, ours.values, rtol=1e-12)
-    ratios = [statistics.median(a / b for a, b in zip(found, costs[0], strict=True)) for found in costs]
-    cells = [f"{statistics.median(found):.3g} ({ratio:.3g})" for found, ratio in zip(costs, ratios, strict=True)]
-    print(f"| {ring.count} | {bare.taken} | " + " | ".join(cells) + " |", flush=True)
+    tell(ring, f"{bare.taken}", costs)
 
 
 def solved(ring: Ring, repetitions: int) -> None:
@@ -278,9 +276,14 @@ def solved(ring: Ring, repetitions: int) -> None:
     bare, ours = all_of[0], all_of[1]
     assert bare.done == ours.done
     assert bare.values == ours.values, (bare.values, ours.values)
+    tell(ring, f"{bare.evaluations / bare.done:.3g}", costs)
+
+
+def tell(ring: Ring, what: str, costs: list[list[float]]) -> None:
+    """A row of a table: medians, and in parentheses those of the ratios to what was measured first, pair by pair."""
     ratios = [statistics.median(a / b for a, b in zip(found, costs[0], strict=True)) for found in costs]
     cells = [f"{statistics.median(found):.3g} ({ratio:.3g})" for found, ratio in zip(costs, ratios, strict=True)]
-    print(f"| {ring.count} | {bare.evaluations / bare.done:.3g} | " + " | ".join(cells) + " |", flush=True)
+    print(f"| {ring.count} | {what} | " + " | ".join(cells) + " |", flush=True)
 
 
 def taken(one: Any) -> int:
