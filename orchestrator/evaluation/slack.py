@@ -29,7 +29,7 @@ def decoded(values: Array) -> Array:
 
 
 def slack_of(node: Node, scope: Scope, scales: Scales | None = None) -> Array:
-    """The slack of a condition: b - a for a < b, the least for `and`, the most for `or`, negated for `not`.
+    """The slack of a condition that is made of no others: b - a for a < b. What words make of them, `Formula` knows.
 
     It is positive where the condition holds and negative where it does not (missed by), never 0, as `decoded` has it;
     infinite where there is no measure. A bare signal is a boolean: it holds where it is not zero and has no measure.
@@ -40,18 +40,9 @@ def slack_of(node: Node, scope: Scope, scales: Scales | None = None) -> Array:
         scope: what its names stand for.
         scales: what the slack of a comparison is divided by; 1 by default.
     """
-    match node:
-        case Operation(operator="not", operands=(operand,)):
-            return -slack_of(operand, scope, scales)
-        case Operation(operator="and" | "or" as operator, operands=operands):
-            parts = [slack_of(operand, scope, scales) for operand in operands]
-            return np.asarray(reduce(np.minimum if operator == "and" else np.maximum, parts))
-        case Operation(operator="if", operands=(condition, then, otherwise)):
-            choice = _number(condition, scope)
-            yes, no = slack_of(then, scope, scales), slack_of(otherwise, scope, scales)
-            return np.where(np.isnan(choice), np.nan, np.where(choice, yes, no))
-        case Operation(operator=operator, operands=(left, right)) if operator in COMPARISONS:
-            return _compared(operator, left, right, scope, None if scales is None else scales[id(node)])
+    if isinstance(node, Operation) and node.operator in COMPARISONS:
+        left, right = node.operands
+        return _compared(node.operator, left, right, scope, None if scales is None else scales[id(node)])
     value = _number(node, scope)
     return np.where(np.isnan(value), np.nan, np.where(value, np.inf, -np.inf))
 

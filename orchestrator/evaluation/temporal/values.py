@@ -152,14 +152,14 @@ class Formula:
             case Operation(operator="and" | "or" as operator, operands=operands):
                 choose = np.minimum if operator == "and" else np.maximum
                 return _combined(partial(reduce, choose), [self.values(operand, first, last) for operand in operands])
-            case _ if not self.is_temporal(node):
-                return self._plain(node, first, last)
             case Operation(operator="if", operands=(condition, *branches)):
                 choice = self.choice(condition, first, last)
                 return _combined(
                     lambda both: np.where(np.isnan(choice), np.nan, np.where(choice, both[0], both[1])),
                     [self.values(branch, first, last) for branch in branches],
                 )
+            case _ if not self.is_temporal(node):
+                return self._plain(node, first, last)
         evaluate(node, self.scope)  # which says what is wrong
         raise AssertionError("a formula in a number")  # pragma: no cover: that was an error
 
