@@ -32,7 +32,6 @@ if TYPE_CHECKING:
     from ..fmi.binding import LoadedSlave
 
 _LOG_LINES = 50
-_FATAL = 4
 
 
 class _Heard(deque[str]):
@@ -103,10 +102,12 @@ class Host:
     def come_back(self) -> None:
         """Go on by messages, at the time that the master has got to by calls through the lane."""
         if self._slave is not None and self.service.operations:
+            from ..fmi.binding import FATAL  # noqa: PLC0415 (it is there by now, with the FMU)
+
             self._slave.time = self.service.time
-            if self._notes[NOTE_FAILED] and self._notes[NOTE_STATUS] == _FATAL:
+            if self._notes[NOTE_FAILED] and self._notes[NOTE_STATUS] == FATAL:
                 with contextlib.suppress(Exception):  # a neighbour may have failed first, and be told of
-                    self._slave.check("", _FATAL)
+                    self._slave.check("", FATAL)
 
     # ---------------------------------------------------------------- answered
 

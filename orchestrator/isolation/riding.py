@@ -13,7 +13,7 @@ from typing import Any, Protocol
 
 from ..errors import FmuError, LostError
 from ..fmi import Interface
-from ..fmi.binding import FmuSlave
+from ..fmi.binding import DISCARD, FATAL, PENDING, FmuSlave
 from .channel import IsolatedChannel
 from .lanes import HAS_LANES, lane
 from .messages import (
@@ -32,7 +32,6 @@ from .messages import (
 )
 from .process import HostProcess
 
-_DISCARD, _FATAL, _PENDING = 2, 4, 5
 _VERSION = "2.0"
 """Of FMI, whose functions the lane calls."""
 _CALLS = {
@@ -191,7 +190,7 @@ class Ride:
         if status == lane.SILENT:
             self._await()
             return True
-        if self.failed == "step" and status == _DISCARD:
+        if self.failed == "step" and status == DISCARD:
             begin, length, _ = self._rider.last_step()
             slave.ask("resume", begin, length, status, self._is_final)
             return not call.endswith("DoStep")
@@ -214,9 +213,9 @@ class Ride:
         if not self.failed:
             return
         self._slave.time = self._time_of_failure(time, apart=apart)
-        if status == _FATAL or self.failed == "forget":
+        if status == FATAL or self.failed == "forget":
             self.check(self._failed_call(), status)
-        if status == _PENDING and self.failed == "step":
+        if status == PENDING and self.failed == "step":
             with suppress(FmuError):  # it is cancelled: no state may be restored before
                 self.check(self._failed_call(), status)
 

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from .. import world
 from ..errors import FmuError, LostError, RunError
-from ..fmi.binding import LoadedSlave
+from ..fmi.binding import DISCARD, LoadedSlave
 from ..fmi.guard import GUARD, NOTE_SIZE, NOTES, own_note, said
 from ..isolation import IsolatedSlave, Ride
 from .algorithms import Programmed, Repeated
@@ -30,7 +30,6 @@ except ImportError:  # installed without a C compiler
 HAS_KERNEL = kernel is not None
 _look: Any = getattr(kernel, "look", None)
 HAS_THREADS = HAS_KERNEL and bool(kernel.HAS_THREADS)
-_DISCARD = 2
 _BLOCK_SECONDS = 0.05
 """Wall time a block is meant to take: short enough for Ctrl-C and a progress bar, long enough to cost nothing."""
 _GROWTH = 256
@@ -254,7 +253,7 @@ class CompiledLoop:
         is_late = self.plan.late[failed]
         is_of_end = "Get" in call if kind < Kind.SAVE else kind != Kind.SAVE
         when = time + (period - phase) * step if is_of_end or (kind == Kind.SET and is_late) else time
-        if kind == Kind.STEP and 0 <= status <= _DISCARD and isinstance(slave, LoadedSlave):  # or it ended early
+        if kind == Kind.STEP and 0 <= status <= DISCARD and isinstance(slave, LoadedSlave):  # or it ended early
             slave.resume(time, period * step, status, final=not is_late)
             return False
         owner = self._coupling.slaves[slave.name]

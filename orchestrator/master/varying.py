@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 
 from .. import world
 from ..errors import FmuError, RunError
-from ..fmi.binding import LoadedSlave
+from ..fmi.binding import FATAL, PENDING, LoadedSlave
 from ..fmi.guard import NOTES, own_note, said
 from ..isolation import Ride
 from ..times import slack
@@ -27,8 +27,6 @@ from .algorithms.adaptive import Adaptive
 from .coupling import Coupling
 from .observer import Observer, Rows
 from .plans import CONTROL, PLACE, Kind, Plan, is_able
-
-_FATAL, _PENDING = 4, 5
 
 
 @dataclass(frozen=True)
@@ -270,9 +268,9 @@ class Blocks:
         slave.time = when
         if status >> 32 > 0:
             raise slave.lose(said(call, status >> 32, (status & 0x7FFFFFFF) - (status & 0x80000000)))
-        if status == _FATAL or kind == Kind.FORGET:
+        if status == FATAL or kind == Kind.FORGET:
             slave.check(call, status)
-        if status == _PENDING and kind == Kind.STEP:
+        if status == PENDING and kind == Kind.STEP:
             with suppress(FmuError):  # it is cancelled: no state may be restored before
                 slave.check(call, status)
 
