@@ -6,6 +6,8 @@ taken in Python with identical results.
 
 from __future__ import annotations
 
+from collections.abc import Iterable
+from contextlib import suppress
 from functools import reduce
 from typing import Any
 
@@ -219,8 +221,24 @@ class CompiledLoop:
         if max(failed) >= 0:
             waiting = (n for n, operation in enumerate(failed) if operation >= 0)
             part = min(waiting, key=lambda n: self.plan.rank(failed[n]))
-            again = self._see_to(failed[part], int(places[part]["status"]), time, step)
+            try:
+                again = self._see_to(failed[part], int(places[part]["status"]), time, step)
+            except BaseException:
+                self._leave_alone(place for n, place in enumerate(places) if n != part and place["failed"] >= 0)
+                raise
             places[part] = failed[part] + (not again), -1, 0
+
+    def _leave_alone(self, places: Iterable[np.void]) -> None:
+        """Let instances that have failed as well, in other threads, know it: some must not be given back as others are."""
+        for place in places:
+            slave, call = self.plan.culprits[place["failed"]]
+            status = int(place["status"])
+            if isinstance(slave, LoadedSlave):
+                with suppress(FmuError):
+                    if status >> 32 > 0:
+                        slave.lose(call)
+                    else:
+                        slave.check(call, status)
 
     def _see_to(self, failed: int, status: int, time: float, step: float) -> bool:
         """See to an operation that failed, as `_recover` says; states that were saved are given back."""

@@ -164,6 +164,26 @@ def test_of_failures_and_discarded_steps_the_first_is_told(agree, deeds, culprit
     assert what in error[0]
 
 
+@pytest.mark.parametrize("call", [0, 20, 30, 60, 70])
+def test_who_was_fatal_is_not_given_back_though_another_is_told(agree, call):
+    """odd.c aborts where it is, and that would be told; alone, the last two have not got there yet."""
+    _, error, _, notes, _ = agree(doing([0, call + 3, call + 4, call + 4]))
+    assert (error[1], notes) == ("odd[1]", [])
+
+
+def test_of_those_who_leave_their_calls_at_once_nobody_is_given_back(contents, lag):
+    """All of them at t = 0.5 s, where there are three threads; given back after that, each would leave that call, too."""
+    system = System(step=0.1, stop_time=1.0, algorithm="jacobi")
+    for k in range(3):
+        code = {"on_step": f"if (t > 0.45) exit({k + 1});", "on_free": "if (M->t > 0.35) exit(9);"}
+        system.add(f"lag[{k}]", str(lag(name=f"{k}.fmu", **code)))
+    alone, together = (told(system, contents, threads) for threads in (1, 3))
+    assert together[1] == alone[1]
+    assert "fmi2DoStep called exit(1)" in together[1][0]
+    assert len(alone[3]) == 2  # those who have not left a call say so as they are given back
+    assert together[3] == []
+
+
 def test_whom_it_takes_to_be_restored(agree):
     """Two of them: the run begins anew twice."""
     status, error, coupling, *_ = agree(doing([43, 40, 0, 43]))
