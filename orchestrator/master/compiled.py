@@ -229,7 +229,7 @@ class CompiledLoop:
             places[part] = failed[part] + (not again), -1, 0
 
     def _leave_alone(self, places: Iterable[np.void]) -> None:
-        """Let instances that have failed as well, in other threads, know it: some must not be given back as others are."""
+        """Let those that have failed as well, in other threads, know it: some must not be given back as others are."""
         for place in places:
             slave, call = self.plan.culprits[place["failed"]]
             status = int(place["status"])

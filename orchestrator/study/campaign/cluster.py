@@ -5,6 +5,7 @@ from __future__ import annotations
 import importlib
 import importlib.util
 import logging
+import multiprocessing
 import signal
 import threading
 from collections.abc import Callable, Iterator, Mapping, Sequence
@@ -184,6 +185,7 @@ class Cluster:
             for number in filter(None, [nanny.pid for nanny in self._own.workers.values()]):
                 with suppress(psutil.Error):
                     psutil.Process(number).kill()
+            _kill_untold(_PATIENCE / 2)
 
     def _remote(self) -> Any:
         try:
@@ -213,9 +215,26 @@ def _nanny(dask: Any) -> Any:
                 with suppress(ValueError):  # of one that has ended, and is closed
                     if started and started.is_alive():
                         await started.kill()
+                    elif started:
+                        _kill_untold(_START / 2)
             return "OK"
 
     return Nanny
+
+
+def _kill_untold(age: float) -> None:
+    """Kill what ``multiprocessing`` has spawned so many s ago, and has still not told what to do.
+
+    It writes that into a pipe, and waits where the pipe is full; until all of it is written nothing knows the process.
+    """
+    import psutil
+
+    told = {one.pid for one in multiprocessing.active_children()}
+    for one in psutil.Process().children():
+        with suppress(psutil.Error):
+            is_spawned = "--multiprocessing-fork" in one.cmdline()
+            if is_spawned and one.pid not in told and world.now() - one.create_time() > age:
+                one.kill()
 
 
 @contextmanager

@@ -172,7 +172,7 @@ def test_who_was_fatal_is_not_given_back_though_another_is_told(agree, call):
 
 
 def test_of_those_who_leave_their_calls_at_once_nobody_is_given_back(contents, lag):
-    """All of them at t = 0.5 s, where there are three threads; given back after that, each would leave that call, too."""
+    """All of them at t = 0.5 s, where there are three threads; given back after that, each leaves that call, too."""
     system = System(step=0.1, stop_time=1.0, algorithm="jacobi")
     for k in range(3):
         code = {"on_step": f"if (t > 0.45) exit({k + 1});", "on_free": "if (M->t > 0.35) exit(9);"}

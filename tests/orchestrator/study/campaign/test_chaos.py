@@ -72,8 +72,14 @@ def test_a_killed_study_goes_on_as_often_as_it_is_killed(native, system, scenari
     assert same(Study.load(tmp_path / "out"), undisturbed)
 
 
-def test_a_worker_that_does_not_come_up_is_given_up_and_another_one_is_started(native, system, tmp_path, monkeypatch):
-    """The only one there is, twice: stopped, it never says that it runs, like one killed while it is being started."""
+@pytest.mark.parametrize("told", [True, False])
+def test_a_worker_that_does_not_come_up_is_given_up_and_another_one_is_started(
+    native, system, tmp_path, monkeypatch, told
+):
+    """The only one there is, twice: stopped, it never says that it runs, like one killed while it is being started.
+
+    What it is told at its start fits into a pipe, or does not: then it is not even known to be there.
+    """
     monkeypatch.setattr(cluster, "_START", 10.0)
     how, undisturbed = native
     me, over, stopped = psutil.Process(), threading.Event(), []
@@ -91,7 +97,8 @@ def test_a_worker_that_does_not_come_up_is_given_up_and_another_one_is_started(n
             threading.Thread(target=disturb, args=workers_of(me)).start()
 
     try:
-        study = run_study(plan_of(system, runs=RUNS), how, tmp_path / "out", workers=1, progress=begin)
+        with dask.config.set({"distributed.unknown": "" if told else "x" * (1 << 20)}):
+            study = run_study(plan_of(system, runs=RUNS), how, tmp_path / "out", workers=1, progress=begin)
     finally:
         over.set()
     assert len(stopped) == 2
