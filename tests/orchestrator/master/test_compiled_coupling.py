@@ -132,7 +132,7 @@ def test_sampled_ones_step_first(both, mine):
     assert result.status == "completed"
 
 
-def test_only_instances_here_are_restored():
+def test_what_is_no_fmu_is_not_restored():
     assert not can_be_restored(object())
 
 
