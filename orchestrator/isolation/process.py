@@ -202,8 +202,11 @@ class HostProcess:
         if self.lane is None:
             assert self._door is not None
             line, spin = self._door.number, spin_time()
-            self.lane = lane.Lane(self.memory, self._lane_offset, line, self._moment, spin, self.patience)
+            self.lane = lane.Lane(self.memory, self._lane_offset, line, self._moment, spin, self._keep_waiting)
         return self.lane
+
+    def _keep_waiting(self, seat: int) -> None:
+        self.seated[seat].await_lane()
 
     def enter_lane(self) -> None:
         """Let it take calls from there.

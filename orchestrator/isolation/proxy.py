@@ -222,13 +222,14 @@ class IsolatedSlave:
         with self._mourning():
             self._process.enter_lane()
 
-    def await_lane(self, end: float) -> None:
-        """Wait for a call that is under way in the lane, in or after a step to a time in s.
+    def await_lane(self) -> None:
+        """Wait for what is under way in the lane.
 
         Raises:
             FmuError: it is lost.
         """
-        self.end = end
+        assert self._ride is not None
+        self.time, self.end = self._ride.time_of("step"), self._ride.time_of("get")
         with self._mourning():
             self._process.await_lane(self._seat)
         self.end = None

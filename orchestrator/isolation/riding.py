@@ -60,8 +60,8 @@ class Rider(Protocol):
     def enter_lane(self) -> None:
         """Let its process take calls from the lane."""
 
-    def await_lane(self, end: float) -> None:
-        """Wait for a call that is under way in the lane, in or after a step to a time in s."""
+    def await_lane(self) -> None:
+        """Wait for what is under way in the lane."""
 
     def name_call(self, call: str, channel: int) -> str:
         """The function of the standard behind a name of `messages.CALLS`, called for a channel."""
@@ -187,9 +187,7 @@ class Ride:
             FmuError: the instance failed, or is lost.
         """
         slave = self._slave
-        if status == lane.SILENT:
-            self._await()
-            return True
+        self._raise_failure()
         if self.failed == "step" and status == DISCARD:
             begin, length, _ = self._rider.last_step()
             slave.ask("resume", begin, length, status, self._is_final)
@@ -208,7 +206,8 @@ class Ride:
         Raises:
             FmuError: the instance is lost, or cannot be called any more.
         """
-        self._await()
+        self._raise_failure()
+        self._slave.await_lane()
         status = self._process.note(NOTE_STATUS, self._seat)
         if not self.failed:
             return
@@ -219,9 +218,11 @@ class Ride:
             with suppress(FmuError):  # it is cancelled: no state may be restored before
                 self.check(self._failed_call(), status)
 
-    def _await(self) -> None:
-        self._slave.time = self.time_of("step")
-        self._slave.await_lane(self.time_of("get"))
+    def _raise_failure(self) -> None:
+        """Raise what ended the wait for a call in the loop."""
+        failure = self._lane.failure()
+        if failure is not None:
+            raise failure
 
     def _failed_call(self) -> str:
         _, channel, _ = self._table[abs(self._process.note(NOTE_FAILED, self._seat)) - 1]

@@ -53,6 +53,13 @@ class Seated(Protocol):
     def name_call(self, call: str, channel: int) -> str:
         """The function of the standard behind a name of `messages.CALLS`, called for a channel."""
 
+    def await_lane(self) -> None:
+        """Wait for what is under way in the lane.
+
+        Raises:
+            FmuError: it is lost.
+        """
+
     def mourn(self, lost: HostLostError) -> FmuError:
         """The error that tells that it was lost, with its process."""
 

@@ -262,8 +262,6 @@ class Blocks:
         if isinstance(slave, Ride):
             for ride in (slave, *self._plan.rides):
                 ride.leave(when, apart=kind in (Kind.READ, Kind.SLOPES))
-            if kind == Kind.FORGET:  # others have given theirs back
-                raise FmuError(f"took too long in {call}", instance=slave.name, time=when)
             return
         slave.time = when
         if status >> 32 > 0:

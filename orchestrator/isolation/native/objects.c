@@ -17,6 +17,25 @@ Lane *lane_in(const Py_buffer *memory, Py_ssize_t offset)
 
 static PyTypeObject *lane_type, *rider_type;
 
+static int goes_on(LaneObject *road, uint32_t number)
+{
+    PyGILState_STATE state = PyGILState_Ensure();
+    PyObject *waits = road->waits, *traceback, *type;
+    Py_INCREF(waits); /* who closes the lane meanwhile gives it up */
+    PyObject *found = PyObject_CallFunction(waits, "I", (unsigned)number);
+    int is_fine = found != NULL;
+    if (!is_fine) {
+        PyErr_Fetch(&type, &road->failure, &traceback);
+        PyErr_NormalizeException(&type, &road->failure, &traceback);
+        Py_XDECREF(type);
+        Py_XDECREF(traceback);
+    }
+    Py_XDECREF(found);
+    Py_DECREF(waits);
+    PyGILState_Release(state);
+    return is_fine;
+}
+
 static PyObject *allocated(PyTypeObject *type)
 {
     return ((allocfunc)PyType_GetSlot(type, Py_tp_alloc))(type, 0);
@@ -34,9 +53,10 @@ static PyObject *make_lane(PyTypeObject *type, PyObject *arguments, PyObject *na
     Py_buffer memory;
     Py_ssize_t offset;
     int line;
-    double moment, spin, patience;
+    double moment, spin;
+    PyObject *waits;
     (void)names;
-    if (!PyArg_ParseTuple(arguments, "w*niddd:Lane", &memory, &offset, &line, &moment, &spin, &patience)) {
+    if (!PyArg_ParseTuple(arguments, "w*niddO:Lane", &memory, &offset, &line, &moment, &spin, &waits)) {
         return NULL;
     }
     Lane *lane = lane_in(&memory, offset);
@@ -49,7 +69,9 @@ static PyObject *make_lane(PyTypeObject *type, PyObject *arguments, PyObject *na
     road->lane = lane;
     road->line = line;
     road->moment = (int64_t)(moment * 1e9);
-    road->patience = (int64_t)(patience * 1e9);
+    road->goes_on = goes_on;
+    Py_INCREF(waits);
+    road->waits = waits;
     road->spin.most = road->spin.now = (int64_t)(spin * 1e9);
     return (PyObject *)road;
 }
@@ -68,13 +90,27 @@ static PyObject *close_lane(PyObject *self, PyObject *nothing)
     if (road->lane != NULL) {
         road->lane = NULL;
         PyBuffer_Release(&road->memory);
+        Py_CLEAR(road->waits);
     }
     Py_RETURN_NONE;
+}
+
+static PyObject *failure(PyObject *self, PyObject *nothing)
+{
+    LaneObject *road = (LaneObject *)self;
+    PyObject *found = road->failure;
+    (void)nothing;
+    road->failure = NULL;
+    if (found == NULL) {
+        Py_RETURN_NONE;
+    }
+    return found;
 }
 
 static void free_lane(PyObject *self)
 {
     Py_XDECREF(close_lane(self, NULL));
+    Py_XDECREF(failure(self, NULL));
     freed(self);
 }
 
@@ -179,9 +215,6 @@ static PyObject *begin(PyObject *self, PyObject *arguments)
     }
     rider->length = 0.0;
     rider->is_read = 0;
-    for (Seat *seat = rider->seats; seat != NULL; seat = seat->next) {
-        seat->is_under_way = 0;
-    }
     Py_RETURN_NONE;
 }
 
@@ -196,12 +229,14 @@ static PyMethodDef lane_methods[] = {
     {"wait", wait_for_all, METH_VARARGS, "wait(most) -> CAME, CAME_NOT or CLOSED, for all that is posted; at most so many s."},
     {"done", done, METH_NOARGS, "done() -> how many entries the host has come to the end of; 0 once it is closed."},
     {"leave", leave, METH_NOARGS, "leave() -> whether the host could be told to leave the lane."},
+    {"failure", failure, METH_NOARGS, "failure() -> what was raised when the last call was waited for, once; else None."},
     {"close", close_lane, METH_NOARGS, "close(): nothing comes this way any more."},
     {NULL, NULL, 0, NULL},
 };
 static PyType_Slot lane_slots[] = {
     {Py_tp_new, make_lane}, {Py_tp_dealloc, free_lane}, {Py_tp_methods, lane_methods},
-    {Py_tp_doc, "Lane(memory, offset, line, moment, spin, patience): the master's side; the last three in s."}, {0, NULL},
+    {Py_tp_doc, "Lane(memory, offset, line, moment, spin, waits): the master's side. What does not come within a moment is\n"
+     "waited for by what is called with the number of the instance, and raises if it will not come; times in s."}, {0, NULL},
 };
 static PyType_Spec lane_spec = {"railcosim.orchestrator.isolation.lane.Lane", sizeof(LaneObject), 0, Py_TPFLAGS_DEFAULT,
                                 lane_slots};
@@ -234,7 +269,6 @@ int add_riding(PyObject *module)
                   PyModule_AddObjectRef(module, "FUNCTIONS", addresses) == 0 &&
                   PyModule_AddObjectRef(module, "Lane", (PyObject *)lane_type) == 0 &&
                   PyModule_AddObjectRef(module, "Rider", (PyObject *)rider_type) == 0 &&
-                  PyModule_AddIntConstant(module, "SILENT", SILENT) == 0 &&
                   PyModule_AddIntConstant(module, "SIZE", (long)sizeof(Lane)) == 0 &&
                   PyModule_AddIntConstant(module, "CAME", CAME) == 0 &&
                   PyModule_AddIntConstant(module, "CLOSED", CLOSED) == 0;

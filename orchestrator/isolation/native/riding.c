@@ -4,7 +4,8 @@
    read was read by the host after the step, in one go. So a step of an instance is one hand-over, and instances in several
    processes step at the same time where nothing is read between. A call that failed is told by one that comes after.
    Waited for are only derivatives of inputs, which an FMU may refuse, and what comes last in a step that was repeated: a
-   state that is restored for good, and those that are given back. */
+   state that is restored for good, and those that are given back. What does not come within a moment Python waits for, who
+   knows how long a call may take, and whether the run is to stop. */
 
 #include "riding.h"
 
@@ -79,29 +80,50 @@ static int status_of(const Seat *seat)
     return failed == 0 || failed > (int64_t)seat->number + 1 ? 0 : (int)note_of(seat->rider, NOTE_STATUS);
 }
 
+/* Whether so many entries are done; 0 where they are not waited for any more, and the lane may be closed. */
+static int wait_for(const RiderObject *rider, uint32_t ticket)
+{
+    LaneObject *road = rider->road;
+    while (await(road, ticket, road->moment) != CAME) {
+        if (!road->goes_on(road, rider->number)) {
+            return 0;
+        }
+    }
+    return 1;
+}
+
+/* Post an operation as soon as there is room; 0 as above. */
+static int ask_for(Seat *seat, Entry entry, int wakes)
+{
+    LaneObject *road = seat->rider->road;
+    while (!post(road, entry, wakes, &seat->posted)) {
+        if (!road->goes_on(road, seat->rider->number)) {
+            return 0;
+        }
+    }
+    return 1;
+}
+
 static int set(void *component, const void *values, size_t size)
 {
     Seat *seat = component;
     RiderObject *rider = seat->rider;
-    LaneObject *road = rider->road;
-    if (road->lane == NULL || await(road, seat->posted, road->moment) != CAME) { /* the host may still be reading there */
+    if (!wait_for(rider, seat->posted)) { /* the host may still be reading there */
         return SILENT;
     }
     memcpy(values_of(seat), values, size);
     rider->is_read = 0;
-    return post(road, (Entry){.instance = rider->number, .what = seat->number}, 0, &seat->posted) ? 0 : SILENT;
+    return ask_for(seat, (Entry){.instance = rider->number, .what = seat->number}, 0) ? 0 : SILENT;
 }
 
-/* Wait for what was posted; it is not posted again after it was waited for in vain. */
-static int finish(Seat *seat, int64_t most)
+static int finish(const Seat *seat)
 {
-    seat->is_under_way = await(seat->rider->road, seat->posted, most) != CAME;
-    return seat->is_under_way ? SILENT : status_of(seat);
+    return wait_for(seat->rider, seat->posted) ? status_of(seat) : SILENT;
 }
 
-static int carry_out(Seat *seat, Entry entry, int64_t most)
+static int carry_out(Seat *seat, Entry entry)
 {
-    return seat->is_under_way || post(seat->rider->road, entry, 1, &seat->posted) ? finish(seat, most) : SILENT;
+    return ask_for(seat, entry, 1) ? finish(seat) : SILENT;
 }
 
 static int set_reals(void *component, const unsigned *references, size_t count, const double *values)
@@ -120,21 +142,15 @@ static int step(void *component, double time, double length, int is_final)
 {
     Seat *seat = component;
     RiderObject *rider = seat->rider;
-    LaneObject *road = rider->road;
-    if (road->lane == NULL) {
+    Entry entry = {rider->number, seat->number, time, length, (uint64_t)is_final};
+    if (!ask_for(seat, entry, 1)) {
         return SILENT;
     }
-    if (!seat->is_under_way) {
-        Entry entry = {rider->number, seat->number, time, length, (uint64_t)is_final};
-        if (!post(road, entry, 1, &seat->posted)) {
-            return SILENT;
-        }
-        rider->time = time;
-        rider->length = length;
-        rider->wanted = seat->posted;
-        rider->is_read = 1;
-    }
-    return rider->gives ? 0 : finish(seat, road->moment);
+    rider->time = time;
+    rider->length = length;
+    rider->wanted = seat->posted;
+    rider->is_read = 1;
+    return rider->gives ? 0 : finish(seat);
 }
 
 static int set_slopes(void *component, const unsigned *references, size_t count, const int *orders,
@@ -142,18 +158,13 @@ static int set_slopes(void *component, const unsigned *references, size_t count,
 {
     RiderObject *rider = ((Seat *)component)->rider; /* what stands for the instance is what sets these inputs */
     Seat *seat = rider->slopes;
-    if (rider->road->lane == NULL) {
-        return SILENT;
-    }
-    if (!seat->is_under_way) {
-        Slopes to = slopes_in(values_of(seat), (size_t)seat->count);
-        *to.count = (int64_t)count;
-        memcpy(to.values, values, count * sizeof *values);
-        memcpy(to.references, references, count * sizeof *references);
-        memcpy(to.orders, orders, count * sizeof *orders);
-        rider->is_read = 0;
-    }
-    return carry_out(seat, (Entry){.instance = rider->number, .what = seat->number}, rider->road->moment);
+    Slopes to = slopes_in(values_of(seat), (size_t)seat->count);
+    *to.count = (int64_t)count;
+    memcpy(to.values, values, count * sizeof *values);
+    memcpy(to.references, references, count * sizeof *references);
+    memcpy(to.orders, orders, count * sizeof *orders);
+    rider->is_read = 0;
+    return carry_out(seat, (Entry){.instance = rider->number, .what = seat->number});
 }
 
 /* Post one of the operations on a state, by how many numbers it stands behind that which saves it. */
@@ -166,7 +177,7 @@ static Entry of_state(const Seat *seat, uint32_t which)
 static int save(void *component, void **handle)
 {
     Seat *seat = component;
-    if (seat->rider->road->lane == NULL || !post(seat->rider->road, of_state(seat, 0), 0, &seat->posted)) {
+    if (!ask_for(seat, of_state(seat, 0), 0)) {
         return SILENT;
     }
     *handle = (void *)(uintptr_t)(seat->number + 1);
@@ -177,7 +188,7 @@ static int restore(void *component, void *handle)
 {
     Seat *seat = component;
     (void)handle;
-    if (seat->rider->road->lane == NULL || !post(seat->rider->road, of_state(seat, 1), 0, &seat->posted)) {
+    if (!ask_for(seat, of_state(seat, 1), 0)) {
         return SILENT;
     }
     seat->rider->is_read = 0;
@@ -187,36 +198,29 @@ static int restore(void *component, void *handle)
 static int restore_now(void *component, void *handle)
 {
     Seat *seat = component;
-    LaneObject *road = seat->rider->road;
     (void)handle;
     seat->rider->is_read = 0;
-    return road->lane == NULL ? SILENT : carry_out(seat, of_state(seat, 1), road->moment);
+    return carry_out(seat, of_state(seat, 1));
 }
 
-/* Waited for as long as it may take: once others have given theirs back, nobody can come back to the step's begin. */
 static int forget(void *component, void **handle)
 {
-    Seat *seat = component;
-    LaneObject *road = seat->rider->road;
     *handle = NULL;
-    return road->lane == NULL ? SILENT : carry_out(seat, of_state(seat, 2), road->patience);
+    return carry_out(component, of_state(component, 2));
 }
 
 static int get(void *component, void *values, size_t size)
 {
     Seat *seat = component;
     RiderObject *rider = seat->rider;
-    LaneObject *road = rider->road;
-    if (road->lane == NULL) {
-        return SILENT;
-    }
     if (!rider->is_read) {
-        if (!post(road, (Entry){.instance = rider->number, .what = READ}, 1, &rider->wanted)) {
+        if (!ask_for(seat, (Entry){.instance = rider->number, .what = READ}, 1)) {
             return SILENT;
         }
+        rider->wanted = seat->posted;
         rider->is_read = 1;
     }
-    if (await(road, rider->wanted, road->moment) != CAME) {
+    if (!wait_for(rider, rider->wanted)) {
         return SILENT;
     }
     int status = status_of(seat);

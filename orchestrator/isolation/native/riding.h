@@ -14,17 +14,19 @@
 /* Hidden, so that nothing of a name like one of theirs elsewhere in the process can stand in their place. */
 #pragma GCC visibility push(hidden)
 
-/* What a call returns that was waited for in vain: a status that the standard has not. */
+/* What a call returns that is not waited for any more, of which Python knows why: a status that the standard has not. */
 enum { SILENT = 1000 };
 enum { CAME, CAME_NOT, CLOSED };
 
-typedef struct {
+typedef struct LaneObject {
     PyObject_HEAD
     Py_buffer memory;
     Lane *lane; /* NULL once it is closed */
     int line;   /* the socket, whose end tells of that of the process */
-    int64_t moment;   /* ns that a call is waited for in the loop, */
-    int64_t patience; /* and one of which nothing may be left undone */
+    int64_t moment; /* ns that a call is waited for before Python is asked */
+    int (*goes_on)(struct LaneObject *road, uint32_t number); /* whether Python has waited for what an instance was asked */
+    PyObject *waits;   /* what does that; NULL once it is closed */
+    PyObject *failure; /* what that raised, or NULL */
     Spin spin;
 } LaneObject;
 
@@ -49,7 +51,6 @@ typedef struct Seat {
     RiderObject *rider;
     uint32_t number;
     uint32_t posted;   /* how many entries must be done for the last of this to be done */
-    int is_under_way;  /* whether it was waited for in vain */
     Py_ssize_t offset; /* of its values in the memory, */
     Py_ssize_t count;  /* and how many there is room for */
     struct Seat *next;
@@ -62,7 +63,7 @@ extern void *const lane_functions[N_FUNCTIONS];
 /* Wait for so many entries to be done, for so many ns at most. */
 int await(LaneObject *road, uint32_t ticket, int64_t most);
 
-/* Post an entry; 0 if there is no room for it in time. */
+/* Post an entry; 0 if there is no room for it within a moment. */
 int post(LaneObject *road, Entry entry, int wakes, uint32_t *ticket);
 
 /* Where a lane stands in memory; NULL with an exception if it does not fit there. */
