@@ -44,8 +44,10 @@ NOTE_CALL, NOTE_MEMORY, NOTE_BASE, NOTE_LINE, NOTE_FAILED, NOTE_STATUS, NOTE_TIM
 KiB; whether it has lost its line to the master: these three of the whole process, at its first instance. Of calls
 through the lane: which one failed, counted from 1, and less than 0 unless that was one that reads; its status; and the
 time in s, a real number, that the master has got to."""
-SET_REALS, SET_INTEGERS, LANE_STEP, GET_REALS, GET_INTEGERS, SET_SLOPES, LANE_SAVE, LANE_RESTORE, LANE_FORGET = range(9)
-LANE_RESTORE_NOW = 9
+SET_REALS, SET_INTEGERS, LANE_STEP, GET_REALS, GET_INTEGERS, SET_SLOPES, ASK, LANE_SAVE, LANE_RESTORE, LANE_FORGET = (
+    range(10)
+)
+LANE_RESTORE_NOW = 10
 """What is called through the lane: see ``native/lane.h``; and what waits until a state is restored."""
 LANE_VALUES = SET_REALS, SET_INTEGERS, GET_REALS, GET_INTEGERS
 """Of these, what sets and reads channels."""

@@ -48,7 +48,11 @@ class IsolatedSlave:
         process.seated.append(self)
         self._begin = process.begins[self._seat] + messages.HEAD
         self._room, self._used = guest.cells, 0
-        self.slopes = self._begin + 8 * guest.cells, guest.slopes  # where derivatives of inputs stand, and how many may
+        slopes, question = (self._begin + 8 * place for place in guest.places)
+        self.slopes = slopes, guest.slopes
+        """Where derivatives of inputs stand, and how many may."""
+        self.question = question, guest.asked
+        """The same for what is asked for directional ones."""
         self.functions: frozenset[str] = frozenset()  # that its library has, once the process has told
         self._is_made = self._is_gone = False
         self._lost: FmuError | None = None

@@ -17,6 +17,7 @@ from ..fmi.binding import DISCARD, FATAL, PENDING, FmuSlave
 from .channel import IsolatedChannel
 from .lanes import HAS_LANES, lane
 from .messages import (
+    ASK,
     GET_INTEGERS,
     GET_REALS,
     LANE_FORGET,
@@ -36,7 +37,8 @@ _VERSION = "2.0"
 """Of FMI, whose functions the lane calls."""
 _CALLS = {
     SET_REALS: "set", SET_INTEGERS: "set", LANE_STEP: "step", GET_REALS: "get", GET_INTEGERS: "get",
-    SET_SLOPES: "interpolate", LANE_SAVE: "save", LANE_RESTORE: "restore", LANE_FORGET: "forget",
+    SET_SLOPES: "interpolate", ASK: "directional_derivatives",
+    LANE_SAVE: "save", LANE_RESTORE: "restore", LANE_FORGET: "forget",
 }  # fmt: skip
 _STATE = LANE_SAVE, LANE_RESTORE, LANE_FORGET
 
@@ -49,6 +51,8 @@ class Rider(Protocol):
     time: float
     rolls_back: bool
     slopes: tuple[int, int]
+    question: tuple[int, int]
+    functions: frozenset[str]
 
     @property
     def has_news(self) -> bool:
@@ -80,10 +84,12 @@ class Ride:
         slave: the instance. process: its process. seat: its number there.
     """
 
-    DO_STEP, INTERPOLATE, STATE = FmuSlave.DO_STEP, FmuSlave.INTERPOLATE, FmuSlave.STATE
+    DO_STEP, INTERPOLATE, DERIVE = FmuSlave.DO_STEP, FmuSlave.INTERPOLATE, FmuSlave.DERIVE
+    STATE = FmuSlave.STATE
 
     def __init__(self, slave: Rider, process: HostProcess, seat: int) -> None:
         self._slave, self.name = slave, slave.name
+        self.interface, self.functions = slave.interface, slave.functions
         self._process, self._lane = process, process.open_lane()
         self._seat = seat
         self._rider = lane.Rider(self._lane, process.begins[seat], seat)
@@ -113,6 +119,11 @@ class Ride:
         self._add(SET_SLOPES, offset, (offset, room))
         return lane.FUNCTIONS[SET_SLOPES]
 
+    def add_question(self) -> tuple[int, int]:
+        """The function that gives directional derivatives, and what stands for the instance there: addresses."""
+        offset, room = self._slave.question
+        return lane.FUNCTIONS[ASK], self._add(ASK, offset, (offset, room))
+
     def add_state(self, number: int, *, at_once: bool) -> tuple[int, int, int, int]:
         """The functions that save, restore and give back the state of a number, and what stands for the instance.
 
@@ -131,7 +142,7 @@ class Ride:
 
     def references(self, names: Iterable[str]) -> list[int]:
         """The value references of variables."""
-        return [self._slave.interface.variables[name].reference for name in names]
+        return [self.interface.variables[name].reference for name in names]
 
     # ---------------------------------------------------------------- on and off the lane
 
@@ -161,9 +172,11 @@ class Ride:
 
     def time_of(self, call: str) -> float:
         """The time in s at which it was last asked for something, by its name in `messages.CALLS`."""
-        begin, length, left = self._rider.last_step()
+        begin, length, left, now = self._rider.last_step()
         if call in ("save", "restore", "forget"):
             return left
+        if call in ("set", "interpolate", "directional_derivatives"):
+            return now
         return begin + length if call == "get" else begin
 
     # ---------------------------------------------------------------- failures
@@ -189,7 +202,7 @@ class Ride:
         slave = self._slave
         self._raise_failure()
         if self.failed == "step" and status == DISCARD:
-            begin, length, _ = self._rider.last_step()
+            begin, length, *_ = self._rider.last_step()
             slave.ask("resume", begin, length, status, self._is_final)
             return not call.endswith("DoStep")
         slave.time = self._time_of_failure(time, apart=apart)
@@ -229,8 +242,10 @@ class Ride:
         return self._slave.name_call(self.failed, channel)
 
     def _time_of_failure(self, time: float, *, apart: bool) -> float:
-        is_known = self.failed in ("save", "restore", "step") or (self.failed == "set" and not apart)
-        return self.time_of(self.failed) if is_known else time
+        if self.failed in ("save", "restore"):
+            return self.time_of(self.failed)
+        is_of_step = self.failed == "step" or (self.failed == "set" and not apart)
+        return self.time_of("step") if is_of_step else time
 
     def check(self, call: str, status: int) -> None:
         """Raise unless the status of a call is ok or warning, and what was set before was taken."""

@@ -39,9 +39,19 @@ class Guest(NamedTuple):
         return 2 * len(self.interface.of("input")) if self.interface.interpolates_inputs else 0
 
     @property
+    def asked(self) -> int:
+        """For how many variables there is room behind these, of which directional derivatives are asked for."""
+        return len(self.interface.variables) if self.interface.directional_derivatives else 0
+
+    @property
+    def places(self) -> tuple[int, int]:
+        """Where these two begin, as numbers of 64 bits."""
+        return self.cells, self.cells + 1 + 2 * self.slopes
+
+    @property
     def room(self) -> int:
-        """How many numbers of 64 bits all that takes: see `Slopes` in ``native/lane.h``."""
-        return self.cells + 1 + 2 * self.slopes
+        """How many such numbers all that takes: see `Slopes` and `Question` in ``native/lane.h``."""
+        return self.places[1] + 3 + 3 * self.asked
 
 
 class Seated(Protocol):

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any
 
 from .lanes import LANE_SIZE, lane, spin_time
 from .messages import (
+    ASK,
     GET_INTEGERS,
     GET_REALS,
     LANE_RESTORE,
@@ -64,6 +65,8 @@ class Service:
                 self._add(kind, slave.addresses(slave.DO_STEP), note("step"))
             elif kind == SET_SLOPES:
                 self._add(kind, slave.addresses(slave.INTERPOLATE), note("interpolate"), (0, room, number))
+            elif kind == ASK:
+                self._add(kind, slave.addresses(slave.DERIVE), note("directional_derivatives"), (0, room, number))
             elif kind >= LANE_SAVE:
                 told = {LANE_SAVE: "save", LANE_RESTORE: "restore"}.get(kind, "forget")
                 handle = self.states.setdefault(number, ctypes.c_void_p())

@@ -22,7 +22,7 @@ from ..isolation import IsolatedSlave, Ride
 from .algorithms import Programmed, Repeated
 from .coupling import Coupling
 from .observer import Observer, Table
-from .plans import CHANGES, CONTROL, PLACE, SIZES, SWING, Kind, Plan, is_able
+from .plans import APART, CHANGES, CONTROL, PLACE, SIZES, SWING, Kind, Plan, is_able
 
 try:
     from . import kernel
@@ -283,7 +283,7 @@ class CompiledLoop:
             raise slave.lose(said(call, status >> 32, (status & 0x7FFFFFFF) - (status & 0x80000000)))
         try:
             if isinstance(slave, Ride) and not 0 <= status <= 1:
-                return slave.recover(call, status, when, apart=kind in (Kind.READ, Kind.SLOPES))
+                return slave.recover(call, status, when, apart=kind in APART)
             slave.check(call, status)
         except FmuError as error:
             is_refusal = kind == Kind.SLOPES and (not isinstance(slave, Ride) or slave.failed == "interpolate")

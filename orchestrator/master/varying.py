@@ -26,7 +26,7 @@ from .algorithms import VariableStep
 from .algorithms.adaptive import Adaptive
 from .coupling import Coupling
 from .observer import Observer, Rows
-from .plans import CONTROL, PLACE, Kind, Plan, is_able
+from .plans import APART, CONTROL, PLACE, Kind, Plan, is_able
 
 
 @dataclass(frozen=True)
@@ -261,7 +261,7 @@ class Blocks:
         when = float(self._control["called_at"][0] + is_of_end * self._control["called_for"][0])
         if isinstance(slave, Ride):
             for ride in (slave, *self._plan.rides):
-                ride.leave(when, apart=kind in (Kind.READ, Kind.SLOPES))
+                ride.leave(when, apart=kind in APART)
             return
         slave.time = when
         if status >> 32 > 0:

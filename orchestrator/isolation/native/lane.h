@@ -25,7 +25,7 @@ enum { RING = 256 };
 /* What an entry says, beside the number of an operation. */
 enum { READ = 0xfffffffe, LEAVE = 0xffffffff };
 
-enum { SET_REALS, SET_INTEGERS, STEP, GET_REALS, GET_INTEGERS, SET_SLOPES, SAVE, RESTORE, FORGET, N_KINDS };
+enum { SET_REALS, SET_INTEGERS, STEP, GET_REALS, GET_INTEGERS, SET_SLOPES, ASK, SAVE, RESTORE, FORGET, N_KINDS };
 
 typedef struct {
     uint32_t instance; /* of the lane, */
@@ -66,6 +66,24 @@ static inline Slopes slopes_in(void *memory, size_t room)
     double *values = (double *)memory + 1;
     unsigned *references = (unsigned *)(values + room);
     return (Slopes){memory, values, references, (int *)(references + room)};
+}
+
+/* What is asked for directional derivatives in the memory, and the answer: the status that it has, how many unknowns and
+   inputs there are, then room for so many seeds, slopes, and references of either. */
+typedef struct {
+    int64_t *status;
+    int64_t *counts;
+    double *seeds, *slopes;
+    unsigned *unknowns, *knowns;
+} Question;
+
+enum { QUESTION_HEAD = 3 };
+
+static inline Question question_in(void *memory, size_t room)
+{
+    double *seeds = (double *)memory + QUESTION_HEAD;
+    unsigned *unknowns = (unsigned *)(seeds + 2 * room);
+    return (Question){memory, (int64_t *)memory + 1, seeds, seeds + room, unknowns, unknowns + room};
 }
 
 /* How long somebody watches before it sleeps: as long as it may where the last wait was a short one, else hardly; and not at

@@ -192,7 +192,8 @@ static PyObject *add(PyObject *self, PyObject *arguments)
         return NULL;
     }
     if (!has_room(rider->road, offset, count) ||
-        (kind == SET_SLOPES && !has_room(rider->road, offset, 2 * count + 1))) {
+        (kind == SET_SLOPES && !has_room(rider->road, offset, 2 * count + 1)) ||
+        (kind == ASK && !has_room(rider->road, offset, 3 * count + QUESTION_HEAD))) {
         return NULL;
     }
     Seat *seat = calloc(1, sizeof *seat);
@@ -221,8 +222,10 @@ static PyObject *begin(PyObject *self, PyObject *arguments)
 static PyObject *last_step(PyObject *self, PyObject *nothing)
 {
     RiderObject *rider = (RiderObject *)self;
+    uint32_t seen;
+    int is_past = !rider->is_back && rider->road->lane != NULL && is_done(rider->road->lane, rider->stepped, &seen);
     (void)nothing;
-    return Py_BuildValue("(ddd)", rider->time, rider->length, rider->left);
+    return Py_BuildValue("(dddd)", rider->time, rider->length, rider->left, rider->time + is_past * rider->length);
 }
 
 static PyMethodDef lane_methods[] = {
@@ -247,7 +250,7 @@ static PyMethodDef rider_methods[] = {
      "their order, and the first stands for all."},
     {"begin", begin, METH_VARARGS, "begin(time): it is at a time in s, and what was read before is old."},
     {"last_step", last_step, METH_NOARGS,
-     "last_step() -> time and length of the last step, and where states were last treated, in s."},
+     "last_step() -> time and length of the last step, where states were last treated, and where it has got to, in s."},
     {NULL, NULL, 0, NULL},
 };
 static PyType_Slot rider_slots[] = {

@@ -3,8 +3,8 @@
    What stands for the FMU's instance is an operation of ours. What is set or stepped is posted and not waited for; what is
    read was read by the host after the step, in one go. So a step of an instance is one hand-over, and instances in several
    processes step at the same time where nothing is read between. A call that failed is told by one that comes after.
-   Waited for are only derivatives of inputs, which an FMU may refuse, and what comes last in a step that was repeated: a
-   state that is restored for good, and those that are given back. What does not come within a moment Python waits for, who
+   Waited for are only derivatives, which an FMU may refuse, what an FMU is asked that gives nothing, and what comes last in a
+   step that was repeated: a state that is restored for good, and those that are given back. What does not come within a moment Python waits for, who
    knows how long a call may take, and whether the run is to stop. */
 
 #include "riding.h"
@@ -16,7 +16,7 @@
 
 enum { SLICE = 10 * 1000 * 1000 }; /* ns between two looks at the line to the process */
 
-static int is_done(const Lane *lane, uint32_t ticket, uint32_t *seen)
+int is_done(const Lane *lane, uint32_t ticket, uint32_t *seen)
 {
     *seen = atomic_load_explicit(&((Lane *)lane)->host.count, memory_order_acquire);
     return (int32_t)(*seen - ticket) >= 0;
@@ -104,26 +104,22 @@ static int ask_for(Seat *seat, Entry entry, int wakes)
     return 1;
 }
 
+static int carry_out(Seat *seat, Entry entry)
+{
+    return ask_for(seat, entry, 1) && wait_for(seat->rider, seat->posted) ? status_of(seat) : SILENT;
+}
+
 static int set(void *component, const void *values, size_t size)
 {
     Seat *seat = component;
     RiderObject *rider = seat->rider;
+    Entry entry = {.instance = rider->number, .what = seat->number};
     if (!wait_for(rider, seat->posted)) { /* the host may still be reading there */
         return SILENT;
     }
     memcpy(values_of(seat), values, size);
     rider->is_read = 0;
-    return ask_for(seat, (Entry){.instance = rider->number, .what = seat->number}, 0) ? 0 : SILENT;
-}
-
-static int finish(const Seat *seat)
-{
-    return wait_for(seat->rider, seat->posted) ? status_of(seat) : SILENT;
-}
-
-static int carry_out(Seat *seat, Entry entry)
-{
-    return ask_for(seat, entry, 1) ? finish(seat) : SILENT;
+    return !rider->gives ? carry_out(seat, entry) : ask_for(seat, entry, 0) ? 0 : SILENT;
 }
 
 static int set_reals(void *component, const unsigned *references, size_t count, const double *values)
@@ -148,9 +144,10 @@ static int step(void *component, double time, double length, int is_final)
     }
     rider->time = time;
     rider->length = length;
-    rider->wanted = seat->posted;
+    rider->wanted = rider->stepped = seat->posted;
+    rider->is_back = 0;
     rider->is_read = 1;
-    return rider->gives ? 0 : finish(seat);
+    return rider->gives ? 0 : wait_for(rider, seat->posted) ? status_of(seat) : SILENT;
 }
 
 static int set_slopes(void *component, const unsigned *references, size_t count, const int *orders,
@@ -165,6 +162,25 @@ static int set_slopes(void *component, const unsigned *references, size_t count,
     memcpy(to.orders, orders, count * sizeof *orders);
     rider->is_read = 0;
     return carry_out(seat, (Entry){.instance = rider->number, .what = seat->number});
+}
+
+/* One that is refused has failed of nothing: the slopes are found in another way. */
+static int ask(void *component, const unsigned *unknowns, size_t count, const unsigned *knowns, size_t known_count,
+               const double *seeds, double *slopes)
+{
+    Seat *seat = component;
+    Question of = question_in(values_of(seat), (size_t)seat->count);
+    of.counts[0] = (int64_t)count;
+    of.counts[1] = (int64_t)known_count;
+    memcpy(of.unknowns, unknowns, count * sizeof *unknowns);
+    memcpy(of.knowns, knowns, known_count * sizeof *knowns);
+    memcpy(of.seeds, seeds, known_count * sizeof *seeds);
+    int status = carry_out(seat, (Entry){.instance = seat->rider->number, .what = seat->number});
+    if (status != 0) {
+        return status;
+    }
+    memcpy(slopes, of.slopes, count * sizeof *slopes);
+    return (int)*of.status;
 }
 
 /* Post one of the operations on a state, by how many numbers it stands behind that which saves it. */
@@ -191,6 +207,7 @@ static int restore(void *component, void *handle)
     if (!ask_for(seat, of_state(seat, 1), 0)) {
         return SILENT;
     }
+    seat->rider->is_back = 1;
     seat->rider->is_read = 0;
     return 0;
 }
@@ -199,6 +216,7 @@ static int restore_now(void *component, void *handle)
 {
     Seat *seat = component;
     (void)handle;
+    seat->rider->is_back = 1;
     seat->rider->is_read = 0;
     return carry_out(seat, of_state(seat, 1));
 }
@@ -245,6 +263,7 @@ static int get_integers(void *component, const unsigned *references, size_t coun
 void *const lane_functions[N_FUNCTIONS] = {
     [SET_REALS] = (void *)set_reals, [SET_INTEGERS] = (void *)set_integers, [STEP] = (void *)step,
     [GET_REALS] = (void *)get_reals, [GET_INTEGERS] = (void *)get_integers, [SET_SLOPES] = (void *)set_slopes,
+    [ASK] = (void *)ask,
     [SAVE] = (void *)save, [RESTORE] = (void *)restore, [FORGET] = (void *)forget,
     [RESTORE_NOW] = (void *)restore_now,
 };

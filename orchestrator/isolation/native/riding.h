@@ -41,6 +41,8 @@ typedef struct {
     int gives;       /* whether there is anything to read */
     double time;     /* of the last step, s; or when it boarded, with no length */
     double length;
+    uint32_t stepped; /* how many entries must be done for that to be */
+    int is_back;      /* whether a state was restored since */
     double left;     /* where it was when a state was last saved, restored or given back, s */
     struct Seat *seats;
     struct Seat *slopes; /* of the operation that takes derivatives of inputs */
@@ -59,6 +61,9 @@ typedef struct Seat {
 /* Functions in the place of those of an FMU, by kind of operation; and one that waits until a state is restored. */
 enum { RESTORE_NOW = N_KINDS, N_FUNCTIONS };
 extern void *const lane_functions[N_FUNCTIONS];
+
+/* Whether so many entries are done, and how many are. */
+int is_done(const Lane *lane, uint32_t ticket, uint32_t *seen);
 
 /* Wait for so many entries to be done, for so many ns at most. */
 int await(LaneObject *road, uint32_t ticket, int64_t most);

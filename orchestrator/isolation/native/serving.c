@@ -16,6 +16,8 @@ typedef int (*SetInteger)(void *component, const unsigned *references, size_t co
 typedef int (*GetInteger)(void *component, const unsigned *references, size_t count, int *values);
 typedef int (*SetSlopes)(void *component, const unsigned *references, size_t count, const int *orders,
                          const double *values);
+typedef int (*Ask)(void *component, const unsigned *unknowns, size_t count, const unsigned *knowns, size_t known_count,
+                   const double *seeds, double *slopes);
 typedef int (*Save)(void *component, void **handle);
 typedef int (*Restore)(void *component, void *handle);
 
@@ -46,6 +48,8 @@ typedef struct {
     fenv_t floats;    /* and all that belongs to it */
 } Service;
 
+enum { DISCARD = 2, ERROR = 3 };
+
 static int is_failure(int status)
 {
     return status < 0 || status > 1;
@@ -68,11 +72,24 @@ static size_t length(const Guest *guest)
     return (size_t)guest->operations.len / sizeof(Operation);
 }
 
+static size_t at_most(int64_t count, size_t room)
+{
+    return (uint64_t)count < room ? (size_t)count : room;
+}
+
 static int set_slopes(SetSlopes set, void *component, void *memory, size_t room)
 {
     Slopes given = slopes_in(memory, room);
-    size_t count = (uint64_t)*given.count < room ? (size_t)*given.count : room;
-    return set(component, given.references, count, given.orders, given.values);
+    return set(component, given.references, at_most(*given.count, room), given.orders, given.values);
+}
+
+static int ask(Ask derive, void *component, void *memory, size_t room)
+{
+    Question of = question_in(memory, room);
+    int status = derive(component, of.unknowns, at_most(of.counts[0], room), of.knowns, at_most(of.counts[1], room), of.seeds,
+                        of.slopes);
+    *of.status = status;
+    return status == DISCARD || status == ERROR ? 0 : status; /* it goes without */
 }
 
 static int save(Save get, void *component, void **handle)
@@ -107,6 +124,7 @@ static int do_one(const Guest *guest, const Operation *it, const Entry *entry)
     case GET_REALS: return ((GetReal)function)(component, references, it->count, values);
     case GET_INTEGERS: return ((GetInteger)function)(component, references, it->count, values);
     case SET_SLOPES: return set_slopes((SetSlopes)function, component, values, it->count);
+    case ASK: return ask((Ask)function, component, values, it->count);
     case SAVE: return save((Save)function, component, handle);
     case RESTORE: return ((Restore)function)(component, *handle);
     default: return forget((Save)function, component, handle);
@@ -193,6 +211,7 @@ static int is_sound(const Service *service, const Guest *guest, Py_ssize_t head)
         uint64_t rest = it->offset <= size ? (size - it->offset) / sizeof(double) : 0;
         is_fine = it->kind >= 0 && it->kind < N_KINDS && it->function != 0 && it->offset <= size &&
                   (it->kind == SET_SLOPES ? it->count < (rest + 1) / 2 : it->count <= rest) &&
+                  (it->kind != ASK || QUESTION_HEAD + 3 * it->count <= rest) &&
                   (it->kind < SAVE || it->references != 0);
     }
     return is_fine;

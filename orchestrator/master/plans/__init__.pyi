@@ -1,5 +1,5 @@
 from .ability import is_able
-from .layout import CHANGES, CONTROL, PLACE, SIZES, SWING, Kind
+from .layout import APART, CHANGES, CONTROL, PLACE, SIZES, SWING, Kind
 from .plan import Plan
 
-__all__ = ["CHANGES", "CONTROL", "PLACE", "SIZES", "SWING", "Kind", "Plan", "is_able"]
+__all__ = ["APART", "CHANGES", "CONTROL", "PLACE", "SIZES", "SWING", "Kind", "Plan", "is_able"]

@@ -22,8 +22,7 @@ def is_able(coupling: Coupling, repeated: Iterable[str]) -> bool:
     continued = coupling.extrapolator.courses if coupling.extrapolator else ()
     able = able and all(_has(slaves[name], "interpolate") for name in continued)
     able = able and (refresher is None or refresher.is_decided)
-    here = not any(isinstance(slave, IsolatedSlave) for slave in slaves.values())
-    return able and (here or coupling.loops is None) and can_exchange(exchange)
+    return able and can_exchange(exchange)
 
 
 def _can_be_called(slave: Slave, exchange: Exchange) -> bool:

@@ -39,6 +39,8 @@ AT_STAMP, AT_END, AS_NOTED = 0, 1, 2
 """What time the values of inputs that go on belong to."""
 METHODS = {"none": 0, "aitken": 1, "anderson": 2}
 """Ways to the next guess of an iteration."""
+APART = Kind.SET, Kind.EXTEND, Kind.READ, Kind.SLOPES, Kind.ASK
+"""What an isolated instance that fails of it fails of at that time, and not in the step that was posted last."""
 NOBODY = None, ""
 """Whom an operation calls that calls nobody, and by which function."""
 NONE = 2**32 - 1

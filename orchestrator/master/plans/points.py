@@ -5,7 +5,8 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import Protocol
 
-from ...fmi.binding import Fmi3Slave, LoadedSlave, whole_arrays
+from ...fmi.binding import Fmi3Slave, whole_arrays
+from ...isolation import Ride
 from ..algebraic import NUMBERS, LoopSolver
 from ..algorithms import HEAD
 from ..coupling import Coupling
@@ -101,8 +102,7 @@ def _add_solution(plan: Growing, loops: LoopSolver) -> None:
     for feeder in loops.feeders:
         plan.add_sets(plan.slaves[feeder.name], 1, late=True)
         plan.add_gets(plan.slaves[feeder.name], 1, None, kind=Kind.READ)
-    called = (plan.slaves[slave.name] for slave in loops.instances)
-    slaves = [slave for slave in called if isinstance(slave, LoadedSlave)]  # no others: see `is_able`
+    slaves = [plan.slaves[slave.name] for slave in loops.instances]
     knowns: dict[str, list[Term]] = {}
     ends = [len(plan.operations)]
     for slave in slaves:
@@ -115,10 +115,7 @@ def _add_solution(plan: Growing, loops: LoopSolver) -> None:
         ends.append(len(plan.operations))
     count, party = len(slaves), len(algebra.parties)
     for n, slave in enumerate(slaves):
-        call = "" if plan.exchange.output_changes else slave.DERIVE
-        function = (
-            slave.addresses(call)[0] if slave.interface.directional_derivatives and call in slave.functions else 0
-        )
+        function, component = (0, 0) if plan.exchange.output_changes else _derivatives(slave)
         own = ends[n], ends[n + 1], ends[count + n], ends[count + n + 1], len(plan.operations)
         names = [loops.name_of(row) for row in loops.rows[slave.name]]
         whole = whole_arrays(names, slave.interface)
@@ -126,10 +123,8 @@ def _add_solution(plan: Growing, loops: LoopSolver) -> None:
         asked = [(0, reference, size, 0) for reference, size in _references(slave, whole)]
         counts = len(knowns[slave.name]), len(rows), len(asked)
         if function:
-            plan.add_operation(Kind.ASK, len(algebra.parties), (slave, call), (1, 0))
-        algebra.parties.append(
-            (function, slave.pointer, isinstance(slave, Fmi3Slave), *own, len(algebra.terms), *counts)
-        )
+            plan.add_operation(Kind.ASK, len(algebra.parties), (slave, slave.DERIVE), (1, 0))
+        algebra.parties.append((function, component, isinstance(slave, Fmi3Slave), *own, len(algebra.terms), *counts))
         algebra.terms += [*knowns[slave.name], *rows, *asked]
     n, m = len(loops.reals), len(loops.others)
     algebra.solvers.append(
@@ -139,7 +134,14 @@ def _add_solution(plan: Growing, loops: LoopSolver) -> None:
     plan.room += NUMBERS + 3 * n + n * (9 + 2 * n) + m + plan.width
 
 
-def _inputs(plan: Growing, slave: LoadedSlave, feed: tuple[str, int, list[int], bool, int]) -> list[Term]:
+def _derivatives(slave: Called) -> tuple[int, int]:
+    """The function that gives directional derivatives, and what stands for the instance there; 0 if there is none."""
+    if not (slave.interface.directional_derivatives and slave.DERIVE in slave.functions):
+        return 0, 0
+    return slave.add_question() if isinstance(slave, Ride) else slave.addresses(slave.DERIVE)
+
+
+def _inputs(plan: Growing, slave: Called, feed: tuple[str, int, list[int], bool, int]) -> list[Term]:
     """The real inputs of one feed of an instance, in its order."""
     made, variables, wholes = (
         plan.exchange.feeds[slave.name][feed[1]],
@@ -157,7 +159,7 @@ def _inputs(plan: Growing, slave: LoadedSlave, feed: tuple[str, int, list[int], 
     return found
 
 
-def _references(slave: LoadedSlave, whole: Sequence[str]) -> list[tuple[int, int]]:
+def _references(slave: Called, whole: Sequence[str]) -> list[tuple[int, int]]:
     """Of variables, each array whole, the value references and how many numbers each of them stands for."""
     found: dict[str, tuple[int, int]] = {}
     for name in whole:

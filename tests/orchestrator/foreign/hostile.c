@@ -3,7 +3,8 @@
    by Euler's method, y = x + v); 4 calls, 5 pid (real outputs: how often it stepped, in which process); 6 m (integer
    input); 7 n (integer output: m + 1); 8 on (boolean input); 9 off (boolean output: not on); 10 deed (text parameter);
    11 word (text input); 12 said (text output: word, twice).
-   Where: instantiate, setup, enter, exit, set, get, step, save, forget, terminate, free. What: null (writes where nothing is),
+   Where: instantiate, setup, enter, exit, set, get, step, save, forget, derive, terminate, free.
+   What: null (writes where nothing is),
    abort, exit (with code 7), kill (by SIGKILL), hang, slow (0.3 s), leak (16 MiB, and an error when there are no more),
    gulp (the same, and a crash), print (100 lines), say (a line to the logger and one printed), cry (the same, and null), fork (a child that stays),
    discard, error, fatal, nan, once (nothing but the process's first instance is made), and those of deeds.h. */
@@ -228,7 +229,7 @@ int fmi2GetDirectionalDerivative(void *c, const unsigned *unknown, size_t rows, 
     for (size_t k = 0; k < rows; k++) {
         found[k] = unknown[k] == 3 && known[0] == 1 ? seed[0] : 0.0;
     }
-    return 0;
+    return misbehave(c, "derive");
 }
 
 int fmi2GetFMUstate(void *c, void **state)

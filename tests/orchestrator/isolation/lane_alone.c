@@ -21,7 +21,7 @@ int add_riding(PyObject *made)
     return 0;
 }
 
-enum { STEPS = 10000, INSTANCES = 2, HEAD = 64, ROOM = 128, AT_SLOPES = 8 };
+enum { STEPS = 10000, INSTANCES = 2, HEAD = 64, ROOM = 192, AT_SLOPES = 8, AT_QUESTION = 13 };
 
 typedef struct {
     double u, x, slope;
@@ -42,6 +42,12 @@ static int set_slope(void *c, const unsigned *vr, size_t count, const int *order
 {
     ((Model *)c)->slope = count == 2 && vr[1] == 7 && orders[1] == 2 ? values[1] : NAN;
     return 0;
+}
+static int derive(void *c, const unsigned *unknowns, size_t count, const unsigned *knowns, size_t known_count,
+                  const double *seeds, double *slopes)
+{
+    slopes[0] = count == 1 && known_count == 1 && unknowns[0] == 8 && knowns[0] == 9 ? ((Model *)c)->x + seeds[0] : NAN;
+    return ((Model *)c)->n % 2 ? 1 : 2; /* a warning, or a refusal */
 }
 static int get_state(void *c, void **state)
 {
@@ -111,6 +117,7 @@ typedef int (*GetR)(void *, const unsigned *, size_t, double *);
 typedef int (*SetI)(void *, const unsigned *, size_t, const int *);
 typedef int (*GetI)(void *, const unsigned *, size_t, int *);
 typedef int (*SetS)(void *, const unsigned *, size_t, const int *, const double *);
+typedef int (*Derive)(void *, const unsigned *, size_t, const unsigned *, size_t, const double *, double *);
 typedef int (*Get)(void *, void **);
 typedef int (*Put)(void *, void *);
 
@@ -133,6 +140,7 @@ int main(int count, char **arguments)
     Guest guests[INSTANCES];
     uintptr_t functions[N_KINDS] = {(uintptr_t)set_real,  (uintptr_t)set_whole, (uintptr_t)do_step,
                                     (uintptr_t)get_real,  (uintptr_t)get_whole, (uintptr_t)set_slope,
+                                    (uintptr_t)derive,
                                     (uintptr_t)get_state, (uintptr_t)set_state, (uintptr_t)free_state};
     void *handles[INSTANCES];
     int64_t spin = count > 1 ? atol(arguments[1]) : 0;
@@ -148,7 +156,8 @@ int main(int count, char **arguments)
         guests[k].operations.len = sizeof operations[k];
         riders[k] = (RiderObject){.road = &road, .head = head, .number = k, .gives = 1};
         for (uint32_t n = 0; n < N_KINDS; n++) {
-            uint64_t offset = (uint64_t)head + HEAD + 8 * (n == SET_SLOPES ? AT_SLOPES : n), many = n == SET_SLOPES ? 2 : 1;
+            uint32_t place = n == SET_SLOPES ? AT_SLOPES : n == ASK ? AT_QUESTION : n;
+            uint64_t offset = (uint64_t)head + HEAD + 8 * place, many = n == SET_SLOPES ? 2 : 1;
             uintptr_t where = n >= SAVE ? (uintptr_t)&handles[k] : 0;
             operations[k][n] = (Operation){n, functions[n], (uintptr_t)&models[k], where, many, offset, n + 1};
             seats[k][n] = (Seat){.rider = &riders[k], .number = n, .offset = (Py_ssize_t)offset, .count = (Py_ssize_t)many};
@@ -182,6 +191,10 @@ int main(int count, char **arguments)
             MUST(((Get)lane_functions[FORGET])(&seats[j][SAVE], &handle));
             MUST(((GetR)lane_functions[GET_REALS])(&seats[j][GET_REALS], NULL, 1, &x));
             MUST(((GetI)lane_functions[GET_INTEGERS])(&seats[j][GET_INTEGERS], NULL, 1, &n));
+            const unsigned unknowns[] = {8}, knowns[] = {9};
+            double slope = 0.0;
+            int how = ((Derive)lane_functions[ASK])(&seats[j][ASK], unknowns, 1, knowns, 1, slopes, &slope);
+            misses += how != (n % 2 ? 1 : 2) || slope != x + slopes[0];
         }
     }
     MUST(((Step)lane_functions[STEP])(&seats[1][STEP], STEPS + 1.0, 1.0, 0));

@@ -216,11 +216,37 @@ def test_a_crash_is_at_the_begin_of_a_step_of_its_own(shared):
     for ride in rides:
         ride.begin()
     for (function, rider), length in zip(calls, (0.25, 1.0), strict=True):
-        step = ctypes.CFUNCTYPE(ctypes.c_int, ctypes.c_void_p, ctypes.c_double, ctypes.c_double, ctypes.c_int)
-        step(function)(rider, 5.0, length, 1)
+        _function(function, ctypes.c_double, ctypes.c_double, ctypes.c_int)(rider, 5.0, length, 1)
     b.time = 5.25
     with pytest.raises(LostError, match=r"^b, t = 5 s: its process crashed in fmi2DoStep"):
         a.await_lane()
+
+
+@pytest.mark.parametrize("at_once", [True, False])
+def test_a_crash_is_where_it_has_come_back_to(shared, at_once):
+    """As it is set after a step, from whose begin a state was restored."""
+    (it,) = shared("it", deeds={"it": "set null 5"})
+    ride, u = it.ride(), it.channel("Real", ["u"])
+    step, (put, rider), (save, restore, _, state) = (
+        ride.add_step(final=False),
+        ride.add(u, is_get=False),
+        ride.add_state(0, at_once=at_once),
+    )
+    ride.add(it.channel("Real", ["x"]), is_get=True)
+    ride.board()
+    ride.begin()
+    pointer, handle, value = ctypes.c_void_p, ctypes.c_void_p(), ctypes.c_double(1.0)
+    assert not _function(step[0], ctypes.c_double, ctypes.c_double, ctypes.c_int)(step[1], 4.5, 0.5, 0)
+    assert not _function(save, pointer)(state, ctypes.byref(handle))
+    assert not _function(step[0], ctypes.c_double, ctypes.c_double, ctypes.c_int)(step[1], 5.0, 0.25, 0)
+    assert not _function(restore, pointer)(state, handle)
+    assert not _function(put, pointer, ctypes.c_size_t, pointer)(rider, None, 1, ctypes.byref(value))
+    with pytest.raises(LostError, match=r"^it, t = 5 s: its process crashed in fmi2SetReal"):
+        it.await_lane()
+
+
+def _function(address, *arguments):
+    return ctypes.CFUNCTYPE(ctypes.c_int, ctypes.c_void_p, *arguments)(address)
 
 
 @pytest.mark.parametrize("what", ["discard", "error"])

@@ -12,7 +12,7 @@ import fmpy
 import numpy as np
 import pytest
 from railcosim.orchestrator.errors import RunError
-from railcosim.orchestrator.isolation import instantiate
+from railcosim.orchestrator.isolation import instantiate, process
 from railcosim.orchestrator.master import compiled
 from railcosim.orchestrator.master.compiled import CompiledLoop
 from railcosim.orchestrator.master.loop import Master
@@ -118,6 +118,14 @@ def contents():
 def _contents(result):
     columns = [("time", result.time), *((name, result[name]) for name in result.names())]
     return [(name, column.tolist() if column.dtype == object else column.tobytes()) for name, column in columns]
+
+
+@pytest.fixture
+def hurried(monkeypatch):
+    """Most calls of isolated instances come to be waited for outside the compiled loop."""
+    made, changed = process.lane.Lane, SimpleNamespace(**vars(process.lane))
+    changed.Lane = lambda memory, offset, line, _, *others: made(memory, offset, line, 2e-6, *others)
+    monkeypatch.setattr(process, "lane", changed)
 
 
 @pytest.fixture(scope="session")

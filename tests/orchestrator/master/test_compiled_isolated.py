@@ -6,12 +6,11 @@ import sys
 from dataclasses import replace
 from itertools import product
 from time import perf_counter
-from types import SimpleNamespace
 
 import fmpy
 import pytest
 from railcosim.orchestrator.errors import FmuError
-from railcosim.orchestrator.isolation import HAS_LANES, choice, isolate, lanes, process
+from railcosim.orchestrator.isolation import HAS_LANES, choice, isolate, lanes
 from railcosim.orchestrator.isolation.lanes import lane
 from railcosim.orchestrator.master import compiled
 from railcosim.orchestrator.run.execution import run
@@ -51,24 +50,6 @@ def attempt(system):
 
 def described(error):
     return error and (str(error), error.instance, error.time, error.status, error.log)
-
-
-@pytest.fixture
-def hurry(monkeypatch):
-    """Let the compiled loop itself wait for a call for so many s alone."""
-    made, changed = process.lane.Lane, SimpleNamespace(**vars(process.lane))
-
-    def go(moment):
-        changed.Lane = lambda memory, offset, line, _, spin, waits: made(memory, offset, line, moment, spin, waits)
-        monkeypatch.setattr(process, "lane", changed)
-
-    return go
-
-
-@pytest.fixture
-def hurried(hurry):
-    """Most calls come to be waited for outside the loop."""
-    hurry(2e-6)
 
 
 # -------------------------------------------------------------------- the same bits
@@ -263,6 +244,32 @@ def test_a_process_that_is_lost(used, hostile, where, what, algorithm):
     call = {"step": "DoStep", "get": "GetReal", "set": "SetReal", "save": "GetFMUstate"}[where]
     assert result.error.instance == "it"
     assert re.match(rf"it, t = [0-9.]+ s: {ENDS[what].format(f'fmi2{call}')}", str(result.error))
+
+
+@pytest.mark.parametrize(
+    "how",
+    [
+        {"refresh": True},
+        {"extrapolation": 1},
+        {"algorithm": "iterative"},
+        {"algorithm": "iterative", "extrapolation": 1},
+    ],
+    ids=str,
+)
+def test_the_time_of_one_that_is_lost_as_it_is_set(used, hostile, monkeypatch, how):
+    """After a step or before it, which may be one that is repeated: as the loop in Python tells it."""
+    system = System(**{"stop_time": 4.0, "step": 0.5, "tolerance": 1e-2} | how)
+    for name, deed in (("other", ""), ("it", "set null 1")):
+        system.add(name, hostile(mute=True), deed=deed, v=1.0)
+        system.instances[name].isolate = True
+    system.connect("other.y", "it.v", scale=0.5)
+    system.connect("other.x", "it.u")
+    system.connect("it.x", "other.u", offset=1.0)
+    found = described(attempt(system).error)
+    assert used
+    monkeypatch.setattr(compiled, "kernel", None)
+    assert found == described(attempt(system).error)
+    assert found[2] == 1.0
 
 
 @pytest.mark.long

@@ -2,7 +2,6 @@
 
 import sys
 
-import fmpy
 import numpy as np
 import pytest
 from railcosim.fmus.build import build
@@ -16,39 +15,6 @@ pytestmark = [
     pytest.mark.skipif(not sys.platform.startswith("linux"), reason="FMUs by hand are compiled for Linux here"),
 ]
 EXPLICIT = pytest.mark.parametrize("algorithm", ["gauss-seidel", "jacobi"])
-
-
-@pytest.fixture
-def bent(compile_c, xml, tmp_path):
-    """The FMU of bent.c."""
-
-    def make(*options, derives=True):
-        v, whole = xml["variable"], {"variability": "discrete"}
-        shown = [v("u", "input", start=0.0), v("v", "input", start=0.0)]
-        shown += [v("y", "output", dependencies=["u", "v"]), v("z", "output", dependencies=["u", "v"])]
-        shown += [v(name, "parameter", start=0.0, variability="tunable") for name in ("a", "b", "c")]
-        shown += [v(name, "parameter", "Integer", 0, variability="tunable") for name in ("f", "mode")]
-        shown += [v("m", "input", "Integer", 0, **whole), v("n", "output", "Integer", dependencies=["m"], **whole)]
-        able = f'canHandleVariableCommunicationStepSize="true" providesDirectionalDerivative="{str(derives).lower()}"'
-        files = {
-            "modelDescription.xml": xml["description"](shown, identifier="Bent", simulation=able),
-            f"binaries/{fmpy.platform}/Bent{fmpy.sharedLibraryExtension}": compile_c("bent.c", *options),
-        }
-        return str(xml["write_archive"](tmp_path / f"bent{len(list(tmp_path.iterdir()))}.fmu", files))
-
-    return make
-
-
-def coupled(model, first, second, stop=2.0, **how):
-    """y of each is u of the other one, and v of both is 0.25 of y of the first one."""
-    system = System(**{"stop_time": stop, "step": 0.25, "algebraic_loops": "solve"} | how)
-    for name, start in (("p", first), ("q", second)):
-        system.add(name, model, **start)
-    system.connect("p.y", "q.u")
-    system.connect("q.y", "p.u")
-    for name in "pq":
-        system.connect("p.y", f"{name}.v", scale=0.25)
-    return system
 
 
 @pytest.fixture
@@ -78,7 +44,7 @@ def _coupling(system, **how):
 @EXPLICIT
 @pytest.mark.parametrize("derives", [True, False])
 @pytest.mark.parametrize("f", range(6))
-def test_bent_ones(told, bent, algorithm, derives, f):
+def test_bent_ones(told, bent, coupled, *, algorithm, derives, f):
     """With the FMUs' own derivatives and with differences; the equations hold."""
     start = [{"a": 0.5, "b": -0.75, "c": -1.0, "f": f}, {"a": -1.5, "b": 0.5, "c": 0.5, "f": f}]
     result = told(coupled(bent(derives=derives), *start, algorithm=algorithm))
@@ -101,7 +67,7 @@ WAYS = {
 
 @EXPLICIT
 @pytest.mark.parametrize("way", WAYS)
-def test_events_and_refresh(told, bent, algorithm, way):
+def test_events_and_refresh(told, bent, coupled, algorithm, way):
     """What is behind the loop follows it; a delay is no part of it."""
     how = dict(WAYS[way])
     events = how.pop("events", [])
@@ -118,7 +84,7 @@ def test_events_and_refresh(told, bent, algorithm, way):
     assert told(system).status == "completed"
 
 
-def test_inputs_that_go_on(told, bent, able):
+def test_inputs_that_go_on(told, bent, coupled, able):
     start = [{"a": -0.5, "c": -1.0}, {"a": 1.5, "b": 0.5, "c": 0.5}]
     system = coupled(bent(), *start, extrapolation=1)
     system.add("lag", able)
@@ -128,14 +94,14 @@ def test_inputs_that_go_on(told, bent, able):
 
 
 @pytest.mark.parametrize("shown", ["no promise", "no function"])
-def test_a_promise_without_a_function(told, bent, shown):
+def test_a_promise_without_a_function(told, bent, coupled, shown):
     model = bent(*["-DMUTE"] * (shown == "no function"))
     assert told(coupled(model, {"a": 3.0}, {"a": -2.0, "c": 1.0})).status == "completed"
 
 
 @pytest.mark.parametrize("mode", [102, 103, 104, 109, 203, 204, 303, 304, 400])
 @pytest.mark.parametrize("derives", [True, False])
-def test_one_that_fails_in_between(both, bent, mode, derives):
+def test_one_that_fails_in_between(both, bent, coupled, mode, derives):
     """An FMU that refuses derivatives is not asked for them; whatever else it refuses ends the run."""
     system = coupled(bent(derives=derives), {"a": 3.0, "mode": mode}, {"a": -2.0, "c": 1.0})
     result = both(system)
@@ -223,13 +189,6 @@ def plain_arrays(arrays):
     return str(arrays((texts, ""), ('<Output valueReference="10"/>', "")))
 
 
-def test_isolated_ones_stay_in_python(used, bent):
-    system = coupled(bent(), {"a": 3.0}, {"a": -2.0, "c": 1.0}, stop=0.5)
-    system.instances["p"].isolate = True
-    assert run(system).status == "completed"
-    assert not used
-
-
 @pytest.mark.parametrize("refresh", [True, False])
 def test_steps_that_vary(told, mine, refresh):
     """`adaptive` solves where a step ends: y = -3 y + t, and a lag behind it."""
@@ -261,7 +220,7 @@ def test_steps_that_vary_and_no_solution(told, mine):
 
 
 @pytest.mark.parametrize("seed", [1, 2, 3, 4, 5, 7])
-def test_drawn_ones_that_jump(told, bent, seed):
+def test_drawn_ones_that_jump(told, bent, coupled, seed):
     """What is added to them grows by 5 in each step, so that every start is a poor one; some end without a solution."""
     rng = np.random.default_rng(seed)
     start = [

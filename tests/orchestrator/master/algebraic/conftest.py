@@ -1,0 +1,60 @@
+"""What the tests of algebraic loops in the compiled loop share: an FMU by hand, two of it, and what a run comes to."""
+
+import fmpy
+import pytest
+from railcosim.orchestrator.errors import RunError
+from railcosim.orchestrator.run.execution import run
+from railcosim.orchestrator.system import System
+
+
+@pytest.fixture
+def bent(compile_c, xml, tmp_path):
+    """The FMU of bent.c."""
+
+    def make(*options, derives=True):
+        v, whole = xml["variable"], {"variability": "discrete"}
+        shown = [v("u", "input", start=0.0), v("v", "input", start=0.0)]
+        shown += [v("y", "output", dependencies=["u", "v"]), v("z", "output", dependencies=["u", "v"])]
+        shown += [v(name, "parameter", start=0.0, variability="tunable") for name in ("a", "b", "c")]
+        shown += [v(name, "parameter", "Integer", 0, variability="tunable") for name in ("f", "mode")]
+        shown += [v("m", "input", "Integer", 0, **whole), v("n", "output", "Integer", dependencies=["m"], **whole)]
+        able = f'canHandleVariableCommunicationStepSize="true" providesDirectionalDerivative="{str(derives).lower()}"'
+        files = {
+            "modelDescription.xml": xml["description"](shown, identifier="Bent", simulation=able),
+            f"binaries/{fmpy.platform}/Bent{fmpy.sharedLibraryExtension}": compile_c("bent.c", *options),
+        }
+        return str(xml["write_archive"](tmp_path / f"bent{len(list(tmp_path.iterdir()))}.fmu", files))
+
+    return make
+
+
+@pytest.fixture
+def coupled():
+    """Makes systems of two FMUs: y of each is u of the other one, and v of both is 0.25 of y of the first one."""
+
+    def make(model, first, second, stop=2.0, **how):
+        system = System(**{"stop_time": stop, "step": 0.25, "algebraic_loops": "solve"} | how)
+        for name, start in (("p", first), ("q", second)):
+            system.add(name, model, **start)
+        system.connect("p.y", "q.u")
+        system.connect("q.y", "p.u")
+        for name in "pq":
+            system.connect("p.y", f"{name}.v", scale=0.25)
+        return system
+
+    return make
+
+
+@pytest.fixture
+def outcome(contents):
+    """What a run of a system comes to: its values, what it fails of, what it counts."""
+
+    def go(system, **how):
+        try:
+            result, error = run(system, **how), None
+        except RunError as failure:
+            result, error = failure.run, failure
+        known = error and (str(error), *(getattr(error, name, None) for name in ("instance", "time", "status", "log")))
+        return contents(result), known, result.coupling
+
+    return go
