@@ -19,7 +19,7 @@ from ..kinds import NOTE_OF_KIND, FmuKind
 from ..references import summary
 from ..variables import scalar_variables
 from .formulas import Formulas
-from .reference_signals import EXCITATION, STEPS, reference_signals
+from .reference_signals import EXCITATION, reference_signals, steps_of
 
 _RESOURCES = Path(__file__).parents[1] / "resources"
 _STYLE = (
@@ -66,7 +66,7 @@ def _page(component: Component, kind: FmuKind, signals: dict[str, str]) -> str:
         f"<code>{html.escape(arguments(component))}</code>. Kind: {kind} ({NOTE_OF_KIND[kind]}). "
         f'<a href="licenses/license.txt">Licence</a>.</p>'
         f"<h2>Stepping</h2><ul>{''.join(f'<li>{html.escape(line)}</li>' for line in stepping(component))}</ul>"
-        f"<h2>Reference signals</h2><p>{_signals(signals)}</p>"
+        f"<h2>Reference signals</h2><p>{_signals(signals, steps_of(component))}</p>"
         f"<h2>Interface</h2><table><tr><th>name</th><th>causality</th><th>variability</th><th>unit or type</th>"
         f"<th>start</th><th>description</th></tr>{rows}</table></body></html>\n"
     )
@@ -129,12 +129,12 @@ def _order(component: Component) -> str:
     )
 
 
-def _signals(signals: dict[str, str]) -> str:
+def _signals(signals: dict[str, str], steps: int) -> str:
     if not signals:
         return "None: with the start values of this build the equations refuse the usual excitation."
     links = ", ".join(f'<a href="{name}">{name}</a>' for name in sorted(signals))
     return (
-        f"{links}: {STEPS} communication steps computed in plain Python, in the format of the FMI cross-check. "
+        f"{links}: {steps} communication steps computed in plain Python, in the format of the FMI cross-check. "
         f"The inputs are set at the time of their row and held over the step: {EXCITATION}."
     )
 

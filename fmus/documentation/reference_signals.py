@@ -13,11 +13,13 @@ from typing import Any
 import numpy as np
 
 from ...components.component import Component, Slot
-from ...components.declarations import Input, Output
+from ...components.declarations import Input, Output, State
 from ...components.simulate import simulate
 from ..description import default_step
 
 STEPS = 50
+"""So many communication steps; `steps_of` those of large components."""
+_FEWEST, _WORK = 12, 2000
 EXCITATION = (
     "every real input swings about its start value as a sine of 1 to 5 periods (amplitude 100 kN, 100 m, 10 m/s, "
     "0.1 m/s2 or 0.01 N/kg, 1 in any other unit), a boolean is the opposite of its start value in the second third, "
@@ -25,6 +27,16 @@ EXCITATION = (
 )
 """What the inputs do: it moves all of them and is no realistic case."""
 _AMPLITUDES = {"N": 1e5, "m": 100.0, "m/s": 10.0, "m/s2": 0.1, "N/kg": 0.01}
+
+
+def steps_of(component: Component) -> int:
+    """How many communication steps the signals of a component last.
+
+    Fewer for one of many states: a hundred wagons in plain Python take a second for each. Twelve still show all periods
+    of the inputs.
+    """
+    states = sum(math.prod(slot.shape) for slot in component.of(State))
+    return max(_FEWEST, min(STEPS, _WORK // max(states, 1)))
 
 
 def reference_signals(component: Component) -> dict[str, str]:
@@ -35,12 +47,12 @@ def reference_signals(component: Component) -> dict[str, str]:
     Args:
         component: built; its values are the start values. It is not changed.
     """
-    step = default_step(component)
+    step, count = default_step(component), steps_of(component)
     inputs = [slot for slot in component.of(Input) if slot.type is not str]
-    rows = [_excitation(component, inputs, k * step, STEPS * step) for k in range(STEPS + 1)]
+    rows = [_excitation(component, inputs, k * step, count * step) for k in range(count + 1)]
     try:
         # A value outside what the equations can take is theirs to refuse, by whatever exception.
-        result = simulate(_fresh(component), STEPS * step, step, lambda t: rows[round(t / step)])
+        result = simulate(_fresh(component), count * step, step, lambda t: rows[round(t / step)])
     except Exception:
         return {}
     name, times = type(component).__name__, result["time"].tolist()

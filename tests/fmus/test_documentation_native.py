@@ -12,12 +12,12 @@ import pytest
 from fmpy import read_csv, read_model_description, simulate_fmu
 from fmpy.util import read_ref_opt_file
 from fmpy.validation import validate_fmu
-from railcosim.components import CATALOGUE, ComfortCruise, ComponentError, Gust, PointMassTrain
+from railcosim.components import CATALOGUE, ComfortCruise, ComponentError, FreightTrain, Gust, PointMassTrain
 from railcosim.fmus import documentation, toolchain
 from railcosim.fmus.build import build, native_problem
 from railcosim.fmus.documentation import page
 from railcosim.fmus.documentation.formulas import Formulas
-from railcosim.fmus.documentation.reference_signals import STEPS, reference_signals
+from railcosim.fmus.documentation.reference_signals import STEPS, reference_signals, steps_of
 from railcosim.fmus.references import resolve
 
 ROOT = Path(__file__).parents[2]
@@ -217,6 +217,19 @@ def test_an_importer_that_follows_the_files_gets_the_reference(name, kind, tmp_p
         np.testing.assert_allclose(
             found[column].astype(float), reference[column], rtol=1e-12, atol=1e-12 * size, err_msg=column
         )
+
+
+def test_those_of_many_states_last_fewer_steps():
+    """In which every input still moves."""
+    train = FreightTrain(vehicles=25)
+    assert steps_of(train) == 19
+    assert steps_of(FreightTrain(vehicles=101)) == 12
+    signals = reference_signals(train)
+    files = (signals[f"FreightTrain_{name}.csv"].splitlines()[1:] for name in ("in", "ref"))
+    given, found = (np.genfromtxt(lines, delimiter=",") for lines in files)
+    assert len(given) == len(found) == 20
+    assert (np.ptp(given, axis=0) > 0.0).all()
+    assert "19 communication steps" in page(train, "native")
 
 
 def test_the_inputs_do_what_the_page_says():
