@@ -1,4 +1,4 @@
-from .channel import IsolatedChannel
+from .channel import IsolatedChannel, IsolatedPart
 from .choice import (
     ALL,
     AUTO,
@@ -22,6 +22,7 @@ __all__ = [
     "CRASHES",
     "HAS_LANES",
     "IsolatedChannel",
+    "IsolatedPart",
     "IsolatedSlave",
     "Ride",
     "become_known",

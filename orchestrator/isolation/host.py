@@ -102,6 +102,7 @@ class Host:
     def come_back(self) -> None:
         """Go on by messages, at the time that the master has got to by calls through the lane."""
         if self._slave is not None and self.service.operations:
+            self.service.forget_arrays()
             from ..fmi.binding import FATAL  # noqa: PLC0415 (it is there by now, with the FMU)
 
             self._slave.time = self.service.time
@@ -226,11 +227,10 @@ class Host:
     def _keep_values(self, content: tuple[int, Sequence[Any]]) -> None:
         self._texts[content[0]] = content[1]
 
-    def _board(self, table: Sequence[tuple[int, int, int]]) -> None:
+    def _board(self, table: Sequence[tuple[int, int, int, int, int]]) -> None:
         """Make ready for calls that come through the lane."""
-        nothing = None, None
-        found = [self._channels[k] if kind in messages.LANE_VALUES else nothing for kind, k, _ in table]
-        self.service.board(self._instance, [(*entry, *channel) for entry, channel in zip(table, found, strict=True)])
+        found = [self._channels[k][0] if kind in messages.LANE_VALUES else None for kind, k, *_ in table]
+        self.service.board(self._instance, [(*entry, channel) for entry, channel in zip(table, found, strict=True)])
 
     # ---------------------------------------------------------------- saved states
 

@@ -2,6 +2,7 @@ from collections.abc import Callable
 from typing import Any
 
 FUNCTIONS: tuple[int, ...]
+CUT_SHORT: int
 SIZE: int
 CAME: int
 CLOSED: int
@@ -18,7 +19,7 @@ class Lane:
 
 class Rider:
     def __new__(cls, lane: Lane, head: int, number: int) -> Rider: ...
-    def add(self, kind: int, offset: int, count: int) -> int: ...
+    def add(self, kind: int, offset: int, count: int, width: int) -> int: ...
     def begin(self, time: float) -> None: ...
     def last_step(self) -> tuple[float, float, float, float]: ...
 

@@ -44,13 +44,12 @@ NOTE_CALL, NOTE_MEMORY, NOTE_BASE, NOTE_LINE, NOTE_FAILED, NOTE_STATUS, NOTE_TIM
 KiB; whether it has lost its line to the master: these three of the whole process, at its first instance. Of calls
 through the lane: which one failed, counted from 1, and less than 0 unless that was one that reads; its status; and the
 time in s, a real number, that the master has got to."""
-SET_REALS, SET_INTEGERS, LANE_STEP, GET_REALS, GET_INTEGERS, SET_SLOPES, ASK, LANE_SAVE, LANE_RESTORE, LANE_FORGET = (
-    range(10)
-)
-LANE_RESTORE_NOW = 10
-"""What is called through the lane: see ``native/lane.h``; and what waits until a state is restored."""
-LANE_VALUES = SET_REALS, SET_INTEGERS, GET_REALS, GET_INTEGERS
-"""Of these, what sets and reads channels."""
+LANE_SET, LANE_SET_3, LANE_STEP, LANE_STEP_3, LANE_GET, LANE_GET_3 = range(6)
+SET_SLOPES, ASK, ASK_3, LANE_SAVE, LANE_RESTORE, LANE_FORGET, LANE_RESTORE_NOW = range(6, 13)
+"""What is called through the lane: see ``native/lane.h``; the last waits until a state is restored."""
+LANE_GETS = LANE_GET, LANE_GET_3
+LANE_VALUES = LANE_SET, LANE_SET_3, *LANE_GETS
+"""Of these, what reads channels; and what sets or reads them."""
 CALLS = ("", "instantiate", "setup", "enter_initialization", "exit_initialization", "set", "step", "get", "save",
          "restore", "forget", "serialize", "deserialize", "directional_derivatives", "interpolate", "terminate",
          "roll_back", "reset", "free", "check", "board")  # fmt: skip
@@ -63,9 +62,15 @@ _SUSPICIOUS = 0.5
 """The part of the memory limit in use from which on it is named as a likely reason of a failure."""
 
 
-def note(call: str, channel: int = 0) -> int:
-    """What stands in `NOTE_CALL` during a call."""
-    return NUMBERS[call] | channel << 8
+def note(call: str, channel: int = 0, part: int = 0) -> int:
+    """What stands in `NOTE_CALL` during a call, of one of a channel's parts."""
+    return NUMBERS[call] | part << 8 | channel << 16
+
+
+def noted(found: int) -> tuple[str, int, int]:
+    """A name of `CALLS`, and the channel and part where they matter; an FMU may have overwritten it."""
+    number = found & 0xFF
+    return CALLS[number] if number < len(CALLS) else "", found >> 16, found >> 8 & 0xFF
 
 
 def frame(kind: int, content: Any) -> bytes:

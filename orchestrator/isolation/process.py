@@ -250,22 +250,17 @@ class HostProcess:
         seats = range(len(self.begins))
         return next((seat for seat in seats if self.note(NOTE_CALL, seat)), self._asked)
 
-    def last_call(self) -> tuple[str, int]:
-        """What it is doing, or was when it was lost: a name of `messages.CALLS`, and the channel where that matters.
-
-        An FMU may have overwritten it.
-        """
-        found = self.note(NOTE_CALL, self.culprit())
-        number = found & 0xFF
-        return messages.CALLS[number] if number < len(messages.CALLS) else "", found >> 8
+    def last_call(self) -> tuple[str, int, int]:
+        """What it is doing, or was when it was lost, as `messages.noted` has it."""
+        return messages.noted(self.note(NOTE_CALL, self.culprit()))
 
     def _where(self) -> str:
         call = self._called()
         return f"in {call}" if call else "between two calls"
 
     def _called(self) -> str:
-        call, channel = self.last_call()
-        return self.seated[self.culprit()].name_call(call, channel) if call else ""
+        call, *which = self.last_call()
+        return self.seated[self.culprit()].name_call(call, *which) if call else ""
 
     # ---------------------------------------------------------------- how it ends
 

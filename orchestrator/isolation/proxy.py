@@ -15,7 +15,7 @@ from typing import Any
 
 from ..errors import FmuError, LostError
 from ..fmi import Interface, Type
-from ..fmi.binding import call_name
+from ..fmi.binding import by_type, call_name
 from . import messages
 from .channel import IsolatedChannel
 from .messages import Cells, Report, Saved, frame
@@ -106,7 +106,7 @@ class IsolatedSlave:
                 self._used += len(names)
             self._queue += frame(messages.CHANNEL, (kind, key[1], offset))
             cells = None if offset is None else Cells(self._process.memory, offset, kind, len(names))
-            self._known[key] = IsolatedChannel(self, len(self._channels), kind, cells)
+            self._known[key] = IsolatedChannel(self, len(self._channels), *key, cells)
             self._channels.append(self._known[key])
         return self._known[key]
 
@@ -391,8 +391,11 @@ class IsolatedSlave:
                 break
             channel.moment, channel.texts = self.moment, report.texts.get(channel.index)
 
-    def name_call(self, call: str, channel: int) -> str:
-        """The function of the standard behind a name of `messages.CALLS`, called for a channel."""
-        known = list(self._known)
-        kind, names = known[channel] if call in ("set", "get") and 0 <= channel < len(known) else ("Real", ())
-        return call_name(self.interface, call, kind, names)
+    def name_call(self, call: str, channel: int, part: int) -> str:
+        """The function of the standard behind a name of `messages.CALLS`, called for a part of a channel."""
+        if call not in ("set", "get") or not 0 <= channel < len(self._channels):
+            return call_name(self.interface, call, "Real", ())
+        kind, names = self._channels[channel].kind, self._channels[channel].names
+        parts = list(by_type(kind, names, self.interface).values())
+        own = [names[k] for k in parts[part]] if part < len(parts) else names
+        return call_name(self.interface, call, kind, own)

@@ -13,31 +13,31 @@ from typing import Any, Protocol
 
 from ..errors import FmuError, LostError
 from ..fmi import Interface
-from ..fmi.binding import DISCARD, FATAL, PENDING, FmuSlave
-from .channel import IsolatedChannel
+from ..fmi.binding import DISCARD, FATAL, PENDING, SLAVES
+from .channel import IsolatedPart
 from .lanes import HAS_LANES, lane
 from .messages import (
     ASK,
-    GET_INTEGERS,
-    GET_REALS,
+    ASK_3,
     LANE_FORGET,
+    LANE_GET,
+    LANE_GET_3,
     LANE_RESTORE,
     LANE_RESTORE_NOW,
     LANE_SAVE,
+    LANE_SET,
+    LANE_SET_3,
     LANE_STEP,
+    LANE_STEP_3,
     NOTE_FAILED,
     NOTE_STATUS,
-    SET_INTEGERS,
-    SET_REALS,
     SET_SLOPES,
 )
 from .process import HostProcess
 
-_VERSION = "2.0"
-"""Of FMI, whose functions the lane calls."""
 _CALLS = {
-    SET_REALS: "set", SET_INTEGERS: "set", LANE_STEP: "step", GET_REALS: "get", GET_INTEGERS: "get",
-    SET_SLOPES: "interpolate", ASK: "directional_derivatives",
+    LANE_SET: "set", LANE_SET_3: "set", LANE_STEP: "step", LANE_STEP_3: "step", LANE_GET: "get", LANE_GET_3: "get",
+    SET_SLOPES: "interpolate", ASK: "directional_derivatives", ASK_3: "directional_derivatives",
     LANE_SAVE: "save", LANE_RESTORE: "restore", LANE_FORGET: "forget",
 }  # fmt: skip
 _STATE = LANE_SAVE, LANE_RESTORE, LANE_FORGET
@@ -67,14 +67,13 @@ class Rider(Protocol):
     def await_lane(self) -> None:
         """Wait for what is under way in the lane."""
 
-    def name_call(self, call: str, channel: int) -> str:
-        """The function of the standard behind a name of `messages.CALLS`, called for a channel."""
+    def name_call(self, call: str, channel: int, part: int) -> str:
+        """The function of the standard behind a name of `messages.CALLS`, called for a part of a channel."""
 
 
-def may_ride(slave: Rider, channels: Iterable[Any]) -> bool:
-    """Whether an isolated instance can be called through a lane, with these channels of its."""
-    able = HAS_LANES and slave.interface.version == _VERSION and not slave.rolls_back
-    return able and all(channel.cells is not None for channel in channels)
+def may_ride(slave: Rider) -> bool:
+    """Whether an isolated instance can be called through a lane, where its channels have parts."""
+    return HAS_LANES and not slave.rolls_back
 
 
 class Ride:
@@ -82,19 +81,24 @@ class Ride:
 
     Args:
         slave: the instance. process: its process. seat: its number there.
-    """
 
-    DO_STEP, INTERPOLATE, DERIVE = FmuSlave.DO_STEP, FmuSlave.INTERPOLATE, FmuSlave.DERIVE
-    STATE = FmuSlave.STATE
+    Attributes:
+        name, interface, functions: of the instance. DO_STEP, INTERPOLATE, DERIVE, STATE: what its version of FMI calls
+            its functions.
+    """
 
     def __init__(self, slave: Rider, process: HostProcess, seat: int) -> None:
         self._slave, self.name = slave, slave.name
         self.interface, self.functions = slave.interface, slave.functions
+        own = SLAVES[slave.interface.version]
+        self.DO_STEP, self.INTERPOLATE, self.DERIVE = own.DO_STEP, own.INTERPOLATE, own.DERIVE
+        self.STATE: tuple[str, ...] = getattr(own, "STATE", ())  # FMI 1.0 has none
+        self._is_third = own.COUNTS_VALUES
         self._process, self._lane = process, process.open_lane()
         self._seat = seat
         self._rider = lane.Rider(self._lane, process.begins[seat], seat)
-        self._table: list[tuple[int, int, int]] = []
-        self._made: dict[tuple[int, int], int] = {}
+        self._table: list[tuple[int, int, int, int, int]] = []
+        self._made: dict[tuple[int, int, int], int] = {}
         self._is_final = True
         self._is_on = False
 
@@ -103,26 +107,23 @@ class Ride:
     def add_step(self, *, final: bool) -> tuple[int, int]:
         """The function that takes a step, ``final`` or not, and what stands for the instance there: addresses."""
         self._is_final = final
-        return lane.FUNCTIONS[LANE_STEP], self._add(LANE_STEP)
+        kind = LANE_STEP_3 if self._is_third else LANE_STEP
+        return lane.FUNCTIONS[kind], self._add(kind)
 
-    def add(self, channel: IsolatedChannel, *, is_get: bool) -> tuple[int, int]:
+    def add(self, part: IsolatedPart, *, is_get: bool) -> tuple[int, int]:
         """The same for a function that reads or sets variables."""
-        assert channel.cells is not None
-        kinds = (GET_REALS, GET_INTEGERS) if is_get else (SET_REALS, SET_INTEGERS)
-        kind = kinds[channel.kind != "Real"]
-        place = channel.cells.offset, channel.cells.count
-        return lane.FUNCTIONS[kind], self._add(kind, channel.index, place)
+        kind = ((LANE_SET, LANE_GET), (LANE_SET_3, LANE_GET_3))[self._is_third][is_get]
+        return lane.FUNCTIONS[kind], self._add(kind, part.channel, part.number, part.place)
 
     def add_slopes(self) -> int:
         """The function that takes derivatives of inputs; what sets these inputs stands for the instance."""
-        offset, room = self._slave.slopes
-        self._add(SET_SLOPES, offset, (offset, room))
+        self._add(SET_SLOPES, place=(*self._slave.slopes, 0))
         return lane.FUNCTIONS[SET_SLOPES]
 
     def add_question(self) -> tuple[int, int]:
         """The function that gives directional derivatives, and what stands for the instance there: addresses."""
-        offset, room = self._slave.question
-        return lane.FUNCTIONS[ASK], self._add(ASK, offset, (offset, room))
+        kind = ASK_3 if self._is_third else ASK
+        return lane.FUNCTIONS[kind], self._add(kind, place=(*self._slave.question, 0))
 
     def add_state(self, number: int, *, at_once: bool) -> tuple[int, int, int, int]:
         """The functions that save, restore and give back the state of a number, and what stands for the instance.
@@ -133,12 +134,13 @@ class Ride:
         save, restore, forget = _STATE[0], LANE_RESTORE_NOW if at_once else _STATE[1], _STATE[2]
         return lane.FUNCTIONS[save], lane.FUNCTIONS[restore], lane.FUNCTIONS[forget], first
 
-    def _add(self, kind: int, number: int = -1, place: tuple[int, int] = (0, 0)) -> int:
+    def _add(self, kind: int, number: int = -1, part: int = 0, place: tuple[int, int, int] = (0, 0, 0)) -> int:
         """What is called in several places of a plan is one: its values stand in one place of the memory."""
-        if (kind, number) not in self._made:
-            self._made[kind, number] = self._rider.add(kind, *place)
-            self._table.append((kind, number, place[1]))
-        return self._made[kind, number]
+        key = kind, number, part
+        if key not in self._made:
+            self._made[key] = self._rider.add(kind, *place)
+            self._table.append((*key, *place[:2]))
+        return self._made[key]
 
     def references(self, names: Iterable[str]) -> list[int]:
         """The value references of variables."""
@@ -201,9 +203,10 @@ class Ride:
         """
         slave = self._slave
         self._raise_failure()
-        if self.failed == "step" and status == DISCARD:
+        if self.failed == "step" and (status == DISCARD or status >= lane.CUT_SHORT):
             begin, length, *_ = self._rider.last_step()
-            slave.ask("resume", begin, length, status, self._is_final)
+            own = status - lane.CUT_SHORT if status >= lane.CUT_SHORT else status
+            slave.ask("resume", begin, length, own, self._is_final)
             return not call.endswith("DoStep")
         slave.time = self._time_of_failure(time, apart=apart)
         self.check(self._failed_call(), status)
@@ -238,8 +241,8 @@ class Ride:
             raise failure
 
     def _failed_call(self) -> str:
-        _, channel, _ = self._table[abs(self._process.note(NOTE_FAILED, self._seat)) - 1]
-        return self._slave.name_call(self.failed, channel)
+        _, channel, part, *_ = self._table[abs(self._process.note(NOTE_FAILED, self._seat)) - 1]
+        return self._slave.name_call(self.failed, channel, part)
 
     def _time_of_failure(self, time: float, *, apart: bool) -> float:
         if self.failed in ("save", "restore"):

@@ -51,7 +51,7 @@ class Guest(NamedTuple):
     @property
     def room(self) -> int:
         """How many such numbers all that takes: see `Slopes` and `Question` in ``native/lane.h``."""
-        return self.places[1] + 3 + 3 * self.asked
+        return self.places[1] + 5 + 3 * self.asked
 
 
 class Seated(Protocol):
@@ -60,8 +60,8 @@ class Seated(Protocol):
     name: str
     time: float
 
-    def name_call(self, call: str, channel: int) -> str:
-        """The function of the standard behind a name of `messages.CALLS`, called for a channel."""
+    def name_call(self, call: str, channel: int, part: int) -> str:
+        """The function of the standard behind a name of `messages.CALLS`, called for a part of a channel."""
 
     def await_lane(self) -> None:
         """Wait for what is under way in the lane.

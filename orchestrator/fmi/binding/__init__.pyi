@@ -1,4 +1,4 @@
-from .arrays import ElementsChannel, whole_arrays
+from .arrays import Calls, ElementsChannel, are_as_called, arrays_in, by_type, calls_of, heads, whole_arrays
 from .channel import FmuChannel, MixedChannel
 from .fmi1 import Fmi1Slave
 from .fmi2 import FmuSlave
@@ -15,6 +15,7 @@ __all__ = [
     "FATAL",
     "PENDING",
     "SLAVES",
+    "Calls",
     "ElementsChannel",
     "Fmi1Slave",
     "Fmi3Slave",
@@ -23,8 +24,13 @@ __all__ = [
     "LoadedSlave",
     "MixedChannel",
     "Watch",
+    "are_as_called",
+    "arrays_in",
+    "by_type",
     "call_name",
+    "calls_of",
     "forget_paths",
+    "heads",
     "is_watched",
     "library",
     "names_of_platform",

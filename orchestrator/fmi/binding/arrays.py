@@ -1,14 +1,57 @@
-"""Elements of FMI 3.0 arrays, which are set and read as whole arrays only."""
+"""Variables by the calls that set and read them: one for each type, and for FMI 3.0 arrays as a whole only."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from typing import Any
 
-from ..interface import Interface
+from ..interface import Interface, Type
 from ..slave import Channel
 from .binary import BinaryChannel
-from .channel import FmuChannel, Owner
+from .channel import FmuChannel, MixedChannel, Owner
+
+Calls = list[tuple[FmuChannel, Sequence[int]]]
+"""Calls of an FMU, each with the places of its values among all of a channel."""
+
+
+def by_type(kind: Type, names: Sequence[str], interface: Interface) -> dict[str, list[int]]:
+    """The places of some variables of one type of ours, by the FMU's types of them: there is a call for each."""
+    found: dict[str, list[int]] = {}
+    for place, name in enumerate(names):
+        found.setdefault(interface.variables[name].fmi_type or kind, []).append(place)
+    return found
+
+
+def are_as_called(kind: Type, names: Sequence[str], interface: Interface) -> bool:
+    """Whether numbers and truth values are set and read as they stand there: whole arrays, and nothing negated."""
+    types = by_type(kind, names, interface)
+    own = [[names[k] for k in places] for places in types.values()]
+    return (
+        kind != "String"
+        and not any(interface.variables[name].negated for name in names)
+        and all(whole_arrays(each, interface) == each for each in own)
+    )
+
+
+def heads(names: Sequence[str], interface: Interface) -> list[int]:
+    """The value references of variables; of the elements of an array, which stand together, the first's."""
+    variables = map(interface.variables.__getitem__, names)
+    return [v.reference for v in variables if v.element is None or not v.element[1]]
+
+
+def calls_of(channel: Channel) -> Calls | None:
+    """The calls behind a channel of an instance in this process; None where there are others."""
+    if isinstance(channel, FmuChannel):
+        return [(channel, range(len(channel.names)))]
+    if isinstance(channel, ElementsChannel):
+        return calls_of(channel.channel) if channel.is_whole else None
+    found: Calls = []
+    for own, places in channel.parts if isinstance(channel, MixedChannel) else ():
+        inner = calls_of(own)
+        if inner is None:
+            return None
+        found += [(each, [places[k] for k in own_places]) for each, own_places in inner]
+    return found or None
 
 
 def prepared(slave: Owner, kind: str, names: Sequence[str], given: dict[str, Any]) -> Channel:
@@ -25,6 +68,14 @@ def prepared(slave: Owner, kind: str, names: Sequence[str], given: dict[str, Any
         return make(slave, kind, names)
     whole = whole_arrays(names, slave.interface)
     return ElementsChannel(make(slave, kind, whole), whole, names, given, slave.interface)
+
+
+def arrays_in(channel: Channel) -> list[ElementsChannel]:
+    """The arrays of a channel, which are set past it where its `calls_of` are made."""
+    if isinstance(channel, ElementsChannel):
+        return [channel]
+    parts = channel.parts if isinstance(channel, MixedChannel) else ()
+    return [array for own, _ in parts for array in arrays_in(own)]
 
 
 def whole_arrays(names: Sequence[str], interface: Interface) -> list[str]:

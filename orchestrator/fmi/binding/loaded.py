@@ -20,7 +20,7 @@ from ...errors import FmuError, LostError
 from ..guard import dismiss, introduce, noted
 from ..interface import Interface, Type
 from ..slave import STATUS, Channel
-from .arrays import prepared
+from .arrays import by_type, heads, prepared
 from .channel import MixedChannel, NegatedChannel
 from .libraries import Signatures, close_library, library, open_library, threads
 from .messages import LOGS, without_head
@@ -210,8 +210,8 @@ class LoadedSlave(Stepping):
 
     def references(self, names: Sequence[str]) -> Any:
         """The value references of variables, for C; of the elements of an array, which stand together, the first's."""
-        heads = [v for v in map(self.interface.variables.__getitem__, names) if v.element is None or not v.element[1]]
-        return (ctypes.c_uint * len(heads))(*(v.reference for v in heads))
+        found = heads(names, self.interface)
+        return (ctypes.c_uint * len(found))(*found)
 
     def channel(self, kind: Type, names: Sequence[str]) -> Channel:
         """Prepare variables of one type for being set or read together; once for all runs."""
@@ -221,10 +221,8 @@ class LoadedSlave(Stepping):
         return self._channels[key]
 
     def _prepared(self, kind: Type, names: Sequence[str]) -> Channel:
-        parts: dict[str, list[int]] = {}
-        for place, name in enumerate(names):
-            parts.setdefault(self.interface.variables[name].fmi_type or kind, []).append(place)
-        own = [(prepared(self, each, [names[k] for k in ks], self._given), ks) for each, ks in parts.items()]
+        parts = by_type(kind, names, self.interface).items()
+        own = [(prepared(self, each, [names[k] for k in ks], self._given), ks) for each, ks in parts]
         channel = own[0][0] if len(own) == 1 else MixedChannel(own, len(names))
         negated = [self.interface.variables[name].negated for name in names]
         return NegatedChannel(channel, negated, kind) if any(negated) else channel

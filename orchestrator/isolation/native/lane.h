@@ -25,7 +25,11 @@ enum { RING = 256 };
 /* What an entry says, beside the number of an operation. */
 enum { READ = 0xfffffffe, LEAVE = 0xffffffff };
 
-enum { SET_REALS, SET_INTEGERS, STEP, GET_REALS, GET_INTEGERS, SET_SLOPES, ASK, SAVE, RESTORE, FORGET, N_KINDS };
+/* What an operation is: FMI 3.0 has more arguments where values are set and read, for a step and for derivatives. */
+enum { SET, SET_3, STEP, STEP_3, GET, GET_3, SET_SLOPES, ASK, ASK_3, SAVE, RESTORE, FORGET, N_KINDS };
+
+/* In the place of the status of a step of FMI 3.0 that ended early, or with the simulation: this, and its status. */
+enum { CUT_SHORT = 1001 };
 
 typedef struct {
     uint32_t instance; /* of the lane, */
@@ -61,6 +65,21 @@ typedef struct {
     int *orders;
 } Slopes;
 
+static inline int is_get(int64_t kind)
+{
+    return kind == GET || kind == GET_3;
+}
+
+static inline int is_ask(int64_t kind)
+{
+    return kind == ASK || kind == ASK_3;
+}
+
+static inline int is_step(int64_t kind)
+{
+    return kind == STEP || kind == STEP_3;
+}
+
 static inline Slopes slopes_in(void *memory, size_t room)
 {
     double *values = (double *)memory + 1;
@@ -68,8 +87,8 @@ static inline Slopes slopes_in(void *memory, size_t room)
     return (Slopes){memory, values, references, (int *)(references + room)};
 }
 
-/* What is asked for directional derivatives in the memory, and the answer: the status that it has, how many unknowns and
-   inputs there are, then room for so many seeds, slopes, and references of either. */
+/* What is asked for directional derivatives in the memory, and the answer: the status that it has, how many references
+   of unknowns, of inputs, seeds and slopes there are, then room for so many seeds, slopes, and references of either. */
 typedef struct {
     int64_t *status;
     int64_t *counts;
@@ -77,7 +96,7 @@ typedef struct {
     unsigned *unknowns, *knowns;
 } Question;
 
-enum { QUESTION_HEAD = 3 };
+enum { N_COUNTS = 4, QUESTION_HEAD = 1 + N_COUNTS };
 
 static inline Question question_in(void *memory, size_t room)
 {

@@ -187,13 +187,13 @@ static PyObject *add(PyObject *self, PyObject *arguments)
 {
     RiderObject *rider = (RiderObject *)self;
     int kind;
-    Py_ssize_t offset, count;
-    if (!PyArg_ParseTuple(arguments, "inn:add", &kind, &offset, &count)) {
+    Py_ssize_t offset, count, width;
+    if (!PyArg_ParseTuple(arguments, "innn:add", &kind, &offset, &count, &width)) {
         return NULL;
     }
-    if (!has_room(rider->road, offset, count) ||
+    if (!has_room(rider->road, offset, width >= 0 && width <= (Py_ssize_t)sizeof(double) ? count : -1) ||
         (kind == SET_SLOPES && !has_room(rider->road, offset, 2 * count + 1)) ||
-        (kind == ASK && !has_room(rider->road, offset, 3 * count + QUESTION_HEAD))) {
+        (is_ask(kind) && !has_room(rider->road, offset, 3 * count + QUESTION_HEAD))) {
         return NULL;
     }
     Seat *seat = calloc(1, sizeof *seat);
@@ -201,10 +201,10 @@ static PyObject *add(PyObject *self, PyObject *arguments)
         return PyErr_NoMemory();
     }
     *seat = (Seat){.rider = rider, .number = rider->operations++, .posted = atomic_load(&rider->road->lane->master.count),
-                   .offset = offset, .count = count, .next = rider->seats};
+                   .offset = offset, .count = count, .width = width, .next = rider->seats};
     rider->seats = seat;
     rider->slopes = kind == SET_SLOPES ? seat : rider->slopes;
-    rider->gives |= kind == GET_REALS || kind == GET_INTEGERS;
+    rider->gives |= is_get(kind);
     return PyLong_FromVoidPtr(seat);
 }
 
@@ -246,8 +246,8 @@ static PyType_Spec lane_spec = {"railcosim.orchestrator.isolation.lane.Lane", si
 
 static PyMethodDef rider_methods[] = {
     {"add", add, METH_VARARGS,
-     "add(kind, offset, count) -> what stands for the instance in calls of an operation. Those on a state are added in\n"
-     "their order, and the first stands for all."},
+     "add(kind, offset, count, width) -> what stands for the instance in calls of an operation, with so many values\n"
+     "of so many bytes. Those on a state are added in their order, and the first stands for all."},
     {"begin", begin, METH_VARARGS, "begin(time): it is at a time in s, and what was read before is old."},
     {"last_step", last_step, METH_NOARGS,
      "last_step() -> time and length of the last step, where states were last treated, and where it has got to, in s."},
@@ -272,6 +272,7 @@ int add_riding(PyObject *module)
                   PyModule_AddObjectRef(module, "FUNCTIONS", addresses) == 0 &&
                   PyModule_AddObjectRef(module, "Lane", (PyObject *)lane_type) == 0 &&
                   PyModule_AddObjectRef(module, "Rider", (PyObject *)rider_type) == 0 &&
+                  PyModule_AddIntConstant(module, "CUT_SHORT", CUT_SHORT) == 0 &&
                   PyModule_AddIntConstant(module, "SIZE", (long)sizeof(Lane)) == 0 &&
                   PyModule_AddIntConstant(module, "CAME", CAME) == 0 &&
                   PyModule_AddIntConstant(module, "CLOSED", CLOSED) == 0;

@@ -104,36 +104,38 @@ static int ask_for(Seat *seat, Entry entry, int wakes)
     return 1;
 }
 
+static size_t size_of(const Seat *seat)
+{
+    return (size_t)(seat->count * seat->width);
+}
+
 static int carry_out(Seat *seat, Entry entry)
 {
     return ask_for(seat, entry, 1) && wait_for(seat->rider, seat->posted) ? status_of(seat) : SILENT;
 }
 
-static int set(void *component, const void *values, size_t size)
+static int set(void *component, const unsigned *references, size_t count, const void *values)
 {
     Seat *seat = component;
     RiderObject *rider = seat->rider;
     Entry entry = {.instance = rider->number, .what = seat->number};
+    (void)references;
+    (void)count;
     if (!wait_for(rider, seat->posted)) { /* the host may still be reading there */
         return SILENT;
     }
-    memcpy(values_of(seat), values, size);
+    memcpy(values_of(seat), values, size_of(seat));
     rider->is_read = 0;
     return !rider->gives ? carry_out(seat, entry) : ask_for(seat, entry, 0) ? 0 : SILENT;
 }
 
-static int set_reals(void *component, const unsigned *references, size_t count, const double *values)
+static int set_3(void *component, const unsigned *references, size_t count, const void *values, size_t value_count)
 {
-    (void)references;
-    return set(component, values, count * sizeof *values);
+    (void)value_count;
+    return set(component, references, count, values);
 }
 
-static int set_integers(void *component, const unsigned *references, size_t count, const int *values)
-{
-    (void)references;
-    return set(component, values, count * sizeof *values);
-}
-
+/* Of every version: what a step of FMI 3.0 tells beside its status stays with the host, but that it was cut short. */
 static int step(void *component, double time, double length, int is_final)
 {
     Seat *seat = component;
@@ -165,22 +167,30 @@ static int set_slopes(void *component, const unsigned *references, size_t count,
 }
 
 /* One that is refused has failed of nothing: the slopes are found in another way. */
-static int ask(void *component, const unsigned *unknowns, size_t count, const unsigned *knowns, size_t known_count,
-               const double *seeds, double *slopes)
+static int ask_3(void *component, const unsigned *unknowns, size_t count, const unsigned *knowns, size_t known_count,
+                 const double *seeds, size_t seed_count, double *slopes, size_t slope_count)
 {
     Seat *seat = component;
     Question of = question_in(values_of(seat), (size_t)seat->count);
-    of.counts[0] = (int64_t)count;
-    of.counts[1] = (int64_t)known_count;
+    const size_t counts[] = {count, known_count, seed_count, slope_count};
+    for (int k = 0; k < N_COUNTS; k++) {
+        of.counts[k] = (int64_t)counts[k];
+    }
     memcpy(of.unknowns, unknowns, count * sizeof *unknowns);
     memcpy(of.knowns, knowns, known_count * sizeof *knowns);
-    memcpy(of.seeds, seeds, known_count * sizeof *seeds);
+    memcpy(of.seeds, seeds, seed_count * sizeof *seeds);
     int status = carry_out(seat, (Entry){.instance = seat->rider->number, .what = seat->number});
     if (status != 0) {
         return status;
     }
-    memcpy(slopes, of.slopes, count * sizeof *slopes);
+    memcpy(slopes, of.slopes, slope_count * sizeof *slopes);
     return (int)*of.status;
+}
+
+static int ask(void *component, const unsigned *unknowns, size_t count, const unsigned *knowns, size_t known_count,
+               const double *seeds, double *slopes)
+{
+    return ask_3(component, unknowns, count, knowns, known_count, seeds, known_count, slopes, count);
 }
 
 /* Post one of the operations on a state, by how many numbers it stands behind that which saves it. */
@@ -227,10 +237,12 @@ static int forget(void *component, void **handle)
     return carry_out(component, of_state(component, 2));
 }
 
-static int get(void *component, void *values, size_t size)
+static int get(void *component, const unsigned *references, size_t count, void *values)
 {
     Seat *seat = component;
     RiderObject *rider = seat->rider;
+    (void)references;
+    (void)count;
     if (!rider->is_read) {
         if (!ask_for(seat, (Entry){.instance = rider->number, .what = READ}, 1)) {
             return SILENT;
@@ -243,28 +255,21 @@ static int get(void *component, void *values, size_t size)
     }
     int status = status_of(seat);
     if (status == 0) {
-        memcpy(values, values_of(seat), size);
+        memcpy(values, values_of(seat), size_of(seat));
     }
     return status;
 }
 
-static int get_reals(void *component, const unsigned *references, size_t count, double *values)
+static int get_3(void *component, const unsigned *references, size_t count, void *values, size_t value_count)
 {
-    (void)references;
-    return get(component, values, count * sizeof *values);
-}
-
-static int get_integers(void *component, const unsigned *references, size_t count, int *values)
-{
-    (void)references;
-    return get(component, values, count * sizeof *values);
+    (void)value_count;
+    return get(component, references, count, values);
 }
 
 void *const lane_functions[N_FUNCTIONS] = {
-    [SET_REALS] = (void *)set_reals, [SET_INTEGERS] = (void *)set_integers, [STEP] = (void *)step,
-    [GET_REALS] = (void *)get_reals, [GET_INTEGERS] = (void *)get_integers, [SET_SLOPES] = (void *)set_slopes,
-    [ASK] = (void *)ask,
-    [SAVE] = (void *)save, [RESTORE] = (void *)restore, [FORGET] = (void *)forget,
+    [SET] = (void *)set, [SET_3] = (void *)set_3, [STEP] = (void *)step, [STEP_3] = (void *)step,
+    [GET] = (void *)get, [GET_3] = (void *)get_3, [SET_SLOPES] = (void *)set_slopes, [ASK] = (void *)ask,
+    [ASK_3] = (void *)ask_3, [SAVE] = (void *)save, [RESTORE] = (void *)restore, [FORGET] = (void *)forget,
     [RESTORE_NOW] = (void *)restore_now,
 };
 

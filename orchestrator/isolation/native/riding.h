@@ -54,7 +54,8 @@ typedef struct Seat {
     uint32_t number;
     uint32_t posted;   /* how many entries must be done for the last of this to be done */
     Py_ssize_t offset; /* of its values in the memory, */
-    Py_ssize_t count;  /* and how many there is room for */
+    Py_ssize_t count;  /* how many there are, or how many derivatives there is room for, */
+    Py_ssize_t width;  /* and how many bytes each of them has */
     struct Seat *next;
 } Seat;
 

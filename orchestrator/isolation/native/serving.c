@@ -1,5 +1,6 @@
 /* The host's side of a lane, and the module. */
 
+#include "../../fmi/binding/native/step3.h"
 #include "../../fmi/guard/native/floats.h"
 #include "riding.h"
 
@@ -10,14 +11,16 @@
 #include <unistd.h>
 
 typedef int (*DoStep)(void *component, double time, double step, int no_set_state);
-typedef int (*SetReal)(void *component, const unsigned *references, size_t count, const double *values);
-typedef int (*GetReal)(void *component, const unsigned *references, size_t count, double *values);
-typedef int (*SetInteger)(void *component, const unsigned *references, size_t count, const int *values);
-typedef int (*GetInteger)(void *component, const unsigned *references, size_t count, int *values);
+typedef int (*Set)(void *component, const unsigned *references, size_t count, const void *values);
+typedef int (*Set3)(void *component, const unsigned *references, size_t count, const void *values, size_t value_count);
+typedef int (*Get)(void *component, const unsigned *references, size_t count, void *values);
+typedef int (*Get3)(void *component, const unsigned *references, size_t count, void *values, size_t value_count);
 typedef int (*SetSlopes)(void *component, const unsigned *references, size_t count, const int *orders,
                          const double *values);
 typedef int (*Ask)(void *component, const unsigned *unknowns, size_t count, const unsigned *knowns, size_t known_count,
                    const double *seeds, double *slopes);
+typedef int (*Ask3)(void *component, const unsigned *unknowns, size_t count, const unsigned *knowns, size_t known_count,
+                    const double *seeds, size_t seed_count, double *slopes, size_t slope_count);
 typedef int (*Save)(void *component, void **handle);
 typedef int (*Restore)(void *component, void *handle);
 
@@ -26,9 +29,10 @@ typedef struct {
     int64_t kind;
     uint64_t function;
     uint64_t component;
-    uint64_t references; /* of a state: where its handle stands */
-    uint64_t count;
-    uint64_t offset; /* of its values in the memory */
+    uint64_t references; /* of a state: where its handle stands; of a step of FMI 3.0: what it tells */
+    uint64_t count;      /* of the references, or how many derivatives there is room for; */
+    uint64_t value_count; /* of the values, */
+    uint64_t offset;      /* and where these stand in the memory */
     int64_t note;
 } Operation;
 
@@ -83,11 +87,17 @@ static int set_slopes(SetSlopes set, void *component, void *memory, size_t room)
     return set(component, given.references, at_most(*given.count, room), given.orders, given.values);
 }
 
-static int ask(Ask derive, void *component, void *memory, size_t room)
+static int ask(uintptr_t function, int counts_values, void *component, void *memory, size_t room)
 {
     Question of = question_in(memory, room);
-    int status = derive(component, of.unknowns, at_most(of.counts[0], room), of.knowns, at_most(of.counts[1], room), of.seeds,
-                        of.slopes);
+    size_t counts[N_COUNTS];
+    for (int k = 0; k < N_COUNTS; k++) {
+        counts[k] = at_most(of.counts[k], room);
+    }
+    int status = counts_values ? ((Ask3)function)(component, of.unknowns, counts[0], of.knowns, counts[1], of.seeds,
+                                                  counts[2], of.slopes, counts[3])
+                               : ((Ask)function)(component, of.unknowns, counts[0], of.knowns, counts[1], of.seeds,
+                                                 of.slopes);
     *of.status = status;
     return status == DISCARD || status == ERROR ? 0 : status; /* it goes without */
 }
@@ -109,25 +119,32 @@ static int forget(Save give_back, void *component, void **handle)
     return give_back(component, &old);
 }
 
+static int step_3(DoStep3 do_step, void *component, Told *told, const Entry *entry)
+{
+    int status;
+    int is_over = take_step_3(do_step, component, told, entry->time, entry->length, (int)entry->is_final, &status);
+    return is_over || is_failure(status) ? status : CUT_SHORT + status;
+}
+
 static int do_one(const Guest *guest, const Operation *it, const Entry *entry)
 {
     void *component = (void *)(uintptr_t)it->component;
     void *values = guest->memory + it->offset;
-    const unsigned *references = (const unsigned *)(uintptr_t)it->references;
-    void **handle = (void **)(uintptr_t)it->references;
+    void *beside = (void *)(uintptr_t)it->references;
     uintptr_t function = (uintptr_t)it->function;
     put(guest->notes + NOTE_CALL, it->note);
     switch (it->kind) {
-    case SET_REALS: return ((SetReal)function)(component, references, it->count, values);
-    case SET_INTEGERS: return ((SetInteger)function)(component, references, it->count, values);
+    case SET: return ((Set)function)(component, beside, it->count, values);
+    case SET_3: return ((Set3)function)(component, beside, it->count, values, it->value_count);
     case STEP: return ((DoStep)function)(component, entry->time, entry->length, (int)entry->is_final);
-    case GET_REALS: return ((GetReal)function)(component, references, it->count, values);
-    case GET_INTEGERS: return ((GetInteger)function)(component, references, it->count, values);
+    case STEP_3: return step_3((DoStep3)function, component, beside, entry);
+    case GET: return ((Get)function)(component, beside, it->count, values);
+    case GET_3: return ((Get3)function)(component, beside, it->count, values, it->value_count);
     case SET_SLOPES: return set_slopes((SetSlopes)function, component, values, it->count);
-    case ASK: return ask((Ask)function, component, values, it->count);
-    case SAVE: return save((Save)function, component, handle);
-    case RESTORE: return ((Restore)function)(component, *handle);
-    default: return forget((Save)function, component, handle);
+    case ASK: case ASK_3: return ask(function, it->kind == ASK_3, component, values, it->count);
+    case SAVE: return save((Save)function, component, beside);
+    case RESTORE: return ((Restore)function)(component, *(void **)beside);
+    default: return forget((Save)function, component, beside);
     }
 }
 
@@ -144,8 +161,7 @@ static int take(const Service *service, const Guest *guest, size_t number, const
     }
     if (is_failure(status)) {
         put(guest->notes + NOTE_STATUS, status);
-        int is_get = it->kind == GET_REALS || it->kind == GET_INTEGERS;
-        put(guest->notes + NOTE_FAILED, is_get ? (int64_t)number + 1 : -1 - (int64_t)number);
+        put(guest->notes + NOTE_FAILED, is_get(it->kind) ? (int64_t)number + 1 : -1 - (int64_t)number);
     }
     return !is_failure(status);
 }
@@ -155,8 +171,7 @@ static int take_all_that_is_given(const Service *service, const Guest *guest, co
 {
     const Operation *operations = guest->operations.buf;
     for (size_t n = 0; n < length(guest); n++) {
-        if ((operations[n].kind == GET_REALS || operations[n].kind == GET_INTEGERS) &&
-            !take(service, guest, n, entry)) {
+        if (is_get(operations[n].kind) && !take(service, guest, n, entry)) {
             return 0;
         }
     }
@@ -173,7 +188,7 @@ static void take_entry(const Service *service, const Entry *entry)
         if (entry->what == READ) {
             take_all_that_is_given(service, guest, entry);
         } else if (entry->what < length(guest) && take(service, guest, entry->what, entry) &&
-                   ((const Operation *)guest->operations.buf)[entry->what].kind == STEP) {
+                   is_step(((const Operation *)guest->operations.buf)[entry->what].kind)) {
             take_all_that_is_given(service, guest, entry);
         }
     }
@@ -199,6 +214,14 @@ static void ride(Service *service)
     }
 }
 
+/* Whether its values fit into so many words of the memory. */
+static int has_room(const Operation *it, uint64_t rest)
+{
+    return it->kind == SET_SLOPES ? it->count < (rest + 1) / 2
+           : is_ask(it->kind)     ? it->count <= rest && QUESTION_HEAD + 3 * it->count <= rest
+                                  : it->count <= it->value_count && it->value_count <= rest;
+}
+
 /* Whether what Python says of an instance can be. */
 static int is_sound(const Service *service, const Guest *guest, Py_ssize_t head)
 {
@@ -210,9 +233,7 @@ static int is_sound(const Service *service, const Guest *guest, Py_ssize_t head)
         const Operation *it = operations + n;
         uint64_t rest = it->offset <= size ? (size - it->offset) / sizeof(double) : 0;
         is_fine = it->kind >= 0 && it->kind < N_KINDS && it->function != 0 && it->offset <= size &&
-                  (it->kind == SET_SLOPES ? it->count < (rest + 1) / 2 : it->count <= rest) &&
-                  (it->kind != ASK || QUESTION_HEAD + 3 * it->count <= rest) &&
-                  (it->kind < SAVE || it->references != 0);
+                  has_room(it, rest) && ((it->kind < SAVE && it->kind != STEP_3) || it->references != 0);
     }
     return is_fine;
 }

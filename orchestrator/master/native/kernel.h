@@ -9,6 +9,7 @@
 #define HAS_THREADS 1
 #endif
 
+#include "../../fmi/binding/native/step3.h"
 #include "../../fmi/guard/native/floats.h"
 #include "../../fmi/guard/native/guard.h"
 #include "algebraic/solver.h"
@@ -48,12 +49,6 @@ enum {
     TYPE_TEXT = 13, /* of FMI 1.0 or 2.0 */
     TYPE_TEXT_3 = 14,
 };
-
-/* How a step of FMI 3.0 went, beside its status; Python reads it (`Told` in fmi3.py). */
-typedef struct {
-    uint8_t waits, ends, early; /* C's bool, of which an FMU may set any bit */
-    double reached;
-} Told;
 
 /* ------------------------------------------------------------------------------------- the plan, as Python writes it */
 

@@ -120,7 +120,7 @@ static int resolve(Plan *plan, const Py_buffer *buffers, const Operation *operat
 static int are_alike(const Group *a, const Group *b)
 {
     return !b->is_watched && a->kind == b->kind && a->function == b->function && a->count == b->count &&
-           a->period == b->period && a->phase == b->phase && a->is_late == b->is_late &&
+           a->type == b->type && a->period == b->period && a->phase == b->phase && a->is_late == b->is_late &&
            a->is_unseen == b->is_unseen && b->kind < BEGIN &&
            (a->count == 0 || memcmp(a->references, b->references, a->count * sizeof *a->references) == 0);
 }

@@ -8,7 +8,6 @@ from ...fmi import Slave
 from ...fmi.binding import LoadedSlave, call_name
 from ...isolation import IsolatedSlave, may_ride
 from ..coupling import Coupling
-from ..exchange import Exchange
 from .courses import Called
 from .flattening import can_exchange
 
@@ -16,7 +15,7 @@ from .flattening import can_exchange
 def is_able(coupling: Coupling, repeated: Iterable[str]) -> bool:
     """Whether the kernel can do all that is asked for, with instances of which states are saved."""
     exchange, slaves, refresher = coupling.exchange, coupling.slaves, coupling.refresher
-    able = all(_can_be_called(x, exchange) for x in slaves.values())
+    able = all(_can_be_called(x) for x in slaves.values())
     able = able and not any(link.mapping is not None for link in exchange.every_link)
     able = able and all(can_be_restored(slaves[name]) for name in repeated)
     continued = coupling.extrapolator.courses if coupling.extrapolator else ()
@@ -25,11 +24,10 @@ def is_able(coupling: Coupling, repeated: Iterable[str]) -> bool:
     return able and can_exchange(exchange)
 
 
-def _can_be_called(slave: Slave, exchange: Exchange) -> bool:
-    """Whether the kernel can call an instance, and set and read what is exchanged."""
+def _can_be_called(slave: Slave) -> bool:
+    """Whether the kernel can call an instance."""
     if isinstance(slave, IsolatedSlave):
-        given = [part.channel for part in exchange.yields[slave.name]]
-        return may_ride(slave, [*(feed.channel for feed in exchange.feeds[slave.name]), *given])
+        return may_ride(slave)
     return isinstance(slave, LoadedSlave) and not slave.rolls_back
 
 

@@ -12,8 +12,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...fmi import Channel
-from ...fmi.binding import ElementsChannel, Fmi1Slave, Fmi3Slave, FmuChannel, MixedChannel
-from ...isolation import IsolatedChannel
+from ...fmi.binding import FmuChannel, calls_of
+from ...isolation import IsolatedChannel, IsolatedPart
 from ..exchange import Exchange, Feed
 from ..observer import Rows
 from .layout import AS_IT_IS, ROUNDED_UP, TRUE_ABOVE
@@ -36,7 +36,7 @@ _BITS = {SIGNED_BITS: np.int64, UNSIGNED_BITS: np.uint64}
 Entry = tuple[int, int, int, float, float, int, float, int]
 """A value's place, age and change; scale, offset, threshold and what that does; what the value is."""
 
-Parts = list[tuple[FmuChannel | IsolatedChannel, Sequence[int]]]
+Parts = Sequence[tuple[FmuChannel | IsolatedPart, Sequence[int]]]
 
 
 class Wide:
@@ -131,28 +131,16 @@ def noted(entry: Entry, place: int) -> Entry:
 
 def parts_of(channel: Channel) -> Parts | None:
     """The calls behind a channel, each with the places of its values in it; None where there are others."""
-    if isinstance(channel, FmuChannel):
-        return [(channel, range(len(channel.names)))]
-    if isinstance(channel, IsolatedChannel):
-        return [(channel, range(len(channel.references)))]
-    if isinstance(channel, ElementsChannel):
-        return parts_of(channel.channel) if channel.is_whole else None
-    found: Parts = []
-    for own, places in channel.parts if isinstance(channel, MixedChannel) else ():
-        inner = parts_of(own)
-        if inner is None:
-            return None
-        found += [(each, [places[k] for k in own_places]) for each, own_places in inner]
-    return found or None
+    return channel.parts if isinstance(channel, IsolatedChannel) else calls_of(channel)
 
 
-def type_of(slave: object, kind: str) -> int:
-    """The kernel's number for a type of an instance's; 0 where it is called as FMI 2.0 has it."""
+def type_of(version: str, kind: str) -> int:
+    """The kernel's number for a type in a version of FMI; 0 where it is called as FMI 2.0 has it."""
     if kind == "String":
-        return _TEXT_3 if isinstance(slave, Fmi3Slave) else _TEXT
-    if isinstance(slave, Fmi3Slave):
+        return _TEXT_3 if version == "3.0" else _TEXT
+    if version == "3.0":
         return TYPES[kind]
-    return _BYTE if isinstance(slave, Fmi1Slave) and kind == "Boolean" else 0
+    return _BYTE if version == "1.0" and kind == "Boolean" else 0
 
 
 def can_exchange(exchange: Exchange) -> bool:

@@ -9,8 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...fmi import Channel, Type
-from ...fmi.binding import ElementsChannel, Fmi3Slave, LoadedSlave, is_watched
-from ...isolation import IsolatedChannel, Ride
+from ...fmi.binding import ElementsChannel, Fmi3Slave, LoadedSlave, arrays_in, is_watched
+from ...isolation import IsolatedPart, Ride
 from ..algebraic import LoopSolver
 from ..algorithms import Batch, Iteration, Operation, Repeated
 from ..coupling import Coupling
@@ -365,18 +365,17 @@ class Plan:
     ) -> list[tuple[int, str]]:
         """Add operations on a channel, each on one of its parts, or the one of this index; the channels and calls."""
         made = []
-        if isinstance(channel, ElementsChannel):
-            self.channels.append(channel)
+        self.channels += arrays_in(channel)
         for own, places in parts_of(channel) or ():
             call = own.calls[kind not in (Kind.SET, Kind.EXTEND)]
             made.append((len(self._channels), call))
             self.add_operation(kind, len(self._channels) if index is None else index, (slave, call), due, late=late)
             if isinstance(slave, Ride):
-                assert isinstance(own, IsolatedChannel)
+                assert isinstance(own, IsolatedPart)
                 addresses = slave.add(own, is_get=kind not in (Kind.SET, Kind.EXTEND))
             else:
                 addresses = slave.addresses(call)
-            what = len(self._entries), len(places), int(is_real), type_of(slave, own.kind)
+            what = len(self._entries), len(places), int(is_real), type_of(slave.interface.version, own.kind)
             self._channels.append((*addresses, *what, len(own.references)))
             self._entries += [entries[k] for k in places]
             self._references += [*own.references, *[NONE] * (len(places) - len(own.references))]

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import Protocol
 
-from ...fmi.binding import Fmi3Slave, whole_arrays
+from ...fmi.binding import whole_arrays
 from ...isolation import Ride
 from ..algebraic import NUMBERS, LoopSolver
 from ..algorithms import HEAD
@@ -124,7 +124,9 @@ def _add_solution(plan: Growing, loops: LoopSolver) -> None:
         counts = len(knowns[slave.name]), len(rows), len(asked)
         if function:
             plan.add_operation(Kind.ASK, len(algebra.parties), (slave, slave.DERIVE), (1, 0))
-        algebra.parties.append((function, component, isinstance(slave, Fmi3Slave), *own, len(algebra.terms), *counts))
+        algebra.parties.append(
+            (function, component, slave.interface.version == "3.0", *own, len(algebra.terms), *counts)
+        )
         algebra.terms += [*knowns[slave.name], *rows, *asked]
     n, m = len(loops.reals), len(loops.others)
     algebra.solvers.append(

@@ -1,5 +1,6 @@
 /* An FMI 3.0 FMU by hand whose variables are arrays: y = 2 u (2 by 3), a number of every element of which is set or read at
-   once; z = k . u[1,:] + der; on, off: two booleans and their opposites; words and their copies; n and m: whole numbers.
+   once; z = k . u[1,:] + der; on, off: two booleans and their opposites; words and their copies; n and m: whole numbers; w:
+   a whole number of another type, of which nothing comes.
    What is set or read in part, with another number of values than the arrays have, is refused. */
 
 #include <stdbool.h>
@@ -10,6 +11,7 @@ typedef void (*Logger)(void *environment, int status, const char *category, cons
 typedef struct {
     double u[6], k[3];
     int n[2];
+    long long w;
     bool on[2];
     char words[2][100];
 } Arrays;
@@ -99,6 +101,12 @@ int fmi3GetFloat64(void *c, const unsigned *vr, size_t count, double *values, si
         }                                                                                                              \
         return size == 2 * count ? 0 : 3;                                                                              \
     }
+int fmi3SetInt64(void *c, const unsigned *vr, size_t count, const long long *values, size_t size)
+{
+    ((Arrays *)c)->w = values[0];
+    return count == 1 && size == 1 && vr[0] == 11 ? 0 : 3;
+}
+
 PAIRS(Int32, int, n, -value)
 PAIRS(Boolean, bool, on, !value)
 

@@ -1,7 +1,8 @@
 /* An FMI 1.0 FMU by hand: der(x) = u - x, solved exactly over a step, and an input and an output of every type, which
    gives what the input was a step ago. It insists on the order of calls. From t = 5 s on its parameter `mode` rules:
    1 to 5 and 9: the step gives that status (9: -1); 6: a step takes 0.05 s at most, and says how far it came; 7: a step of
-   more than 0.05 s is refused, and the next must be told to be a repetition; 10: numbers are rounded upward; 20 + s: the status of getting reals, 30 + s: of getting texts, 40 + s: of setting them. At any
+   more than 0.05 s is refused, and the next must be told to be a repetition; 10: numbers are rounded upward; 14, 15, 16: the step crashes, hangs, ends the process;
+   17, 18: reading, setting booleans crashes; 20 + s: the status of getting reals, 30 + s: of getting texts, 40 + s: of setting them. At any
    time 90: initialization fails. Value references: reals 0 u, 1 x, 2 y = x + gain * u, 3 gain, 4 guess, 5 pi, 6 twice the
    gain, 7 switch; whole numbers 0 n, 1 m, 2 gear, 3 shown, 4 mode; booleans 0 on, 1 off; texts 0 word, 1 said. */
 
@@ -41,6 +42,20 @@ static int tell(First *s, int status, const char *text)
 static int mode(const First *s)
 {
     return s->time >= 5.0 ? s->whole[4] : 0;
+}
+
+/* A deed of the mode in a call: in the step, in reading or in setting booleans, which begin there. */
+static void misbehave(const First *s, int begin)
+{
+    int how = mode(s);
+    if (how == 14 + begin) {
+        *(volatile int *)0 = 1;
+    }
+    if (how == 16 && begin == 0) {
+        exit(7);
+    }
+    for (volatile int k = 0; how == 15 && begin == 0; k++) {
+    }
 }
 
 void *EXPORT(fmiInstantiateSlave)(const char *name, const char *guid, const char *place, const char *mime, double timeout,
@@ -137,6 +152,7 @@ int EXPORT(fmiSetBoolean)(void *c, const unsigned *vr, size_t count, const char 
     for (size_t k = 0; k < count; k++) {
         ((First *)c)->flags[vr[k]] = values[k];
     }
+    misbehave(c, 4);
     return 0;
 }
 
@@ -145,6 +161,7 @@ int EXPORT(fmiGetBoolean)(void *c, const unsigned *vr, size_t count, char *value
     for (size_t k = 0; k < count; k++) {
         values[k] = ((First *)c)->flags[vr[k]] ? TRUE : 0;
     }
+    misbehave(c, 3);
     return 0;
 }
 
@@ -181,6 +198,7 @@ int EXPORT(fmiDoStep)(void *c, double time, double step, char is_new)
         return tell(s, 3, "a step that was not expected");
     }
     s->refused = 0;
+    misbehave(s, 0);
     if (how == 6 && step > 0.05) {
         step = 0.05;
         status = 2;

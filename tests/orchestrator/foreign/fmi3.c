@@ -2,8 +2,8 @@
    an input and an output of every type, which gives what the input was a step ago. From t = 5 s on its parameter `mode`
    rules: 1 to 5 and 9: the step gives that status (9: -1); 6: a step takes 0.05 s at most, and is discarded there; 7: a step
    of more than 0.05 s is refused; 8: the simulation shall end after half a step; 10: numbers are rounded upward; 11: half of a step of more than 0.05 s is
-   taken, and that is told as an early return; 12: y is not a number; 20 + s: the status of getting reals. At any time 40:
-   initialization fails. Value references are ten times the place of a type below plus 0 for its input and 1 for its output;
+   taken, and that is told as an early return; 12: y is not a number; 13: setting fails; 14, 15, 16: the step crashes, hangs, ends the
+   process; 17, 18: reading, setting a UInt16 crashes; 20 + s: the status of getting reals. At any time 40: initialization fails. Value references are ten times the place of a type below plus 0 for its input and 1 for its output;
    Float64: 0 time, 1 u, 2 x, 3 y = x + gain * u, 4 gain, 5 der(x); Int32: 62 mode; Int64: 82 gear, 83 shown.
    With -DEVENTS=1 it insists on its event mode: a step ends early at each third of a second, where an event waits whose
    discrete states are updated twice. With -DANY_ORDER it enters and leaves that mode whenever it is told to,
@@ -57,6 +57,21 @@ static int tell(Third *s, int status, const char *text)
 static int mode(const Third *s)
 {
     return s->now.time >= 5.0 ? s->now.i32[2] : 0;
+}
+
+/* A deed of the mode in a call. */
+static void misbehave(const Third *s, const char *call)
+{
+    int how = mode(s);
+    if ((how == 14 && !strcmp(call, "step")) || (how == 17 && !strcmp(call, "GetUInt16")) ||
+        (how == 18 && !strcmp(call, "SetUInt16"))) {
+        *(volatile int *)0 = 1;
+    }
+    if (how == 16 && !strcmp(call, "step")) {
+        exit(7);
+    }
+    for (volatile int k = 0; how == 15 && !strcmp(call, "step"); k++) {
+    }
 }
 
 void *fmi3InstantiateCoSimulation(const char *name, const char *token, const char *resources, bool visible, bool logging,
@@ -170,6 +185,7 @@ static int update(Third *s)
 #define EXCHANGE(name, type, kept)                                                                                     \
     int fmi3Set##name(void *c, const unsigned *vr, size_t count, const type *values, size_t size)                      \
     {                                                                                                                  \
+        misbehave(c, "Set" #name);                                                                                     \
         for (size_t k = 0; k < count; k++) {                                                                           \
             ((Third *)c)->now.kept[vr[k] % 10] = values[k];                                                            \
         }                                                                                                              \
@@ -178,6 +194,7 @@ static int update(Third *s)
     int fmi3Get##name(void *c, const unsigned *vr, size_t count, type *values, size_t size)                            \
     {                                                                                                                  \
         int status = sizeof(type) == sizeof(double) && vr[0] < 10 ? update(c) : 0;                                     \
+        misbehave(c, "Get" #name);                                                                                     \
         for (size_t k = 0; k < count; k++) {                                                                           \
             values[k] = ((Third *)c)->now.kept[vr[k] % 10];                                                            \
         }                                                                                                              \
@@ -237,6 +254,7 @@ int fmi3DoStep(void *c, double time, double step, bool final, bool *event, bool 
     if (s->in_events || s->waits) {
         return tell(s, 3, "a step without the event mode");
     }
+    misbehave(s, "step");
     double until = (floor(3.0 * time + 1e-9) + 1.0) / 3.0 - time;
     s->waits = EVENTS && until <= step + 1e-9;
     *event = s->waits || !EVENTS; /* of no meaning without an event mode */

@@ -37,4 +37,4 @@ def test_two_threads_hand_over_whole_values_and_none_is_lost(tmp_path, sanitizer
     compiled([*sources, "-lm"], *flags, "-o", str(program))
     for spin in ("0", "50000"):
         done = subprocess.run([program, spin], check=False, capture_output=True, text=True, timeout=60)
-        assert (done.returncode, done.stdout, done.stderr) == (0, "20000 20000 3\n", "")
+        assert (done.returncode, done.stdout, done.stderr) == (0, "20000 20000 1001\n", "")

@@ -106,9 +106,10 @@ def test_what_begins_no_frame_is_not_waited_for(doors, begun):
         other.receive()
 
 
-def test_notes_tell_call_and_channel_apart():
-    assert messages.note("set", 300) & 0xFF == messages.NUMBERS["set"]
-    assert messages.note("set", 300) >> 8 == 300
+def test_notes_tell_call_channel_and_part_apart():
+    assert messages.noted(messages.note("set", 300, 7)) == ("set", 300, 7)
+    assert messages.noted(messages.note("terminate")) == ("terminate", 0, 0)
+    assert messages.noted(-1)[0] == messages.noted(0)[0] == ""
     assert len({messages.note(call) for call in messages.CALLS}) == len(messages.CALLS)
 
 

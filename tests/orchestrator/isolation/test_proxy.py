@@ -3,9 +3,11 @@
 import os
 import random
 import sys
+from ctypes import sizeof
 
 import pytest
 from railcosim.orchestrator.errors import FmuError
+from railcosim.orchestrator.fmi.binding import calls_of
 from railcosim.orchestrator.isolation import choice as isolated
 from railcosim.orchestrator.isolation import launch
 
@@ -182,6 +184,35 @@ def test_whole_numbers_that_need_64_bits_without_sign(apart, by_hand, begin):
     channel = it.channel("Integer", names)
     channel.set([2**64 - 1] * len(names))
     assert channel.get() == [2**64 - 1] * len(names)
+
+
+KINDS = {"y u x": "Real", "m n": "Integer", "on off": "Boolean", "minus_x": "Real", "u[1,2] y[1,1]": "Real"}
+NUMBERS = "f i8 ui8 i16 ui16 i32 ui32 i64 ui64 gear o8 mode"
+
+
+@pytest.mark.parametrize("version", ["1", "2", "3", "arrays"])
+def test_the_master_knows_which_calls_stand_behind_a_channel(apart, alone, request, version):
+    """As an FMU that is loaded has them: by type, with arrays as a whole, or not at all."""
+    path = {"2": "odd", "arrays": "arrays"}.get(version, "by_hand")
+    make = request.getfixturevalue(path)
+    path = make if version == "2" else make() if version == "arrays" else make(int(version))
+    here, there = alone(path), apart(path=path)
+    known = here.interface.variables
+    wanted = KINDS | {NUMBERS: "Integer", "n[1] n[2] w m[2] m[1]": "Integer", "m[1] m[2] w n[1] n[2]": "Integer"}
+    checked = set()
+    for text, kind in wanted.items():
+        names = [name for name in text.split() if name in known]
+        if not names or (version == "1" and text == NUMBERS):
+            continue
+        calls, parts = calls_of(here.channel(kind, names)), there.channel(kind, names).parts
+        checked.add(text)
+        assert (calls is None) == (parts is None) == (text in ("minus_x", "u[1,2] y[1,1]", "n[1] n[2] w m[2] m[1]"))
+        for (call, places), (part, own_places) in zip(calls or (), parts or (), strict=True):
+            assert (call.kind, call.calls, list(places)) == (part.kind, part.calls, list(own_places))
+            assert list(call.references) == part.references
+            assert part.place[1:] == (len(call.names), sizeof(here.TYPES[call.kind][1]))
+    assert len(checked) >= 3
+    assert there.channel("String", ["word"] if version in "13" else []).parts is None
 
 
 def test_python_fmus(apart, components, workspace):

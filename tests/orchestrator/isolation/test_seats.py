@@ -229,10 +229,10 @@ def test_a_crash_is_where_it_has_come_back_to(shared, at_once):
     ride, u = it.ride(), it.channel("Real", ["u"])
     step, (put, rider), (save, restore, _, state) = (
         ride.add_step(final=False),
-        ride.add(u, is_get=False),
+        ride.add(u.parts[0][0], is_get=False),
         ride.add_state(0, at_once=at_once),
     )
-    ride.add(it.channel("Real", ["x"]), is_get=True)
+    ride.add(it.channel("Real", ["x"]).parts[0][0], is_get=True)
     ride.board()
     ride.begin()
     pointer, handle, value = ctypes.c_void_p, ctypes.c_void_p(), ctypes.c_double(1.0)

@@ -12,7 +12,7 @@ import fmpy
 import numpy as np
 import pytest
 from railcosim.orchestrator.errors import RunError
-from railcosim.orchestrator.isolation import instantiate, process
+from railcosim.orchestrator.isolation import HAS_LANES, instantiate, isolate, process
 from railcosim.orchestrator.master import compiled
 from railcosim.orchestrator.master.compiled import CompiledLoop
 from railcosim.orchestrator.master.loop import Master
@@ -93,6 +93,25 @@ def both(monkeypatch, used):
         assert fast.status == slow.status
         assert _contents(fast) == _contents(slow)
         return fast
+
+    return go
+
+
+@pytest.fixture(params=["here", "isolated"])
+def anywhere(request, both, in_time, nothing_left):
+    """As `both`, and with all instances isolated, where it is the same as without that."""
+    if request.param == "here":
+        return both
+    if not HAS_LANES:
+        pytest.skip("there are no lanes here")
+
+    def go(system, **how):
+        apart = both(isolate(system, ["together"]), **how)
+        known = _attempt(system, **how)
+        assert _described(apart.error, log=True) == _described(known.error, log=True)
+        assert apart.status == known.status
+        assert _contents(apart) == _contents(known)
+        return apart
 
     return go
 
@@ -181,6 +200,65 @@ def arguments(workspace, odd, ring, instantiated):
     yield dict(zip(NAMES.split(), given, strict=True))
     for slave in master.slaves.values():
         slave.free()
+
+
+def _lines(version, negated):
+    """What takes texts out of fmi1.xml or fmi3.xml, and there what is another's with its sign changed."""
+    if version == 3:
+        yield '<String name="said" valueReference="111" causality="output"/>'
+        yield '<Binary name="blob" valueReference="121" causality="output"/>'
+        for reference in (111, 121):
+            yield from (f'    <{kind} valueReference="{reference}"/>\n' for kind in ("Output", "InitialUnknown"))
+        return
+    lines = {
+        "word": 'causality="input" variability="discrete"><String start=""/>',
+        "said": 'causality="output" variability="discrete"><String/>',
+        "minus_x": 'causality="output" alias="negatedAlias"><Real unit="m"/>',
+        "neither": 'causality="output" variability="discrete" alias="negatedAlias"><Boolean/>',
+    }
+    references = {"word": 0, "said": 1, "minus_x": 1, "neither": 1}
+    for n in ("word", "said") if negated else lines:
+        yield f'<ScalarVariable name="{n}" valueReference="{references[n]}" {lines[n]}</ScalarVariable>'
+
+
+@pytest.fixture
+def plainly(by_hand):
+    """The FMU of fmi1.c or fmi3.c without texts, nor what is the negative of another variable unless it is wanted."""
+
+    def pack(version, *changes, negated=False, **how):
+        return str(by_hand(version, *((line, "") for line in _lines(version, negated)), *changes, **how))
+
+    return pack
+
+
+@pytest.fixture
+def first(plainly):
+    return plainly(1)
+
+
+@pytest.fixture
+def third(plainly):
+    return plainly(3)
+
+
+@pytest.fixture
+def lagging(plainly):
+    """Makes systems of two FMUs of fmi1.c or fmi3.c in a cycle, in which b has what a gives in other types as well."""
+    typed = {1: "m n off on shown gear", 3: "g f o8 i8 uo16 ui16 o64 i64 shown gear off on"}
+
+    def make(version, **how):
+        system = System(**{"stop_time": 8.0, "step": 0.25, "tolerance": 1e-3} | how)
+        path = plainly(version)
+        system.add("a", path, x=2.0)
+        system.add("b", path)
+        system.connect("a.x", "b.u", scale=0.5)
+        system.connect("b.x", "a.u", scale=-1.0, offset=2.0)
+        names = typed[version].split()
+        for source, target in zip(names[::2], names[1::2], strict=True):
+            system.connect(f"a.{source}", f"b.{target}")
+        return system
+
+    return make
 
 
 @pytest.fixture

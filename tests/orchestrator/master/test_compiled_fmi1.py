@@ -14,25 +14,8 @@ pytestmark = [
     pytest.mark.skipif(shutil.which("gcc") is None, reason="FMUs by hand need gcc"),
 ]
 ALGORITHMS = pytest.mark.parametrize("algorithm", ["gauss-seidel", "jacobi"])
-
-
-def without(*names):
-    """What takes variables from the description of fmi1.xml: texts, and what is another's with its sign changed."""
-    lines = {
-        "word": 'causality="input" variability="discrete"><String start=""/>',
-        "said": 'causality="output" variability="discrete"><String/>',
-        "minus_x": 'causality="output" alias="negatedAlias"><Real unit="m"/>',
-        "neither": 'causality="output" variability="discrete" alias="negatedAlias"><Boolean/>',
-    }
-    references = {"word": 0, "said": 1, "minus_x": 1, "neither": 1}
-    return [
-        (f'<ScalarVariable name="{n}" valueReference="{references[n]}" {lines[n]}</ScalarVariable>', "") for n in names
-    ]
-
-
-@pytest.fixture
-def first(by_hand):
-    return str(by_hand(1, *without("word", "said", "minus_x", "neither")))
+MANY = pytest.mark.parametrize("anywhere", ["here", pytest.param("isolated", marks=pytest.mark.long)], indirect=True)
+"""Of many cases those in processes of their own are in the long tier."""
 
 
 def two_of(model, **how):
@@ -47,7 +30,7 @@ def two_of(model, **how):
 
 @ALGORITHMS
 @pytest.mark.parametrize("delay", [0, 2])
-def test_every_type(both, first, odd, algorithm, delay):
+def test_every_type(anywhere, first, odd, algorithm, delay):
     """Truth values are a byte each here, of which any bit is true; one goes to an FMU of FMI 2.0 and comes back."""
     system = two_of(first, algorithm=algorithm)
     system.add("odd", odd)
@@ -58,34 +41,30 @@ def test_every_type(both, first, odd, algorithm, delay):
     system.connect("b.off", "odd.m")
     system.connect("odd.n", "a.on", threshold=0.5)
     system.events.append(Event("a.n", "set", 3.0, value=-9))
-    result = both(system)
+    result = anywhere(system)
     assert [result[name][-1] for name in ("a.m", "b.m", "b.shown")] == [-8.0, -7.0, 3.0]
     assert set(result["a.off"]) == {0.0, 1.0} == set(result["b.off"])
 
 
+@MANY
 @ALGORITHMS
 @pytest.mark.parametrize("mode", [1, 3, 4, 5, 6, 7, 9, 23])
-def test_steps_that_are_taken_in_parts_or_fail(both, first, algorithm, mode):
+def test_steps_that_are_taken_in_parts_or_fail(anywhere, first, algorithm, mode):
     """Also by one that wants to be told that a shorter step repeats a longer one."""
     system = two_of(first, algorithm=algorithm)
     system.instances["a"].start["mode"] = mode
-    assert both(system).status == ("completed" if mode in {1, 6, 7} else "failed")
+    assert anywhere(system).status == ("completed" if mode in {1, 6, 7} else "failed")
 
 
 @pytest.mark.parametrize("order", [1, 2])
-def test_inputs_that_go_on(both, first, order):
-    both(two_of(first, extrapolation=order))
+def test_inputs_that_go_on(anywhere, first, order):
+    anywhere(two_of(first, extrapolation=order))
 
 
 @pytest.mark.parametrize("version", [1, 3])
-def test_numbers_that_are_rounded_otherwise_are_those_of_nobody_else(by_hand, odd, both, version):
+def test_numbers_that_are_rounded_otherwise_are_those_of_nobody_else(plainly, odd, both, version):
     """It is put back after the very call, and told; whatever version of FMI it is that did it."""
-    texts = without("word", "said", "minus_x", "neither") if version == 1 else [
-        ('<String name="said" valueReference="111" causality="output"/>', ""),
-        ('<Binary name="blob" valueReference="121" causality="output"/>', ""),
-        *((f'    <{kind} valueReference="{k}"/>\n', "") for kind in ("Output", "InitialUnknown") for k in (111, 121)),
-    ]  # fmt: skip
-    system = two_of(str(by_hand(version, *texts)))
+    system = two_of(plainly(version))
     system.add("odd", odd)
     system.connect("a.x", "odd.u", scale=0.1)
     undisturbed = both(system)
@@ -95,9 +74,9 @@ def test_numbers_that_are_rounded_otherwise_are_those_of_nobody_else(by_hand, od
     assert (disturbed["odd.x"] == undisturbed["odd.x"]).all()
 
 
-def test_what_is_left_to_python(by_hand, used):
+def test_what_is_left_to_python(plainly, used):
     """What is the negative of another variable."""
-    assert run(two_of(str(by_hand(1, *without("word", "said"))))).status == "completed"
+    assert run(two_of(plainly(1, negated=True))).status == "completed"
     assert not used
 
 

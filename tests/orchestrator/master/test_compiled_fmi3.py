@@ -6,6 +6,7 @@ import sys
 import numpy as np
 import pytest
 from railcosim.orchestrator.fmi.binding import MixedChannel
+from railcosim.orchestrator.isolation import isolate
 from railcosim.orchestrator.master import compiled
 from railcosim.orchestrator.master.plans.flattening import parts_of
 from railcosim.orchestrator.run.execution import run
@@ -17,20 +18,11 @@ pytestmark = [
     pytest.mark.skipif(shutil.which("gcc") is None, reason="FMUs by hand need gcc"),
 ]
 ALGORITHMS = pytest.mark.parametrize("algorithm", ["gauss-seidel", "jacobi"])
-TEXTS = (
-    ('<String name="said" valueReference="111" causality="output"/>', ""),
-    ('<Binary name="blob" valueReference="121" causality="output"/>', ""),
-    *((f'    <{kind} valueReference="{k}"/>\n', "") for kind in ("Output", "InitialUnknown") for k in (111, 121)),
-)
-"""What takes from the FMU of fmi3.c the outputs that are no numbers."""
+MANY = pytest.mark.parametrize("anywhere", ["here", pytest.param("isolated", marks=pytest.mark.long)], indirect=True)
+"""Of many cases those in processes of their own are in the long tier."""
 WIDTHS = ("8", "16", "32", "64")
 BEYOND = 2**53 + 1
 """The first whole number that no double is."""
-
-
-@pytest.fixture
-def third(by_hand):
-    return str(by_hand(3, *TEXTS))
 
 
 @pytest.fixture
@@ -46,7 +38,7 @@ def plain(arrays):
 
 @ALGORITHMS
 @pytest.mark.parametrize("delay", [0, 2])
-def test_every_type(both, third, odd, algorithm, delay):
+def test_every_type(anywhere, third, odd, algorithm, delay):
     """The limits of all types go from one to the next, and to an FMU of FMI 2.0; two swing around each other."""
     limits = {}
     for bits in map(int, WIDTHS):
@@ -68,7 +60,7 @@ def test_every_type(both, third, odd, algorithm, delay):
     system.connect("high.x", "low.u", delay=delay)
     system.connect("low.o16", "odd.m")
     system.connect("high.uo32", "odd.u", delay=delay)
-    result = both(system)
+    result = anywhere(system)
     for name, ends in limits.items():
         shown = name.replace("i", "o")
         assert tuple(result[f"{of}.{shown}"][-1] for of in "pq") == tuple(map(float, ends))
@@ -77,9 +69,10 @@ def test_every_type(both, third, odd, algorithm, delay):
     assert (result["odd.n"][-1], result["odd.x"][-1] > 1e9) == (-(2**15) + 1, True)
 
 
+@MANY
 @ALGORITHMS
 @pytest.mark.parametrize("number", [BEYOND, -BEYOND, 2**63 - 1, 2**63, 2**64 - 1])
-def test_whole_numbers_that_no_double_is(both, third, odd, algorithm, number):
+def test_whole_numbers_that_no_double_is(anywhere, third, odd, algorithm, number):
     """To the bit from one to the other, delayed and not; to a Real, a truth value and C's int as Python converts it."""
     system = System(stop_time=2.0, step=0.25, algorithm=algorithm, order=["a", "b", "c", "odd"])
     wide = "i64" if -(2**63) <= number < 2**63 else "ui64"
@@ -97,12 +90,12 @@ def test_whole_numbers_that_no_double_is(both, third, odd, algorithm, number):
     system.connect(f"a.{shown}", "b.on", threshold=0.5)
     system.connect(f"a.{shown}", "c.i16", scale=1e-16, threshold=0.5)
     system.connect(f"a.{shown}", "b.f", scale=-1.0)
-    result = both(system)
+    result = anywhere(system)
     assert result[f"c.{shown}"][-1] == float(number)
 
 
 @ALGORITHMS
-def test_wide_numbers_that_are_small(both, third, algorithm):
+def test_wide_numbers_that_are_small(anywhere, third, algorithm):
     """Where another type holds them they go there, scaled or not."""
     system = System(stop_time=1.0, step=0.25, algorithm=algorithm, order=["a", "b", "c"])
     system.add("a", third, i64=6, ui64=7)
@@ -113,7 +106,7 @@ def test_wide_numbers_that_are_small(both, third, algorithm):
         ("o64", "c.i64", {"scale": 0.5, "threshold": 0.5}), ("uo64", "c.ui64", {"scale": 2.0, "threshold": 0.5}),
     ):  # fmt: skip
         system.connect(f"a.{source}", target, **how)
-    result = both(system)
+    result = anywhere(system)
     shown = ("b.uo64", "b.o64", "b.o16", "b.uo16", "c.o64", "c.uo64")
     assert [result[name][-1] for name in shown] == [6.0, 7.0, 6.0, 7.0, 3.0, 14.0]
 
@@ -137,6 +130,7 @@ def test_the_bits_themselves(third, instantiated, used):
         slave.free()
 
 
+@MANY
 @ALGORITHMS
 @pytest.mark.parametrize(
     ("source", "target", "number"),
@@ -151,66 +145,67 @@ def test_the_bits_themselves(third, instantiated, used):
         ("ui64", "i64", 2**63),
     ],
 )
-def test_a_number_that_the_type_does_not_hold(both, third, algorithm, *, source, target, number):
+def test_a_number_that_the_type_does_not_hold(anywhere, third, algorithm, *, source, target, number):
     """It stops both with the same sentence."""
     system = System(stop_time=2.0, step=0.25, algorithm=algorithm, order=["a", "b"])
     system.add("a", third, **{source: 7})
     system.add("b", third)
     system.connect(f"a.{source.replace('i', 'o')}", f"b.{target}")
     system.events.append(Event(f"a.{source}", "set", 0.5, value=number))
-    result = both(system)
+    result = anywhere(system)
     assert result.status == "failed"
     assert f"'{target}' cannot become {number}: its type" in str(result.error)
 
 
 @pytest.mark.parametrize(("target", "sign"), [("i64", 1.0), ("i64", -1.0), ("ui64", -1.0), ("ui64", 1.0), ("i8", 1.0)])
-def test_a_real_that_no_whole_number_holds(both, third, target, sign):
+def test_a_real_that_no_whole_number_holds(anywhere, third, target, sign):
     system = System(stop_time=2.0, step=0.25, order=["a", "b"])
     system.add("a", third, gain=1e30)
     system.add("b", third)
     system.connect("a.y", f"b.{target}", threshold=0.5)
     system.events.append(Event("a.u", "set", 0.75, value=sign))
-    result = both(system)
+    result = anywhere(system)
     assert f"'{target}' cannot become" in str(result.error)
 
 
-def test_feed_through_that_is_refreshed(both, third):
+def test_feed_through_that_is_refreshed(anywhere, third):
     """y is x + gain * u: of the point itself."""
     system = System(stop_time=2.0, step=0.25, refresh=True)
     system.add("a", third, x=2.0)
     system.add("b", third)
     system.connect("a.x", "b.u", scale=2.0)
     system.connect("a.o32", "b.i32")
-    result = both(system)
+    result = anywhere(system)
     assert result["b.y"] == pytest.approx(result["b.x"] + 2.0 * result["a.x"])
 
 
-def test_bits_that_are_no_number_agree(both, third):
+def test_bits_that_are_no_number_agree(anywhere, third):
     """-1 in 64 bits is no number as a double, but the same from one round of a circle of feed-through to the next."""
     system = System(stop_time=2.0, step=0.25, refresh=True)
     for name, other in ("ab", "ba"):
         system.add(name, third, gain=0.5)
         system.connect(f"{other}.y", f"{name}.u", scale=0.0, offset=1.0)
     system.add("c", third, i64=-1)
-    result = both(system)
+    result = anywhere(system)
     assert result["c.o64"][-1] == -1.0
     assert result["a.y"] == pytest.approx(result["a.x"] + 0.5)
 
 
+@MANY
 @ALGORITHMS
 @pytest.mark.parametrize("mode", [3, 6, 7, 8, 9, 11, 12, 13, 23])
-def test_steps_that_are_not_over_or_fail(both, third, algorithm, mode):
+def test_steps_that_are_not_over_or_fail(anywhere, third, algorithm, mode):
     """Discarded, returned from early, ended with the simulation, failed, another status, NaN, a failed set and get."""
     system = System(stop_time=6.0, step=0.25, algorithm=algorithm)
     system.add("a", third, mode=mode)
     system.add("b", third)
     system.connect("a.x", "b.u")
     system.connect("b.x", "a.u", scale=-1.0, offset=2.0)
-    result = both(system)
+    result = anywhere(system)
     assert result.status == {6: "completed", 7: "completed", 8: "terminated", 11: "completed"}.get(mode, "failed")
 
 
-def test_rates_and_events(both, third):
+def test_rates_and_events(anywhere, third):
     system = System(stop_time=3.0, step=0.25)
     system.add("a", third, x=2.0)
     system.add("b", third)
@@ -223,14 +218,21 @@ def test_rates_and_events(both, third):
         Event("b.u", "bias", 2.0, value=1.0),
         Event("a.i32", "set", 1.0, value=-4),
     ]
-    result = both(system)
+    result = anywhere(system)
     assert result["a.x"][4] == 3.0
     assert result["b.o32"][-1] == -4
 
 
-@pytest.mark.parametrize("threads", [1, 2])
-def test_arrays(both, plain, threads):
+def test_arrays(anywhere, plain):
     """Whole arrays are handed over with one reference each; the ends are numbers of all types."""
+    arrays_of(plain, anywhere)
+
+
+def test_arrays_and_threads(both, plain):
+    arrays_of(plain, both, threads=2)
+
+
+def arrays_of(plain, compared, **how):
     system = System(stop_time=1.0, step=0.25, algorithm="jacobi")
     for name in "abc":
         system.add(name, plain, u=[[1.0, 2.0, 3.0], [4.0, 5.0, 6.0]])
@@ -238,23 +240,48 @@ def test_arrays(both, plain, threads):
         system.connect(f"{one}.y", f"{other}.u", scale=0.5)
         system.connect(f"{one}.m", f"{other}.n")
         system.connect(f"{one}.off", f"{other}.on")
-    result = both(system, threads=threads)
+    result = compared(system, **how)
     assert [result[f"c.y[{i},{j}]"][-1] for i in (1, 2) for j in (1, 2, 3)] == [2.0, 4.0, 6.0, 8.0, 10.0, 12.0]
 
 
-def test_part_of_an_array_after_all_of_it(plain, instantiated):
-    """The kernel set it past the channels of Python: what stands beside the part is asked of the FMU."""
+@pytest.mark.parametrize("isolated", [[], ["together"]])
+def test_part_of_an_array_after_all_of_it(plain, instantiated, isolated):
+    """It was set past the channels of Python: what stands beside the part is asked of the FMU.
+
+    Also where the array is set with numbers of another type, in two calls.
+    """
     system = System(stop_time=1.0, step=0.25, order=["a", "b"])
-    system.add("a", plain, u=[[1.0, 2.0, 3.0], [4.0, 5.0, 6.0]])
-    system.add("b", plain)
+    for name in "ab":
+        system.add(name, plain)
     system.connect("a.y", "b.u")
-    master = instantiated(system)
-    assert master.run(0.0, 0.25, 4, 1, lambda steps, rows: True)
-    b = master.slaves["b"]
+    system.connect("a.m", "b.n")
+    system.connect("a.m[2]", "b.w")
+    master = instantiated(isolate(system, isolated))
+    a, b = master.slaves.values()
+    assert master.run(0.0, 0.25, 4, 1, lambda steps, rows: True, until=2)
+    a.channel("Real", [f"u[{i},{j}]" for i in (1, 2) for j in (1, 2, 3)]).set([1.0, 2.0, 3.0, 4.0, 5.0, 6.0])
+    a.channel("Integer", ["n[1]", "n[2]"]).set([2, 5])
+    assert master.run(0.0, 0.25, 4, 1, lambda steps, rows: True, first=2)
     b.channel("Real", ["u[1,1]"]).set([0.5])
     assert b.channel("Real", ["y[1,1]", "y[1,2]"]).get() == [1.0, 8.0]
+    b.channel("Integer", ["n[1]"]).set([3])
+    assert b.channel("Integer", ["m[1]", "m[2]"]).get() == [-3, 5]
     for slave in master.slaves.values():
         slave.free()
+
+
+def test_neighbours_whose_like_references_are_of_other_types(anywhere, plainly):
+    """In one call after the other."""
+    texts = ['name="f" valueReference="10"', 'name="i8" valueReference="20"']
+    others = ['name="f" valueReference="20"', 'name="i8" valueReference="10"']
+    system = System(stop_time=1.0, step=0.25, algorithm="jacobi", order=["source", "plain", "other"])
+    system.add("source", plainly(3), f=0.1, i8=-5)
+    system.add("plain", plainly(3, name="plain.fmu"))
+    system.add("other", plainly(3, *zip(texts, others, strict=True), name="other.fmu"))
+    system.connect("source.g", "plain.f")
+    system.connect("source.o8", "other.i8")
+    result = anywhere(system)
+    assert (result["plain.g"][-1], result["other.o8"][-1]) == (np.float32(0.1), -5.0)
 
 
 @pytest.mark.parametrize("what", ["part", "event", "threshold", "binary"])
@@ -275,14 +302,14 @@ def test_what_is_left_to_python(third, plain, by_hand, used, what):
     assert not used
 
 
-def test_types_of_several_widths_one_of_which_is_set_in_part(both, third, used):
+def test_types_of_several_widths_one_of_which_is_set_in_part(anywhere, third, used):
     """Numbers of several widths are one kind here, and several calls for the FMU; each alone goes to the kernel."""
     system = System(stop_time=1.0, step=0.25)
     system.add("a", third, i8=5, ui32=9)
     system.add("b", third)
     system.connect("a.o8", "b.ui32")
     system.connect("a.uo32", "b.i8")
-    result = both(system)
+    result = anywhere(system)
     assert (result["b.uo32"][-1], result["b.o8"][-1]) == (5.0, 9.0)
 
 

@@ -116,6 +116,21 @@ def test_whoever_is_not_waited_for_in_the_loop_is_waited_for_outside(apart, odd,
     assert apart(ring(odd, 2, algorithm=algorithm), "all").status == "completed"
 
 
+@pytest.mark.parametrize(("version", "mode"), [(1, 4), (1, 7), (1, 23), (3, 8), (3, 9), (3, 13), (3, 23)])
+def test_other_versions_of_fmi_that_fail_or_end(apart, lagging, version, mode):
+    """All the rest of what they may do is in the long tests of the compiled loop for either."""
+    system = lagging(version)
+    system.instances["b"].start["mode"] = mode
+    assert apart(system, "b").status == {7: "completed", 8: "terminated"}.get(mode, "failed")
+
+
+@pytest.mark.parametrize(("version", "mode"), [(1, 6), (3, 6), (3, 8), (3, 11)])
+def test_so_it_is_with_steps_of_other_versions_that_are_not_over(apart, lagging, version, mode, hurried):
+    system = lagging(version, algorithm="jacobi")
+    system.instances["b"].start["mode"] = mode
+    assert apart(system, "all").status == ("terminated" if mode == 8 else "completed")
+
+
 def test_an_fmu_that_gives_nothing(apart, compile_c, xml, tmp_path, hurried):
     """Nothing is read of it that would wait for its steps."""
     files = {
@@ -290,6 +305,25 @@ def test_who_hangs_is_waited_for_once(hostile, algorithm):
     assert "did not return from fmi2FreeFMUstate within 4 s" in str(error)
 
 
+DEEDS = {14: ("step", "null"), 15: ("step", "hang"), 16: ("step", "exit"), 17: ("get", "null"), 18: ("set", "null")}
+NAMES = {1: ("fmi{}Boolean", "fmiDoStep"), 3: ("fmi3{}UInt16", "fmi3DoStep")}
+
+
+@pytest.mark.parametrize("mode", DEEDS)
+@pytest.mark.parametrize("version", [1, 3])
+def test_a_process_that_is_lost_by_an_fmu_of_another_version(used, lagging, version, mode):
+    """The very call is named, though several are what sets or reads variables of one type of ours."""
+    system = lagging(version, stop_time=8.0)
+    system.instances["b"] = replace(system.instances["b"], isolate=True, step_timeout=1.0)
+    system.instances["b"].start["mode"] = mode
+    result = attempt(system)
+    assert used
+    where, what = DEEDS[mode]
+    values, step = NAMES[version]
+    call = step if where == "step" else values.format(where.title())
+    assert re.match(rf"b, t = 5 s: {ENDS[what].format(call)}", str(result.error))
+
+
 def test_slow_is_not_hanging_and_what_was_forked_does_not_go_on(hostile):
     for deed in ("slow", "come_back"):
         system = System(stop_time=1.0, step=0.25)
@@ -306,12 +340,16 @@ def test_what_does_not_fit_the_memory_is_refused():
     with pytest.raises(ValueError, match="it does not fit into the memory"):
         lane.Lane(memory, 192, 0, 1.0, 0.0, print)
     road = lane.Lane(memory, 128, 0, 1.0, 0.0, print)
-    for wrong in (lambda: lane.Rider(road, -8, 0), lambda: lane.Rider(road, 0, 0).add(0, 64, 1 << 60)):
+
+    def add(*place):
+        return lane.Rider(road, 0, 0).add(0, *place)
+
+    for wrong in (lambda: lane.Rider(road, -8, 0), lambda: add(64, 1 << 60, 8), lambda: add(64, 1, 9)):
         with pytest.raises(ValueError, match="does not stand in the memory"):
             wrong()
     with pytest.raises(ValueError, match="it does not fit into the memory"):
         lane.serve(memory, 64 * 99, [], 0.0)
-    for operations in (b"1", bytes(56)):
+    for operations in (b"1", bytes(64)):
         with pytest.raises(ValueError, match="do not fit its memory"):
             lane.serve(memory, 128, [(0, operations)], 0.0)
     assert road.done() == 0
@@ -367,6 +405,25 @@ def test_whatever_it_does_in_a_step_that_is_repeated(apart, able, mode, algorith
     """As above, and of derivatives and states."""
     result = apart(coupled(able, algorithm, mode, extrapolation=2 * (80 < mode < 100)), "b")
     assert 4.5 < result.time[-1] <= 8.0
+
+
+THIRD = [(algorithm, mode) for algorithm in ("iterative", "adaptive") for mode in (0, 3, 6, 7, 8, 9, 11, 12, 13, 23)]
+QUICK_3 = ("iterative", 0), ("iterative", 11), ("iterative", 13), ("adaptive", 0), ("adaptive", 8), ("adaptive", 11)
+
+
+@pytest.mark.parametrize(
+    ("algorithm", "mode"),
+    [
+        pytest.param(*each, marks=[pytest.mark.long] * (each not in QUICK_3), id=f"{each[0]}-{each[1]}")
+        for each in THIRD
+    ],
+)
+def test_fmi_3_in_a_step_that_is_repeated(apart, lagging, mode, algorithm):
+    """Whatever it does there, steps that are cut short among it."""
+    system = lagging(3, algorithm=algorithm, stop_time=6.0)
+    system.instances["b"].start["mode"] = mode
+    ends = {0: "completed", 6: "completed", 7: "completed", 8: "terminated", 11: "completed"}
+    assert apart(system, "together" if mode in (0, 11) else "b").status == ends.get(mode, "failed")
 
 
 @pytest.mark.parametrize("algorithm", ["iterative", "adaptive"])

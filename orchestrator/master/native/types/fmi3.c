@@ -7,10 +7,7 @@
 #include "../kernel.h"
 
 #include <math.h>
-#include <stdbool.h>
 
-typedef int (*DoStep)(void *component, double time, double step, bool no_set_state, bool *waits, bool *ends, bool *early,
-                      double *reached);
 typedef int (*Set)(void *component, const unsigned int *references, size_t count, const void *values, size_t value_count);
 typedef int (*Get)(void *component, const unsigned int *references, size_t count, void *values, size_t value_count);
 typedef int (*SetBytes)(void *component, const unsigned int *references, size_t count, const void *values);
@@ -79,15 +76,11 @@ static double taken(int type, const void *from, size_t k)
 
 const Call *take_steps_3(const Hand *hand, const Group *group, double time, double step, int *status)
 {
-    DoStep do_step = (DoStep)group->function;
+    DoStep3 do_step = (DoStep3)group->function;
     for (const Call *call = group->begin; call < group->end; call++) {
-        Told *told = call->told;
-        told->ends = told->early = false;
-        told->reached = NAN;
+        int found;
         note_call(hand, call);
-        int found = do_step(call->component, time, step, !group->is_late, (bool *)&told->waits, (bool *)&told->ends,
-                            (bool *)&told->early, &told->reached);
-        if (is_failure(found) || told->ends || told->early) {
+        if (!take_step_3(do_step, call->component, call->told, time, step, !group->is_late, &found) || is_failure(found)) {
             *status = found;
             return call;
         }

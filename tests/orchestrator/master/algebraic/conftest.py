@@ -46,6 +46,22 @@ def coupled():
 
 
 @pytest.fixture
+def looped_arrays(arrays):
+    """A system of the FMU of arrays3.c, elements of which lead into others."""
+    texts = '<String name="copies" valueReference="10" causality="output"><Dimension start="2"/></String>'
+    system = System(stop_time=1.0, step=0.25, algebraic_loops="solve")
+    path = arrays((texts, ""), ('<Output valueReference="10"/>', ""))
+    system.add("it", str(path), **{f"k[{k}]": 1.0 for k in (1, 2, 3)})
+    system.connect("it.z", "it.u[1,1]", scale=0.5)
+    system.connect("it.z", "it.u[1,2]", scale=-3.0)
+    system.connect("it.y[1,3]", "it.u[1,3]", scale=0.25, offset=0.5)
+    for k in (2, 1):
+        system.connect(f"it.y[2,{k}]", f"it.u[2,{3 - k}]", scale=-0.75 * k, offset=1.0)
+    system.connect("it.y[2,3]", "it.u[2,3]", scale=3.0, offset=1.0)
+    return system
+
+
+@pytest.fixture
 def outcome(contents):
     """What a run of a system comes to: its values, what it fails of, what it counts."""
 

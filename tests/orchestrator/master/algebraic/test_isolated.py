@@ -44,6 +44,24 @@ def test_bent_ones(apart, bent, coupled, derives, f):
     assert counts["algebraic_loop"]["solutions"] > 0
 
 
+def test_arrays(apart, looped_arrays):
+    """Of FMI 3.0: a value of each element is asked for, with one reference for all."""
+    assert apart(looped_arrays, "all")[0] is None
+
+
+@pytest.mark.parametrize("mode", [0, 3, 11, 12, 23])
+def test_fmi_3(apart, lagging, mode):
+    """What it does in a step, or in reading, which may be that of a guess."""
+    system = lagging(3, algebraic_loops="solve", stop_time=6.0)
+    system.connections = [c for c in system.connections if c.target not in ("a.u", "b.u")]
+    system.connect("a.y", "b.u", scale=0.3)
+    system.connect("b.y", "a.u", scale=-0.5, offset=1.0)
+    system.instances["b"].start["mode"] = mode
+    error, counts = apart(system, "all")
+    assert (error is None) == (mode in (0, 11))
+    assert counts is None or counts["algebraic_loop"]["solutions"] > 0
+
+
 WAYS = {
     "refresh": {"refresh": True},
     "a gain": {"events": [Event("p.u", "connect", 0.5, source=Connection("q.y", "p.u", scale=-2.0), duration=1.0)]},

@@ -168,25 +168,11 @@ def test_a_number_that_becomes_whole_and_is_none_on_the_way(both, bent):
     assert list(result["p.n"][1:]) == list(np.ceil(y - 0.5) + 1.0)
 
 
-def test_arrays(told, plain_arrays):
+def test_arrays(told, looped_arrays):
     """z = 0.5 z - 3 z + 1 through two elements of one array, asked for as a whole; y by elements of its own."""
-    system = System(stop_time=1.0, step=0.25, algebraic_loops="solve")
-    system.add("it", plain_arrays, **{f"k[{k}]": 1.0 for k in (1, 2, 3)})
-    system.connect("it.z", "it.u[1,1]", scale=0.5)
-    system.connect("it.z", "it.u[1,2]", scale=-3.0)
-    system.connect("it.y[1,3]", "it.u[1,3]", scale=0.25, offset=0.5)
-    for k in (2, 1):
-        system.connect(f"it.y[2,{k}]", f"it.u[2,{3 - k}]", scale=-0.75 * k, offset=1.0)
-    system.connect("it.y[2,3]", "it.u[2,3]", scale=3.0, offset=1.0)
-    result = told(system)
+    result = told(looped_arrays)
     assert result["it.z"] == pytest.approx(np.full(5, 1.0 / 3.5), rel=1e-9)
     assert result["it.y[2,3]"] == pytest.approx(np.full(5, -0.4), rel=1e-9)
-
-
-@pytest.fixture
-def plain_arrays(arrays):
-    texts = '<String name="copies" valueReference="10" causality="output"><Dimension start="2"/></String>'
-    return str(arrays((texts, ""), ('<Output valueReference="10"/>', "")))
 
 
 @pytest.mark.parametrize("refresh", [True, False])
