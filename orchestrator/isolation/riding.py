@@ -167,6 +167,20 @@ class Ride:
         """
         self._slave.enter_lane()
 
+    def settle(self) -> None:
+        """See to steps whose outputs are not due yet, before anything else is asked of the instance.
+
+        Raises:
+            FmuError: it failed, or is lost.
+        """
+        if self._is_on:
+            time = self._slave.time
+            self._slave.await_lane()
+            if self.failed:
+                status = self._process.note(NOTE_STATUS, self._seat)
+                self.recover(self._failed_call(), status, self.time_of(self.failed), apart=False)
+            self._slave.time = time
+
     def end(self) -> None:
         """Let the process take messages again, of which one is for this instance: it boards anew then."""
         self._is_on = False

@@ -177,6 +177,8 @@ class CompiledLoop:
                 values, changes = wide.packed(exchange.values), changes_of(self.plan)
                 history, newest = self._unrolled(len(values))
         self.plan.forget_arrays()
+        for ride in self.plan.rides if goes_on else ():
+            ride.settle()
         return goes_on
 
     def rescue(self) -> None:

@@ -223,6 +223,19 @@ def test_rates_and_events(anywhere, third):
     assert result["b.o32"][-1] == -4
 
 
+@pytest.mark.parametrize("mode", [0, 6, 7, 11])
+def test_a_step_of_its_own_that_is_not_over_before_an_event(anywhere, plainly, mode):
+    """From t = 5 s on; its outputs are due at 5.5 s only."""
+    path = plainly(3, ('valueReference="3" dependencies="1 2"', 'valueReference="3" dependencies="2"'))
+    system = System(stop_time=6.0, step=0.25)
+    system.add("a", path, mode=mode, x=4.0)
+    system.add("b", path)
+    system.instances["a"].step = 0.5
+    system.connect("b.x", "a.u")
+    system.events.append(Event("a.gain", "set", 5.25, value=2.0))
+    assert anywhere(system).status == "completed"
+
+
 def test_arrays(anywhere, plain):
     """Whole arrays are handed over with one reference each; the ends are numbers of all types."""
     arrays_of(plain, anywhere)

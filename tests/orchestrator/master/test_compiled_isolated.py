@@ -124,6 +124,19 @@ def test_other_versions_of_fmi_that_fail_or_end(apart, lagging, version, mode):
     assert apart(system, "b").status == {7: "completed", 8: "terminated"}.get(mode, "failed")
 
 
+@pytest.mark.parametrize("mode", [3, 8])
+def test_a_step_of_its_own_that_failed_is_told_before_an_event(apart, plainly, mode):
+    """Its outputs are due later, and nothing else may be asked of it before."""
+    path = plainly(3, ('valueReference="3" dependencies="1 2"', 'valueReference="3" dependencies="2"'))
+    system = System(stop_time=6.0, step=0.25)
+    system.add("it", path, mode=mode)
+    system.instances["it"].step = 0.5
+    system.events.append(Event("it.gain", "set", 5.25, value=2.0))
+    found, known = attempt(isolate(system, ["it"])), attempt(system)
+    assert described(found.error) == described(known.error)
+    assert (found.status, found.time[-1], known.time[-1]) == (known.status, 5.25, 5.0)
+
+
 @pytest.mark.parametrize(("version", "mode"), [(1, 6), (3, 6), (3, 8), (3, 11)])
 def test_so_it_is_with_steps_of_other_versions_that_are_not_over(apart, lagging, version, mode, hurried):
     system = lagging(version, algorithm="jacobi")
