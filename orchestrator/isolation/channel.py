@@ -9,7 +9,7 @@ from typing import Any, NamedTuple, Protocol
 
 from ..errors import FmuError
 from ..fmi import Interface, Type
-from ..fmi.binding import SLAVES, are_as_called, by_type, heads
+from ..fmi.binding import SLAVES, are_as_called, by_type, call_name, heads
 from .messages import Cells
 
 _CELL = 8
@@ -80,6 +80,13 @@ class IsolatedChannel:
             found.append((IsolatedPart(self.index, len(found), kind, calls, references, place), places))
             offset += _CELL * len(places)
         return found
+
+    def name_call(self, call: str, part: int) -> str:
+        """The function of the standard behind ``set`` or ``get``, called for a part."""
+        interface, names = self._slave.interface, self.names
+        parts = list(by_type(self.kind, names, interface).values())
+        own = [names[k] for k in parts[part]] if part < len(parts) else names
+        return call_name(interface, call, self.kind, own)
 
     def set(self, values: Sequence[Any]) -> None:
         """Set all of them; what is wrong with it may be said by a later call."""

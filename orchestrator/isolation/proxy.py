@@ -15,7 +15,7 @@ from typing import Any
 
 from ..errors import FmuError, LostError
 from ..fmi import Interface, Type
-from ..fmi.binding import by_type, call_name
+from ..fmi.binding import call_name
 from . import messages
 from .channel import IsolatedChannel
 from .messages import Cells, Report, Saved, frame
@@ -393,9 +393,6 @@ class IsolatedSlave:
 
     def name_call(self, call: str, channel: int, part: int) -> str:
         """The function of the standard behind a name of `messages.CALLS`, called for a part of a channel."""
-        if call not in ("set", "get") or not 0 <= channel < len(self._channels):
-            return call_name(self.interface, call, "Real", ())
-        kind, names = self._channels[channel].kind, self._channels[channel].names
-        parts = list(by_type(kind, names, self.interface).values())
-        own = [names[k] for k in parts[part]] if part < len(parts) else names
-        return call_name(self.interface, call, kind, own)
+        if call in ("set", "get") and 0 <= channel < len(self._channels):
+            return self._channels[channel].name_call(call, part)
+        return call_name(self.interface, call, "Real", ())
