@@ -32,7 +32,7 @@ def comfort_system(reference, *, comfort=True, gust=0.0, step=0.1, stop=350.0, a
     return system
 
 
-def deviation(reference, *, comfort=True, gust=0.0, step=0.1, stop=350.0, algorithm="gauss-seidel", kind="plain"):
+def deviation(reference, *, comfort=True, gust=0.0, step=0.1, stop=350.0, algorithm="gauss-seidel", kind="auto"):
     """Worst deviations of the co-simulation from the continuous loop at its points: of speeds, m/s, and gaps, m.
 
     The metres of the specification's section 6 are those of the gaps (positions deviate more, all in one direction).
