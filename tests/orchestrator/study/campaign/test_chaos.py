@@ -16,7 +16,7 @@ import pytest
 from distributed.core import Status
 from railcosim.orchestrator import Study, load
 from railcosim.orchestrator.errors import RunError
-from railcosim.orchestrator.study.campaign import cluster, run_study
+from railcosim.orchestrator.study.campaign import cluster, flight, run_study
 from railcosim.orchestrator.study.campaign.cluster import Cluster
 
 from .conftest import plan_of, same
@@ -108,7 +108,7 @@ def test_a_worker_that_does_not_come_up_is_given_up_and_another_one_is_started(
 
 def test_workers_that_die_before_they_are_seen_to_run_are_started_again(native, system, tmp_path, monkeypatch):
     """Their nannies, who start them, then do not: they are made to believe here that they are still at it."""
-    monkeypatch.setattr(cluster, "_PATIENCE", 10.0)
+    monkeypatch.setattr(flight, "_FETCH", 10.0)
     how, undisturbed = native
     enter, entered, killed = Cluster.__enter__, [], []
     monkeypatch.setattr(Cluster, "__enter__", lambda self: entered.append(self) or enter(self))
