@@ -70,6 +70,8 @@ class Host:
         self._states: dict[int, Any] = {}
         self._problem: Exception | None = None
         """What went wrong since the last answer."""
+        self._is_settled = False
+        """Whether a call that failed in the lane has been seen to."""
         self.service = Service(memory, begin)
         self._quiet: dict[int, Callable[[Any], None]] = {
             messages.CHANNEL: self._add_channel,
@@ -103,12 +105,10 @@ class Host:
         """Go on by messages, at the time that the master has got to by calls through the lane."""
         if self._slave is not None and self.service.operations:
             self.service.forget_arrays()
-            from ..fmi.binding import FATAL  # noqa: PLC0415 (it is there by now, with the FMU)
-
             self._slave.time = self.service.time
-            if self._notes[NOTE_FAILED] and self._notes[NOTE_STATUS] == FATAL:
-                with contextlib.suppress(Exception):  # a neighbour may have failed first, and be told of
-                    self._slave.check("", FATAL)
+            if self._notes[NOTE_FAILED] and not self._is_settled:  # whoever is told of
+                self._is_settled = True
+                self._slave.settle(self._notes[NOTE_STATUS])
 
     # ---------------------------------------------------------------- answered
 
@@ -151,6 +151,7 @@ class Host:
             "serialize": self._serialize,
             "deserialize": self._deserialize,
             "board": self._board,
+            "check": self._check,
             "come_back": self._come_back,
             "give_back": self._give_back,
         }
@@ -229,8 +230,17 @@ class Host:
 
     def _board(self, table: Sequence[tuple[int, int, int, int, int]]) -> None:
         """Make ready for calls that come through the lane."""
+        self._is_settled = False
         found = [self._channels[k][0] if kind in messages.LANE_VALUES else None for kind, k, *_ in table]
         self.service.board(self._instance, [(*entry, channel) for entry, channel in zip(table, found, strict=True)])
+
+    def _check(self, call: str, status: int) -> None:
+        """Raise if a call in the lane has failed."""
+        from ..fmi.binding import WARNING  # noqa: PLC0415 (it is there by now, with the FMU)
+
+        assert self._slave is not None
+        if not 0 <= status <= WARNING:
+            raise self._slave.complaint(call, status)
 
     # ---------------------------------------------------------------- saved states
 

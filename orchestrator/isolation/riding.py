@@ -11,9 +11,9 @@ from contextlib import suppress
 from ctypes import c_void_p
 from typing import Any, Protocol
 
-from ..errors import FmuError, LostError
+from ..errors import LostError
 from ..fmi import Interface
-from ..fmi.binding import DISCARD, FATAL, PENDING, SLAVES
+from ..fmi.binding import DISCARD, FATAL, SLAVES
 from .channel import IsolatedPart
 from .lanes import HAS_LANES, lane
 from .messages import (
@@ -244,9 +244,6 @@ class Ride:
         self._slave.time = self._time_of_failure(time, apart=apart)
         if status == FATAL or self.failed == "forget":
             self.check(self._failed_call(), status)
-        if status == PENDING and self.failed == "step":
-            with suppress(FmuError):  # it is cancelled: no state may be restored before
-                self.check(self._failed_call(), status)
 
     def _raise_failure(self) -> None:
         """Raise what ended the wait for a call in the loop."""

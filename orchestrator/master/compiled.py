@@ -7,7 +7,6 @@ taken in Python with identical results.
 from __future__ import annotations
 
 from collections.abc import Iterable
-from contextlib import suppress
 from functools import reduce
 from typing import Any
 
@@ -236,11 +235,10 @@ class CompiledLoop:
             slave, call = self.plan.culprits[place["failed"]]
             status = int(place["status"])
             if isinstance(slave, LoadedSlave):
-                with suppress(FmuError):
-                    if status >> 32 > 0:
-                        slave.lose(call)
-                    else:
-                        slave.check(call, status)
+                if status >> 32 > 0:
+                    slave.lose(call)
+                else:
+                    slave.settle(status)
 
     def _see_to(self, failed: int, status: int, time: float, step: float) -> bool:
         """See to an operation that failed, as `_recover` says; states that were saved are given back."""

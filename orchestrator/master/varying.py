@@ -16,8 +16,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .. import world
-from ..errors import FmuError, RunError
-from ..fmi.binding import FATAL, PENDING, LoadedSlave
+from ..errors import RunError
+from ..fmi.binding import FATAL, LoadedSlave
 from ..fmi.guard import NOTES, own_note, said
 from ..isolation import Ride
 from ..times import slack
@@ -259,18 +259,18 @@ class Blocks:
         kind, late = self._plan.operations[failed][0], self._plan.late[failed]
         is_of_end = kind in (Kind.GET, Kind.READ, Kind.ASK) or (kind == Kind.SET and late)
         when = float(self._control["called_at"][0] + is_of_end * self._control["called_for"][0])
+        rides = self._plan.rides
         if isinstance(slave, Ride):
-            for ride in (slave, *self._plan.rides):
-                ride.leave(when, apart=kind in APART)
-            return
-        slave.time = when
-        if status >> 32 > 0:
-            raise slave.lose(said(call, status >> 32, (status & 0x7FFFFFFF) - (status & 0x80000000)))
-        if status == FATAL or kind == Kind.FORGET:
-            slave.check(call, status)
-        if status == PENDING and kind == Kind.STEP:
-            with suppress(FmuError):  # it is cancelled: no state may be restored before
+            rides = [slave, *rides]
+        else:
+            slave.time = when
+            if status >> 32 > 0:
+                raise slave.lose(said(call, status >> 32, (status & 0x7FFFFFFF) - (status & 0x80000000)))
+            if status == FATAL or kind == Kind.FORGET:
                 slave.check(call, status)
+            slave.settle(status)
+        for ride in rides:  # they may have failed as well
+            ride.leave(when, apart=kind in APART)
 
     def told(self, rows: NDArray[np.float64]) -> Rows:
         """Rows as an observer takes them."""

@@ -6,15 +6,15 @@ from .fmi3 import Fmi3Slave
 from .interfaces import plain_interface, read_interface
 from .libraries import forget_paths, library, names_of_platform
 from .loaded import LoadedSlave
-from .stepping import DISCARD, FATAL, PENDING
+from .stepping import DISCARD, FATAL, WARNING
 from .versions import SLAVES, call_name
 from .watch import Watch, is_watched
 
 __all__ = [
     "DISCARD",
     "FATAL",
-    "PENDING",
     "SLAVES",
+    "WARNING",
     "Calls",
     "ElementsChannel",
     "Fmi1Slave",

@@ -181,12 +181,20 @@ class LoadedSlave(Stepping):
         """Raise unless the status of a call is ok or warning."""
         if 0 <= status <= WARNING:
             return
+        self.settle(status)
+        raise self.complaint(call, status)
+
+    def settle(self, status: int) -> None:
+        """See to what a failed call leaves behind: a fatal one must be the last, a step that is pending is stopped."""
         self._dead = status == FATAL
-        what = f"{call} failed"
         if status == PENDING:
             self._cancel()
-            what = f"{call} is pending: asynchronous FMUs are not supported"
-        raise self._failure(what, status)
+
+    def complaint(self, call: str, status: int) -> FmuError:
+        """The error of a call that failed."""
+        is_pending = status == PENDING
+        what = f"{call} is pending: asynchronous FMUs are not supported" if is_pending else f"{call} failed"
+        return self._failure(what, status)
 
     def _failure(self, what: str, status: int) -> FmuError:
         label = STATUS[status] if 0 <= status < len(STATUS) else f"{status} (unknown)"

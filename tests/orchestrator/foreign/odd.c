@@ -6,7 +6,7 @@
    half of one and asks for the end, 43 is 40 and goes on only when it was restored; 44: rounds upward from then on;
    60 + s, 70 + s: the status of getting, of setting whole numbers; 80 + s: of setting derivatives of inputs, of which 91
    refuses the second and 92 all; 100 + s, 110 + s, 120 + s: of saving a state, of coming back to one, of giving it back.
-   Once one of these was fatal, it aborts as it is given back. */
+   Once one of these was fatal, or while a step is pending, it aborts as it is given back; and as that is cancelled once more. */
 
 #include "fmi2.h"
 
@@ -17,7 +17,7 @@ typedef struct {
     int whole[9];
     double slopes[2][2]; /* of u and v */
     double time, reached;
-    int stuck, ends, pends, is_dead;
+    int stuck, ends, pends, is_cancelled, is_dead;
     Logger logger;
     void *environment;
     char name[100];
@@ -50,7 +50,7 @@ void *fmi2Instantiate(const char *name, int kind, const char *guid, const char *
 
 void fmi2FreeInstance(void *c)
 {
-    if (((Odd *)c)->is_dead) {
+    if (((Odd *)c)->is_dead || ((Odd *)c)->pends) {
         abort();
     }
     free(c);
@@ -153,12 +153,18 @@ int fmi2DoStep(void *c, double time, double step, int final)
         fesetround(FE_UPWARD);
     }
     s->pends = status == 5;
+    s->is_cancelled = 0;
     return tell(s, status == 9 ? -1 : status);
 }
 
 int fmi2CancelStep(void *c)
 {
-    ((Odd *)c)->pends = 0;
+    Odd *s = c;
+    if (s->is_cancelled) {
+        abort();
+    }
+    s->is_cancelled = s->pends;
+    s->pends = 0;
     return 0;
 }
 

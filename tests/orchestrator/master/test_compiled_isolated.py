@@ -100,14 +100,26 @@ def test_of_isolated_neighbours_the_first_that_fails_is_named(apart, odd_fmu, tm
     assert (result.error is None) == (modes == (41, 41))
 
 
-def test_a_neighbour_that_is_fatal_as_well_is_not_given_back(apart, odd, caplog):
-    """They step at once, and only the first is told of."""
+@pytest.mark.parametrize("isolated", ["all", "together"])
+@pytest.mark.parametrize("modes", [(3, 4), (3, 5), (5, 3), (5, 5), (41, 5)])
+def test_a_neighbour_that_fails_as_well_is_seen_to(apart, odd_fmu, tmp_path, caplog, *, modes, isolated):
+    """They step at once, and the first is told of: a fatal one is not given back, a pending step is cancelled once."""
     system = System(stop_time=9.0, step=0.25)
-    for name, mode in zip("abc", (3, 4, 0), strict=True):
-        system.add(name, odd, u=1.0, mode=mode)
+    path = odd_fmu(tmp_path, "canHandleVariableCommunicationStepSize")
+    for name, mode in zip("abc", (*modes, 0), strict=True):
+        system.add(name, path, u=1.0, mode=mode)
     for source, target in zip("abcc", ("c.u", "c.v", "a.u", "b.u"), strict=True):
         system.connect(f"{source}.x", target)
-    assert apart(system, "together").error.instance == "a"
+    assert apart(system, isolated).error.instance == ("b" if modes[0] == 41 else "a")
+    assert not caplog.records
+
+
+@pytest.mark.parametrize("mode", [4, 5])
+def test_an_isolated_neighbour_of_one_that_fails_here(apart, able, caplog, mode):
+    """With steps that vary: who was fatal does not come back to a state, a pending step is cancelled before."""
+    system = coupled(able, "adaptive", mode)
+    system.instances["a"].start["mode"] = 3
+    assert apart(system, "b").error
     assert not caplog.records
 
 
