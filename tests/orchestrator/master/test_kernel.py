@@ -410,7 +410,8 @@ PARTS = (
 )
 SANITIZERS = {
     ("address", "undefined"): (
-        "not sanitized and not compiler and not ctrl_c and not without_the_extension and not short_in_time"
+        "not sanitized and not compiler and not ctrl_c and not without_the_extension and not short_in_time "
+        "and not isolated"  # it calls functions of another library
     ),
     ("thread",): "threads_give or several_threads or discarded or first_is_told or rounded",
 }
