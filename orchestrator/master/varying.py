@@ -162,7 +162,7 @@ class Blocks:
     def __init__(self, coupling: Coupling, algorithm: Adaptive) -> None:
         self._coupling, self._algorithm, self._exchange = coupling, algorithm, coupling.exchange
         self._block = 1
-        self._failure: RunError | None = None
+        self._failure: BaseException | None = None
         self._is_left = False
         """Whether the next step is for Python."""
         self._under_way: tuple[Span, NDArray[np.float64], Observer] | None = None
@@ -189,6 +189,7 @@ class Blocks:
 
         Raises:
             RunError: what the step failed of that comes next.
+            KeyboardInterrupt: it was waited for no more.
         """
         if self._failure is not None:
             raise self._failure
@@ -245,7 +246,7 @@ class Blocks:
                 self._check(failed, status)
             self._plan.come_back(time)
             self._is_left = True
-        except RunError as failure:
+        except (RunError, KeyboardInterrupt) as failure:
             self._failure = failure
             while self._plan.holds_states:  # an FMU may refuse to take more than one back
                 with suppress(RunError):

@@ -6,7 +6,9 @@ import sys
 import fmpy
 import pytest
 from railcosim.orchestrator.isolation import HAS_LANES, isolate
+from railcosim.orchestrator.isolation.process import HostProcess
 from railcosim.orchestrator.master import compiled
+from railcosim.orchestrator.run.execution import run
 from railcosim.orchestrator.system import Connection, Event, System
 
 pytestmark = [
@@ -234,6 +236,24 @@ def test_one_that_is_lost_in_a_solution(ringed, alike, where, what):
     text, instance, time, *_ = error
     assert (instance, time) == ("it", 1.0)
     assert {"derive": "fmi2GetDirectionalDerivative", "set": "fmi2SetReal"}[where] in text
+
+
+@pytest.mark.parametrize("algorithm", ["gauss-seidel", "adaptive"])
+def test_nobody_is_waited_for_who_is_interrupted(ringed, used, monkeypatch, algorithm):
+    """A second Ctrl-C, while Python waits for what the loop has asked."""
+    wait = HostProcess._wait
+
+    def interrupt(process):
+        if process.is_riding:
+            raise KeyboardInterrupt
+        wait(process)
+
+    monkeypatch.setattr(HostProcess, "_wait", interrupt)
+    tolerances = {"it.calls": [1.0, 1e9], "other.calls": [1.0, 1e9]}
+    system = ringed("derive hang 1", algorithm=algorithm, tolerance=1e-2, tolerances=tolerances)
+    result = run(system)
+    assert used
+    assert (result.status, result.time[-1]) == ("interrupted", 0.75)
 
 
 def test_slow_is_not_hanging(ringed, outcome, used):
