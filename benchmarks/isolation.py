@@ -5,9 +5,10 @@
 
 Microseconds per FMU step, wall time and CPU time of all processes together, and the ratio to the ring without
 isolation; both are driven from this process and step in turn, so that a busy machine slows both alike; medians. Then
-the FMUs of a platoon, each in a process of its own and those of one kind together, and FMUs that are heavy (many
-Runge-Kutta steps inside), which isolation lets compute at the same time with ``jacobi``. That both compute the same is
-checked. The last column is the wall time in which the processes start and are initialized.
+one component as an FMU of either version of FMI, the FMUs of a platoon, each in a process of its own and those of one
+kind together, and FMUs that are heavy (many Runge-Kutta steps inside), which isolation lets compute at the same time
+with ``jacobi``. That both compute the same is checked. The last column is the wall time in which the processes start
+and are initialized.
 CPU time of other processes is told by Linux.
 """
 
@@ -123,6 +124,9 @@ def main() -> None:
         for count, isolated in rows:
             for algorithm in ("gauss-seidel", "jacobi"):
                 print(compare(ring_of(least, count, algorithm), *how, isolated), flush=True)
+    print("\nA component in FMI 2.0 and in FMI 3.0:\n")
+    for path in (own, build(f"{HERE / 'lag.py'}:Lag", {}, kind="native", fmi="3")):
+        print(compare(ring_of(path, 8, "gauss-seidel"), *how, TOGETHER), flush=True)
     print("\nThe trains of comfort_cruise:\n")
     for isolated in (True, TOGETHER):
         print(compare(load("comfort_cruise"), *how, isolated), flush=True)
