@@ -218,9 +218,17 @@ class Host:
         return told
 
     def _add_channel(self, content: tuple[Any, Sequence[str], int | None]) -> None:
+        from ..fmi.binding import heed_parts  # noqa: PLC0415 (it is there by now, with the FMU)
+
         kind, names, offset = content
         cells = None if offset is None else Cells(self._memory, offset, kind, len(names))
-        self._channels.append((self._instance.channel(kind, names), cells))
+        channel = self._instance.channel(kind, names)
+        heed_parts(channel, partial(self._note_part, len(self._channels)))
+        self._channels.append((channel, cells))
+
+    def _note_part(self, channel: int, part: int) -> None:
+        call, *_ = messages.noted(self._notes[NOTE_CALL])
+        self._notes[NOTE_CALL] = note(call, channel, part)
 
     def _watch(self, channels: list[int]) -> None:
         self._watched = channels

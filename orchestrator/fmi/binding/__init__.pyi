@@ -1,5 +1,5 @@
 from .arrays import Calls, ElementsChannel, are_as_called, arrays_in, by_type, calls_of, heads, whole_arrays
-from .channel import FmuChannel, MixedChannel
+from .channel import FmuChannel, MixedChannel, heed_parts
 from .fmi1 import Fmi1Slave
 from .fmi2 import FmuSlave
 from .fmi3 import Fmi3Slave
@@ -31,6 +31,7 @@ __all__ = [
     "calls_of",
     "forget_paths",
     "heads",
+    "heed_parts",
     "is_watched",
     "library",
     "names_of_platform",

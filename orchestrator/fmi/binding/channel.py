@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from typing import Any, ClassVar, Protocol
 
 from ...errors import FmuError
@@ -99,23 +99,37 @@ class FmuChannel:
 
 
 class MixedChannel:
-    """Variables of one type of ours that are of several types in the FMU."""
+    """Variables of one type of ours that are of several types in the FMU.
+
+    Attributes:
+        parts: a channel for each type, with the places of its variables.
+        heed: is told the number of each part before it is set or read.
+    """
 
     def __init__(self, parts: Sequence[tuple[Channel, Sequence[int]]], count: int) -> None:
         self.parts, self._count = parts, count
+        self.heed: Callable[[int], object] = lambda _: None
 
     def set(self, values: Sequence[Any]) -> None:
         """Set all of them."""
-        for channel, places in self.parts:
+        for number, (channel, places) in enumerate(self.parts):
+            self.heed(number)
             channel.set([values[k] for k in places])
 
     def get(self) -> list[Any]:
         """Read all of them."""
         found: list[Any] = [None] * self._count
-        for channel, places in self.parts:
+        for number, (channel, places) in enumerate(self.parts):
+            self.heed(number)
             for place, value in zip(places, channel.get(), strict=True):
                 found[place] = value
         return found
+
+
+def heed_parts(channel: Channel, heed: Callable[[int], object]) -> None:
+    """Let somebody be told the number of each part of a channel before it is set or read, if it has several."""
+    if isinstance(channel, MixedChannel):
+        channel.heed = heed
 
 
 class NegatedChannel:
