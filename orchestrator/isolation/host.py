@@ -223,12 +223,8 @@ class Host:
         kind, names, offset = content
         cells = None if offset is None else Cells(self._memory, offset, kind, len(names))
         channel = self._instance.channel(kind, names)
-        heed_parts(channel, partial(self._note_part, len(self._channels)))
+        heed_parts(channel, partial(messages.note_part, self._notes, len(self._channels)))
         self._channels.append((channel, cells))
-
-    def _note_part(self, channel: int, part: int) -> None:
-        call, *_ = messages.noted(self._notes[NOTE_CALL])
-        self._notes[NOTE_CALL] = note(call, channel, part)
 
     def _watch(self, channels: list[int]) -> None:
         self._watched = channels

@@ -73,6 +73,12 @@ def noted(found: int) -> tuple[str, int, int]:
     return CALLS[number] if number < len(CALLS) else "", found >> 16, found >> 8 & 0xFF
 
 
+def note_part(notes: memoryview, channel: int, part: int) -> None:
+    """Note that the call that is under way has come to another part of a channel."""
+    call, *_ = noted(notes[NOTE_CALL])
+    notes[NOTE_CALL] = note(call, channel, part)
+
+
 def frame(kind: int, content: Any) -> bytes:
     """A frame of numbers, texts, bytes, and lists and mappings of them: JSON, because who reads it trusts nobody."""
     body = encoded(content)

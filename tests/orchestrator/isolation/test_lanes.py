@@ -1,10 +1,24 @@
 """The lane as Python has it: what it refuses, and how long it is watched."""
 
+import struct
+
 import pytest
-from railcosim.orchestrator.isolation import HAS_LANES, lanes
+from railcosim.orchestrator.isolation import HAS_LANES, lanes, messages
 from railcosim.orchestrator.isolation.lanes import lane
 
 pytestmark = pytest.mark.skipif(not HAS_LANES, reason="there are no lanes here")
+
+
+ASKING = messages.SET_SLOPES, messages.ASK, messages.ASK_3
+PLACE = 1, 1, 1  # function, instance, and what is beside them
+UNSOUND = [
+    (messages.LANE_SET, 0, 1, 1, 1, 1, 64),
+    *((kind, *PLACE, 1, 1, 64) for kind in (-1, messages.LANE_RESTORE_NOW)),
+    *((messages.LANE_GET_3, *PLACE, *place) for place in ((2, 1, 64), (1, 1 << 20, 64), (0, 0, 1 << 20))),
+    *((kind, *PLACE, room, 0, 64) for kind in ASKING for room in (600, 1 << 62)),
+    *((kind, 1, 1, 0, 0, 0, 64) for kind in (messages.LANE_STEP_3, messages.LANE_SAVE)),
+]
+"""Operations: kind, function, instance, references; how many of these, of values, and where those stand."""
 
 
 def test_what_does_not_fit_the_memory_is_refused():
@@ -13,15 +27,15 @@ def test_what_does_not_fit_the_memory_is_refused():
         lane.Lane(memory, 192, 0, 1.0, 0.0, print)
     road = lane.Lane(memory, 128, 0, 1.0, 0.0, print)
 
-    def add(*place):
-        return lane.Rider(road, 0, 0).add(0, *place)
-
-    for wrong in (lambda: lane.Rider(road, -8, 0), lambda: add(64, 1 << 60, 8), lambda: add(64, 1, 9)):
+    with pytest.raises(ValueError, match="does not stand in the memory"):
+        lane.Rider(road, -8, 0)
+    rider = lane.Rider(road, 0, 0)
+    for wrong in ((0, 64, 1 << 60, 8), (0, 64, 1, 9), (0, 64, 1, -1), *((kind, 64, 600, 0) for kind in ASKING)):
         with pytest.raises(ValueError, match="does not stand in the memory"):
-            wrong()
+            rider.add(*wrong)
     with pytest.raises(ValueError, match="it does not fit into the memory"):
         lane.serve(memory, 64 * 99, [], 0.0)
-    for operations in (b"1", bytes(64)):
+    for operations in (b"1", *(struct.pack("=q6Qq", *each, 0) for each in UNSOUND)):
         with pytest.raises(ValueError, match="do not fit its memory"):
             lane.serve(memory, 128, [(0, operations)], 0.0)
     assert road.done() == 0
