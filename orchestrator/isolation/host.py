@@ -151,7 +151,7 @@ class Host:
             "serialize": self._serialize,
             "deserialize": self._deserialize,
             "board": self._board,
-            "check": self._check,
+            "complain": self._complain,
             "come_back": self._come_back,
             "give_back": self._give_back,
         }
@@ -238,13 +238,10 @@ class Host:
         found = [self._channels[k][0] if kind in messages.LANE_VALUES else None for kind, k, *_ in table]
         self.service.board(self._instance, [(*entry, channel) for entry, channel in zip(table, found, strict=True)])
 
-    def _check(self, call: str, status: int) -> None:
-        """Raise if a call in the lane has failed."""
-        from ..fmi.binding import WARNING  # noqa: PLC0415 (it is there by now, with the FMU)
-
+    def _complain(self, call: str, status: int) -> None:
+        """Raise what a call in the lane has failed of, which has been seen to."""
         assert self._slave is not None
-        if not 0 <= status <= WARNING:
-            raise self._slave.complaint(call, status)
+        raise self._slave.complaint(call, status)
 
     # ---------------------------------------------------------------- saved states
 

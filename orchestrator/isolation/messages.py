@@ -52,7 +52,7 @@ LANE_VALUES = LANE_SET, LANE_SET_3, *LANE_GETS
 """Of these, what reads channels; and what sets or reads them."""
 CALLS = ("", "instantiate", "setup", "enter_initialization", "exit_initialization", "set", "step", "get", "save",
          "restore", "forget", "serialize", "deserialize", "directional_derivatives", "interpolate", "terminate",
-         "roll_back", "reset", "free", "check", "board")  # fmt: skip
+         "roll_back", "reset", "free", "complain", "board")  # fmt: skip
 """What an FMU is asked to do, by number in `NOTE_CALL`."""
 NUMBERS = {name: number for number, name in enumerate(CALLS)}
 _FRAMES = {*range(STEP, RIDE + 1), *range(READY, REPORT + 1)}

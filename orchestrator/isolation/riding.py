@@ -223,7 +223,7 @@ class Ride:
             slave.ask("resume", begin, length, own, self._is_final)
             return not call.endswith("DoStep")
         slave.time = self._time_of_failure(time, apart=apart)
-        self.check(self._failed_call(), status)
+        self._complain(status)
         return False
 
     def leave(self, time: float, *, apart: bool) -> None:
@@ -243,7 +243,7 @@ class Ride:
             return
         self._slave.time = self._time_of_failure(time, apart=apart)
         if status == FATAL or self.failed == "forget":
-            self.check(self._failed_call(), status)
+            self._complain(status)
 
     def _raise_failure(self) -> None:
         """Raise what ended the wait for a call in the loop."""
@@ -261,9 +261,9 @@ class Ride:
         is_of_step = self.failed == "step" or (self.failed == "set" and not apart)
         return self.time_of("step") if is_of_step else time
 
-    def check(self, call: str, status: int) -> None:
-        """Raise unless the status of a call is ok or warning, and what was set before was taken."""
-        self._slave.ask("check", call, status)
+    def _complain(self, status: int) -> None:
+        """Raise what it has failed of."""
+        self._slave.ask("complain", self._failed_call(), status)
 
     # ---------------------------------------------------------------- saved states that the kernel has left
 

@@ -282,9 +282,10 @@ class CompiledLoop:
         if status >> 32 > 0 and not isinstance(slave, Ride):  # a call that was left, how, and with which exit code
             raise slave.lose(said(call, status >> 32, (status & 0x7FFFFFFF) - (status & 0x80000000)))
         try:
-            if isinstance(slave, Ride) and not 0 <= status <= 1:
+            if not isinstance(slave, Ride):
+                slave.check(call, status)
+            elif not 0 <= status <= 1:
                 return slave.recover(call, status, when, apart=kind in APART)
-            slave.check(call, status)
         except FmuError as error:
             is_refusal = kind == Kind.SLOPES and (not isinstance(slave, Ride) or slave.failed == "interpolate")
             is_over = error.status == "fatal" or isinstance(error, LostError)

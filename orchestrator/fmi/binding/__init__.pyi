@@ -6,7 +6,7 @@ from .fmi3 import Fmi3Slave
 from .interfaces import plain_interface, read_interface
 from .libraries import forget_paths, library, names_of_platform
 from .loaded import LoadedSlave
-from .stepping import DISCARD, FATAL, WARNING
+from .stepping import DISCARD, FATAL
 from .versions import SLAVES, call_name
 from .watch import Watch, is_watched
 
@@ -14,7 +14,6 @@ __all__ = [
     "DISCARD",
     "FATAL",
     "SLAVES",
-    "WARNING",
     "Calls",
     "ElementsChannel",
     "Fmi1Slave",
