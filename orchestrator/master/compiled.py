@@ -130,7 +130,7 @@ class CompiledLoop:
         while done < stop and goes_on:
             block = min(block, stop - done, most)
             due = _rows_due(done, block, every, count)
-            into = Table(range(len(values)), due) if table is None else table
+            into = Table(range(len(exchange.values)), due) if table is None else table
             cells = into.room(due)
             self._under_way = into, observe, start_time, step
             for ride in self.plan.rides:

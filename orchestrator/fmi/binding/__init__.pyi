@@ -1,4 +1,4 @@
-from .arrays import Calls, ElementsChannel, are_as_called, arrays_in, by_type, calls_of, heads, whole_arrays
+from .arrays import Calls, ElementsChannel, Held, are_as_called, arrays_in, by_type, calls_of, heads, whole_arrays
 from .channel import FmuChannel, MixedChannel, heed_parts
 from .fmi1 import Fmi1Slave
 from .fmi2 import FmuSlave
@@ -20,6 +20,7 @@ __all__ = [
     "Fmi3Slave",
     "FmuChannel",
     "FmuSlave",
+    "Held",
     "LoadedSlave",
     "MixedChannel",
     "Watch",

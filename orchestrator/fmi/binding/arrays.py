@@ -3,15 +3,23 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Any
+from typing import Any, NamedTuple
 
 from ..interface import Interface, Type
 from ..slave import Channel
 from .binary import BinaryChannel
 from .channel import FmuChannel, MixedChannel, Owner
 
-Calls = list[tuple[FmuChannel, Sequence[int]]]
-"""Calls of an FMU, each with the places of its values among all of a channel."""
+
+class Held(NamedTuple):
+    """An element that is set as it is, with others of its array."""
+
+    array: ElementsChannel
+    name: str
+
+
+Calls = list[tuple[FmuChannel, Sequence[int | Held]]]
+"""Calls of an FMU, each with the places of its values among all of a channel, or what is none of them."""
 
 
 def by_type(kind: Type, names: Sequence[str], interface: Interface) -> dict[str, list[int]]:
@@ -44,13 +52,13 @@ def calls_of(channel: Channel) -> Calls | None:
     if isinstance(channel, FmuChannel):
         return [(channel, range(len(channel.names)))]
     if isinstance(channel, ElementsChannel):
-        return calls_of(channel.channel) if channel.is_whole else None
+        return [(own, channel.sources) for own, _ in calls_of(channel.channel) or ()] or None
     found: Calls = []
     for own, places in channel.parts if isinstance(channel, MixedChannel) else ():
         inner = calls_of(own)
         if inner is None:
             return None
-        found += [(each, [places[k] for k in own_places]) for each, own_places in inner]
+        found += [(each, [k if isinstance(k, Held) else places[k] for k in own_places]) for each, own_places in inner]
     return found or None
 
 
@@ -109,9 +117,15 @@ class ElementsChannel:
         self._starts = {v.name: v.start for v in variables}
 
     @property
-    def is_whole(self) -> bool:
-        """Whether they are whole arrays, in the order of their elements."""
-        return self._places == list(range(len(self._starts)))
+    def sources(self) -> list[int | Held]:
+        """Of the elements of the whole arrays, in their order, which of those that are wanted each is."""
+        places = {name: place for place, name in enumerate(self._names)}
+        return [places.get(name, Held(self, name)) for name in self._starts]
+
+    def value_of(self, name: str) -> Any:
+        """What an element is that is not among those that are wanted."""
+        value = self._given.get(name, self._starts[name])
+        return self.channel.get()[list(self._starts).index(name)] if value is None else value
 
     def forget(self) -> None:
         """They were set past this channel: what a part of an array is beside, the FMU has to say."""

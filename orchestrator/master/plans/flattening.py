@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...fmi import Channel
-from ...fmi.binding import FmuChannel, calls_of
+from ...fmi.binding import FmuChannel, Held, calls_of
 from ...isolation import IsolatedChannel, IsolatedPart
 from ..exchange import Exchange, Feed
 from ..observer import Rows
@@ -36,7 +36,7 @@ _BITS = {SIGNED_BITS: np.int64, UNSIGNED_BITS: np.uint64}
 Entry = tuple[int, int, int, float, float, int, float, int]
 """A value's place, age and change; scale, offset, threshold and what that does; what the value is."""
 
-Parts = Sequence[tuple[FmuChannel | IsolatedPart, Sequence[int]]]
+Parts = Sequence[tuple[FmuChannel | IsolatedPart, Sequence[int | Held]]]
 
 
 class Wide:
@@ -45,6 +45,7 @@ class Wide:
     Attributes:
         forms: by place, for the kernel; empty where all of them are numbers.
         texts: those that are texts; None where there are none.
+        held: elements of arrays that are set in part, by place behind the values.
     """
 
     def __init__(self, exchange: Exchange) -> None:
@@ -58,6 +59,7 @@ class Wide:
         self._wide = [(place, _BITS[form]) for place, form in enumerate(forms) if form in _BITS]
         self._worded = [place for place, form in enumerate(forms) if form == TEXT]
         self.texts = Texts() if self._worded else None
+        self.held: dict[Held, Entry] = {}
         self._more = 0
 
     def widen(self, cells: int) -> None:
@@ -86,6 +88,11 @@ class Wide:
             made.append((*place, feed.scales[k], feed.offsets[k], whole, threshold or 0.0, self.form(source)))
         return made
 
+    def hold(self, element: Held, kind: str, place: int) -> Entry:
+        """Let an element of a type of the FMU's stand at a place behind the values, unless it has one: where it is."""
+        form = TEXT if kind == "String" else _FORMS.get(kind, NUMBER)
+        return self.held.setdefault(element, (place, -1, -1, 1.0, 0.0, AS_IT_IS, 0.0, form))
+
     def packed(self, values: Sequence[Any]) -> NDArray[np.float64]:
         """Values as the kernel takes them."""
         numbers = [*values, *[0.0] * self._more]
@@ -95,6 +102,12 @@ class Wide:
         cells = np.array(numbers, dtype=np.float64)
         for place, bits in self._wide:
             cells.view(bits)[place] = int(values[place])
+        for (array, name), (place, *_, form) in self.held.items():
+            value = array.value_of(name)
+            if form in _BITS:
+                cells.view(_BITS[form])[place] = int(value)
+            else:
+                cells[place] = self.texts.number(value) if self.texts is not None and form == TEXT else value
         return cells
 
     def unpacked(self, cells: NDArray[np.float64]) -> list[Any]:
@@ -143,17 +156,23 @@ def type_of(version: str, kind: str) -> int:
     return _BYTE if version == "1.0" and kind == "Boolean" else 0
 
 
+def _stand_in_order(places: Sequence[int | Held]) -> bool:
+    """Whether values are read as they stand side by side."""
+    return list(places) == sorted(k for k in places if not isinstance(k, Held))
+
+
 def can_exchange(exchange: Exchange) -> bool:
-    """Whether the kernel can: all but Binary, whole arrays, wide numbers that no event changes."""
-    channels = [feed.channel for feeds in exchange.feeds.values() for feed in feeds]
-    channels += [part.channel for parts in exchange.yields.values() for part in parts]
+    """Whether the kernel can: all but Binary, arrays that are read as a whole, wide numbers that no event changes."""
+    given = [parts_of(feed.channel) for feeds in exchange.feeds.values() for feed in feeds]
+    read = [parts_of(part.channel) for parts in exchange.yields.values() for part in parts]
     wide = Wide(exchange)
     compared = (
         abs(link.threshold or 0.0) >= _WIDEST and wide.form(exchange.places[link.source]) in _BITS
         for link in exchange.every_link
     )
     return (
-        None not in map(parts_of, channels)
+        None not in [*given, *read]
+        and all(_stand_in_order(places) for parts in read for _, places in parts or ())
         and not any(wide.form(place) in _BITS for place in exchange.output_changes)
         and not any(compared)
     )

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...fmi import Channel, Type
-from ...fmi.binding import ElementsChannel, Fmi3Slave, LoadedSlave, arrays_in, is_watched
+from ...fmi.binding import ElementsChannel, Fmi3Slave, Held, LoadedSlave, arrays_in, is_watched
 from ...isolation import IsolatedPart, Ride
 from ..algebraic import LoopSolver
 from ..algorithms import Batch, Iteration, Operation, Repeated
@@ -199,7 +199,9 @@ class Plan:
             feed = self.exchange.feeds[name][n]
             places = [k for _, places in parts_of(feed.channel) or () for k in places]
             made = self.wide.entries(feed, changes, late=late)
-            entries[begin : begin + len(places)] = [made[k] for k in places]
+            for at, k in enumerate(places, begin):
+                if not isinstance(k, Held):
+                    entries[at] = made[k]
 
     def _add(self, names: Sequence[str], operations: Sequence[Operation], *, final: bool = True) -> None:
         for operation in operations:
@@ -377,9 +379,15 @@ class Plan:
                 addresses = slave.addresses(call)
             what = len(self._entries), len(places), int(is_real), type_of(slave.interface.version, own.kind)
             self._channels.append((*addresses, *what, len(own.references)))
-            self._entries += [entries[k] for k in places]
+            self._entries += [self._held(k, own.kind) if isinstance(k, Held) else entries[k] for k in places]
             self._references += [*own.references, *[NONE] * (len(places) - len(own.references))]
         return made
+
+    def _held(self, element: Held, kind: str) -> Entry:
+        """An element of an array that is set with others of it, which are connected."""
+        entry = self.wide.hold(element, kind, self.width)
+        self.width = max(self.width, entry[0] + 1)
+        return entry
 
     def _add_step(self, slave: Called, rate: int, *, final: bool) -> None:
         self.add_operation(Kind.STEP, len(self._instances), (slave, slave.DO_STEP), (rate, 0), late=not final)

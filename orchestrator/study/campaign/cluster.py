@@ -5,7 +5,6 @@ from __future__ import annotations
 import importlib
 import importlib.util
 import logging
-import multiprocessing
 import signal
 import threading
 from collections.abc import Callable, Iterator, Mapping, Sequence
@@ -229,7 +228,7 @@ def _kill_untold(age: float) -> None:
     """
     import psutil
 
-    told = {one.pid for one in multiprocessing.active_children()}
+    told = {one.pid for one in _dask().utils.get_mp_context().active_children()}
     for one in psutil.Process().children():
         with suppress(psutil.Error):
             is_spawned = "--multiprocessing-fork" in one.cmdline()

@@ -257,6 +257,37 @@ def arrays_of(plain, compared, **how):
     assert [result[f"c.y[{i},{j}]"][-1] for i in (1, 2) for j in (1, 2, 3)] == [2.0, 4.0, 6.0, 8.0, 10.0, 12.0]
 
 
+@pytest.mark.parametrize("algorithm", ["gauss-seidel", "jacobi"])
+def test_parts_of_arrays(both, arrays, algorithm):
+    """Of every type, and in another order; beside what is connected stands what was given last, also on the way."""
+    system = System(stop_time=2.0, step=0.25, algorithm=algorithm)
+    model = str(arrays())
+    system.add("a", model, u=[[1.0, 2.0, 3.0], [4.0, 5.0, 6.0]], n=[3, 4], words=["some", "thing"])
+    system.add("b", model, u=[[0.0, 0.0, 9.0], [0.0, 8.0, 0.0]], n=[0, 6], on=[True, True], words=["else", "not"])
+    system.connect("a.y[1,1]", "b.u[1,2]", delay=1)
+    system.connect("a.y[1,2]", "b.u[1,1]", scale=0.5)
+    system.connect("b.m[2]", "a.n[1]")
+    system.connect("a.off[2]", "b.on[1]")
+    system.connect("a.copies[1]", "b.words[2]")
+    system.events.append(Event("b.u[2,2]", "set", 1.0, value=7.0))
+    result = both(system)
+    found = [[result[f"b.y[{i},{j}]"][-1] for j in (1, 2, 3)] for i in (1, 2)]
+    assert found == [[4.0, 4.0, 18.0], [0.0, 14.0, 0.0]]
+    assert result["b.copies[1]"][-1] == "else"
+    assert result["b.copies[2]"][-1] == "some"
+    assert result["a.m[2]"][-1] == -4
+
+
+def test_all_of_an_array_in_another_order(both, plain):
+    system = System(stop_time=1.0, step=0.25)
+    system.add("a", plain, n=[3, 4])
+    system.add("b", plain)
+    system.connect("a.m[1]", "b.n[2]")
+    system.connect("a.m[2]", "b.n[1]")
+    result = both(system)
+    assert (result["b.m[1]"][-1], result["b.m[2]"][-1]) == (4.0, 3.0)
+
+
 @pytest.mark.parametrize("isolated", [[], ["together"]])
 def test_part_of_an_array_after_all_of_it(plain, instantiated, isolated):
     """It was set past the channels of Python: what stands beside the part is asked of the FMU.
@@ -297,16 +328,14 @@ def test_neighbours_whose_like_references_are_of_other_types(anywhere, plainly):
     assert (result["plain.g"][-1], result["other.o8"][-1]) == (np.float32(0.1), -5.0)
 
 
-@pytest.mark.parametrize("what", ["part", "event", "threshold", "binary"])
-def test_what_is_left_to_python(third, plain, by_hand, used, what):
-    """A part of an array, an event that changes a number of 64 bits, one that is compared beyond doubles, Binary."""
+@pytest.mark.parametrize("what", ["event", "threshold", "binary"])
+def test_what_is_left_to_python(third, by_hand, used, what):
+    """An event that changes a number of 64 bits, one that is compared beyond doubles, Binary."""
     system = System(stop_time=1.0, step=0.25)
-    model = {"part": plain, "binary": str(by_hand(3, name="binary.fmu"))}.get(what, third)
+    model = {"binary": str(by_hand(3, name="binary.fmu"))}.get(what, third)
     system.add("a", model)
     system.add("b", model)
-    if what == "part":
-        system.connect("a.y[1,1]", "b.u[1,2]")
-    elif what == "event":
+    if what == "event":
         system.events.append(Event("a.o64", "override", 0.5, value=3))
     elif what == "threshold":
         system.connect("a.o64", "b.on", threshold=2.0**60)
