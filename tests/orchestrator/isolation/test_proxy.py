@@ -7,7 +7,7 @@ from ctypes import sizeof
 
 import pytest
 from railcosim.orchestrator.errors import FmuError
-from railcosim.orchestrator.fmi.binding import calls_of
+from railcosim.orchestrator.fmi.binding import Held, calls_of
 from railcosim.orchestrator.isolation import choice as isolated
 from railcosim.orchestrator.isolation import launch
 
@@ -192,7 +192,7 @@ NUMBERS = "f i8 ui8 i16 ui16 i32 ui32 i64 ui64 gear o8 mode"
 
 @pytest.mark.parametrize("version", ["1", "2", "3", "arrays"])
 def test_the_master_knows_which_calls_stand_behind_a_channel(apart, alone, request, version):
-    """As an FMU that is loaded has them: by type, with arrays as a whole, or not at all."""
+    """As an FMU that is loaded has them, by type, but for arrays in part or in another order."""
     path = {"2": "odd", "arrays": "arrays"}.get(version, "by_hand")
     make = request.getfixturevalue(path)
     path = make if version == "2" else make() if version == "arrays" else make(int(version))
@@ -206,6 +206,8 @@ def test_the_master_knows_which_calls_stand_behind_a_channel(apart, alone, reque
             continue
         calls, parts = calls_of(here.channel(kind, names)), there.channel(kind, names).parts
         checked.add(text)
+        if any(list(places) != sorted(k for k in places if not isinstance(k, Held)) for _, places in calls or ()):
+            calls = None
         assert (calls is None) == (parts is None) == (text in ("minus_x", "u[1,2] y[1,1]", "n[1] n[2] w m[2] m[1]"))
         for (call, places), (part, own_places) in zip(calls or (), parts or (), strict=True):
             assert (call.kind, call.calls, list(places)) == (part.kind, part.calls, list(own_places))
