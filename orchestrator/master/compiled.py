@@ -234,11 +234,11 @@ class CompiledLoop:
         for place in places:
             slave, call = self.plan.culprits[place["failed"]]
             status = int(place["status"])
-            if isinstance(slave, LoadedSlave):
-                if status >> 32 > 0:
-                    slave.lose(call)
-                else:
-                    slave.settle(status)
+            assert isinstance(slave, LoadedSlave)
+            if status >> 32 > 0:
+                slave.lose(call)
+            else:
+                slave.settle(status)
 
     def _see_to(self, failed: int, status: int, time: float, step: float) -> bool:
         """See to an operation that failed, as `_recover` says; states that were saved are given back."""

@@ -1,6 +1,7 @@
 /* An FMI 3.0 FMU by hand whose variables are arrays: y = 2 u (2 by 3), a number of every element of which is set or read at
    once; z = k . u[1,:] + der; on, off: two booleans and their opposites; words and their copies; n and m: whole numbers; w:
-   a whole number of another type, of which nothing comes.
+   a whole number of another type, of which nothing comes; wide and wider: whole numbers of 64 bits, where a description has
+   them.
    What is set or read in part, with another number of values than the arrays have, is refused. */
 
 #include <stdbool.h>
@@ -14,6 +15,7 @@ typedef struct {
     long long w;
     bool on[2];
     char words[2][100];
+    unsigned long long wide[2];
 } Arrays;
 
 void *fmi3InstantiateCoSimulation(const char *name, const char *token, const char *resources, bool visible, bool logging,
@@ -109,6 +111,7 @@ int fmi3SetInt64(void *c, const unsigned *vr, size_t count, const long long *val
 
 PAIRS(Int32, int, n, -value)
 PAIRS(Boolean, bool, on, !value)
+PAIRS(UInt64, unsigned long long, wide, value)
 
 int fmi3SetString(void *c, const unsigned *vr, size_t count, const char *const *values, size_t size)
 {

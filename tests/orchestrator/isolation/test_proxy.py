@@ -7,7 +7,7 @@ from ctypes import sizeof
 
 import pytest
 from railcosim.orchestrator.errors import FmuError
-from railcosim.orchestrator.fmi.binding import Held, calls_of
+from railcosim.orchestrator.fmi.binding import Held, calls_of, heed_parts
 from railcosim.orchestrator.isolation import choice as isolated
 from railcosim.orchestrator.isolation import launch
 
@@ -215,6 +215,17 @@ def test_the_master_knows_which_calls_stand_behind_a_channel(apart, alone, reque
             assert part.place[1:] == (len(call.names), sizeof(here.TYPES[call.kind][1]))
     assert len(checked) >= 3
     assert there.channel("String", ["word"] if version in "13" else []).parts is None
+
+
+def test_who_makes_several_calls_for_a_channel_tells_which(alone, by_hand, begin):
+    third, heard = begin(alone(by_hand(3))), []
+    several, single = third.channel("Integer", ["i8", "ui32"]), third.channel("Integer", ["i8"])
+    for channel in (several, single):
+        heed_parts(channel, heard.append)
+    several.set([1, 2])
+    single.set([3])
+    assert several.get() == [3, 2]
+    assert heard == [0, 1, 0, 1]
 
 
 def test_python_fmus(apart, components, workspace):

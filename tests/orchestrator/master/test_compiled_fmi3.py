@@ -10,7 +10,7 @@ from railcosim.orchestrator.isolation import isolate
 from railcosim.orchestrator.master import compiled
 from railcosim.orchestrator.master.plans.flattening import parts_of
 from railcosim.orchestrator.run.execution import run
-from railcosim.orchestrator.system import Event, System
+from railcosim.orchestrator.system import Connection, Event, System
 
 pytestmark = [
     pytest.mark.skipif(compiled.kernel is None, reason="installed without the compiled step loop"),
@@ -257,25 +257,40 @@ def arrays_of(plain, compared, **how):
     assert [result[f"c.y[{i},{j}]"][-1] for i in (1, 2) for j in (1, 2, 3)] == [2.0, 4.0, 6.0, 8.0, 10.0, 12.0]
 
 
+_PAIR = '<UInt64 name="{}" valueReference="{}" causality="{}"{}><Dimension start="2"/></UInt64>'
+WIDE = [
+    (before, new + before)
+    for before, new in (
+        ("<String", _PAIR.format("wide", 13, "input", ' start="0 0"') + _PAIR.format("wider", 12, "output", "")),
+        ('<Output valueReference="10"/>', '<Output valueReference="12"/>'),
+    )
+]
+"""Lines of the description of arrays3.c with whole numbers of 64 bits."""
+
+
 @pytest.mark.parametrize("algorithm", ["gauss-seidel", "jacobi"])
 def test_parts_of_arrays(both, arrays, algorithm):
     """Of every type, and in another order; beside what is connected stands what was given last, also on the way."""
     system = System(stop_time=2.0, step=0.25, algorithm=algorithm)
-    model = str(arrays())
+    model = str(arrays(*WIDE))
     system.add("a", model, u=[[1.0, 2.0, 3.0], [4.0, 5.0, 6.0]], n=[3, 4], words=["some", "thing"])
     system.add("b", model, u=[[0.0, 0.0, 9.0], [0.0, 8.0, 0.0]], n=[0, 6], on=[True, True], words=["else", "not"])
+    system.instances["a"].start["wide"], system.instances["b"].start["wide"] = [2**63 + 1, 5], [2**64 - 1, 0]
     system.connect("a.y[1,1]", "b.u[1,2]", delay=1)
     system.connect("a.y[1,2]", "b.u[1,1]", scale=0.5)
     system.connect("b.m[2]", "a.n[1]")
     system.connect("a.off[2]", "b.on[1]")
     system.connect("a.copies[1]", "b.words[2]")
+    system.connect("a.wider[1]", "b.wide[2]")
     system.events.append(Event("b.u[2,2]", "set", 1.0, value=7.0))
+    system.events.append(Event("b.u[1,1]", "connect", 1.5, source=Connection("a.y[1,3]", "b.u[1,1]", scale=0.5)))
     result = both(system)
     found = [[result[f"b.y[{i},{j}]"][-1] for j in (1, 2, 3)] for i in (1, 2)]
-    assert found == [[4.0, 4.0, 18.0], [0.0, 14.0, 0.0]]
+    assert found == [[6.0, 4.0, 18.0], [0.0, 14.0, 0.0]]
     assert result["b.copies[1]"][-1] == "else"
     assert result["b.copies[2]"][-1] == "some"
     assert result["a.m[2]"][-1] == -4
+    assert [result[f"b.wider[{k}]"][-1] for k in (1, 2)] == [float(2**64 - 1), float(2**63 + 1)]
 
 
 def test_all_of_an_array_in_another_order(both, plain):
