@@ -17,6 +17,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -144,7 +145,7 @@ class Adaptive(VariableStep):
         """Take one step, as `VariableStep.advance` says."""
         shortest = longest * _SHORTEST if self.shortest is None else self.shortest
         shortest = max(shortest, _APART * math.ulp(max(abs(time), abs(until))))
-        begin = self._keep()
+        begin, rejected = self._keep(), 0
         kept = [begin]
         wanted = min(self.length or longest, longest)
         try:
@@ -155,6 +156,7 @@ class Adaptive(VariableStep):
                     error, place = self._take(time, end, kept)
                 except RunError as failure:  # of a shorter step they may be capable
                     if is_shortest or isinstance(failure, StoppedError) or _is_fatal(failure):
+                        self.tally.rejected += rejected
                         raise
                     error, place = math.inf, -1
                 ideal = _SAFETY * error ** (-1.0 / (self.order + 1)) if error > 0.0 else _LARGEST
@@ -164,18 +166,24 @@ class Adaptive(VariableStep):
                         factor = _LARGEST
                     elif length > _LARGEST * shortest:
                         self._in_a_row = 0
+                    self._let_go(kept)
+                    self.tally.rejected += rejected
                     self._accept(length)
                     # A step that was cut short to land on a point says little of how long the next may be.
                     self.length = min(longest, max(length * factor, wanted if factor >= 1.0 else shortest))
                     return end
-                self.tally.rejected += 1
+                rejected += 1
                 if is_shortest:
+                    self.tally.rejected += rejected
                     self._fail(time, length, error, place)
+                self._let_go(kept, but=1)
                 self._go_to(begin)
                 wanted = max(shortest, length * min(factor, _SAFETY))
-        finally:
+        except BaseException:
             for point in kept:
-                self._forget(point)
+                with suppress(RunError):  # what is told of is what came first
+                    self._forget(point)
+            raise
 
     def _sweep(self, time: float, length: float, *, ended: bool = False) -> None:
         """A step that may be taken back, with the inputs of its begin or, ``ended``, the present ones as of its end."""
@@ -243,6 +251,11 @@ class Adaptive(VariableStep):
             self.exchange.values[:] = point.values
         if self.coupling.extrapolator is not None:
             self.coupling.extrapolator.restore(point.memory)
+
+    def _let_go(self, kept: list[_Point], but: int = 0) -> None:
+        """Forget points, ``but`` the first ones; a step that ends with one that cannot be forgotten is not counted."""
+        while len(kept) > but:
+            self._forget(kept.pop(but))
 
     def _forget(self, point: _Point) -> None:
         for slave, state in zip(self.exchange.slaves.values(), point.states, strict=True):

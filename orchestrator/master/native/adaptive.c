@@ -29,6 +29,7 @@ typedef struct {
     const double *relative, *absolute; /* tolerances */
     double *whole, *halves, *reached;  /* all values, by another way */
     Memory begin, end;
+    int is_kept_back; /* a state is not given back: that ends the run */
 } Doubling;
 
 /* An error in units of the tolerance, and the place of the value that has it. */
@@ -233,6 +234,7 @@ static void forget(Doubling *it, int program, int is_kept, double time)
 {
     if (is_kept) {
         go(it, program, time, 0.0);
+        it->is_kept_back |= has_failed(it);
     }
 }
 
@@ -298,7 +300,7 @@ static int choose(Doubling *it, double until)
 /* All but the FMUs is again as it was at the begin of the step; what Python solves anew is not counted twice. */
 static void undo(Doubling *it)
 {
-    if (it->plan->head != NULL) {
+    if (it->plan->head != NULL && !it->is_kept_back) {
         memcpy(it->plan->head, it->begin.head, sizeof it->begin.head);
     }
     recall(it, &it->begin);
