@@ -189,6 +189,20 @@ def test_steps_that_vary(told, mine, refresh):
     assert result["a.y"] == pytest.approx(result.time / 4.0, abs=1e-12)
 
 
+def test_a_state_that_is_not_given_back_after_a_solution(told, mine, able):
+    """It ends the run; what was solved in the step that failed of it is counted as in Python."""
+    system = System(start_time=4.0, stop_time=8.0, step=0.25, algorithm="adaptive", algebraic_loops="solve")
+    system.add("a", mine("Affine"), gain=-3.0)
+    system.add("b", mine("Affine"))
+    system.add("clock", mine("Clock"))
+    system.add("odd", able, mode=122)
+    for source, target in (("a.y", "b.u"), ("b.y", "a.u"), ("clock.t", "a.w"), ("a.y", "odd.u")):
+        system.connect(source, target)
+    error = told(system, kind="native").error
+    assert (error.instance, error.status) == ("odd", "discard")
+    assert "fmi2FreeFMUstate failed" in str(error)
+
+
 def test_steps_that_vary_and_no_solution(told, mine):
     """-t + 12, 10 more while that is below 4.5: no answer is right from 7.5 s on."""
     system = System(start_time=5.0, stop_time=8.0, step=0.25, algorithm="adaptive", algebraic_loops="solve")
