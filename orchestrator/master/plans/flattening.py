@@ -45,7 +45,7 @@ class Wide:
     Attributes:
         forms: by place, for the kernel; empty where all of them are numbers.
         texts: those that are texts; None where there are none.
-        held: elements of arrays that are set in part, by place behind the values.
+        held: elements that arrays which are set in part have beside, and where each stands behind the values.
     """
 
     def __init__(self, exchange: Exchange) -> None:

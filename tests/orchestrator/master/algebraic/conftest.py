@@ -62,6 +62,39 @@ def looped_arrays(arrays):
 
 
 @pytest.fixture
+def varying(mine):
+    """Makes systems in steps that vary: y = -3 y + t, and what y leads to, a lag or another FMU."""
+
+    def make(last=None, start=0.0, stop=2.0, **how):
+        system = System(start_time=start, stop_time=stop, algorithm="adaptive", algebraic_loops="solve", **how)
+        system.add("a", mine("Affine"), gain=-3.0)
+        system.add("b", mine("Affine"))
+        system.add("clock", mine("Clock"))
+        system.add("last", last or mine("Lag"))
+        for source, target in (("a.y", "b.u"), ("b.y", "a.u"), ("clock.t", "a.w"), ("a.y", "last.u")):
+            system.connect(source, target)
+        return system
+
+    return make
+
+
+@pytest.fixture
+def unsolvable(mine):
+    """A system in steps that vary: -t + 12, 10 more while that is below 4.5. No answer is right from 7.5 s on."""
+    system = System(start_time=5.0, stop_time=8.0, step=0.25, algorithm="adaptive", algebraic_loops="solve")
+    system.add("switch", mine("Switch"))
+    system.add("level", mine("Level"), level=4.5, upside_down=True)
+    system.add("bend", mine("Affine"), gain=-1.0)
+    system.add("clock", mine("Clock"))
+    system.add("lag", mine("Lag"))
+    system.connect("clock.t", "bend.u", offset=-12.0)
+    for source, target in (("bend.y", "switch.w"), ("switch.y", "level.u"), ("level.on", "switch.on")):
+        system.connect(source, target)
+    system.connect("switch.y", "lag.u")
+    return system
+
+
+@pytest.fixture
 def outcome(contents):
     """What a run of a system comes to: its values, what it fails of, what it counts."""
 

@@ -148,29 +148,12 @@ def test_truth_values_and_whole_numbers(apart, mine, level):
 
 
 @pytest.mark.parametrize("refresh", [True, False])
-def test_steps_that_vary(apart, mine, refresh):
-    system = System(stop_time=2.0, step=0.5, algorithm="adaptive", algebraic_loops="solve", refresh=refresh)
-    system.add("a", mine("Affine"), gain=-3.0)
-    system.add("b", mine("Affine"))
-    system.add("clock", mine("Clock"))
-    system.add("lag", mine("Lag"))
-    for source, target in (("a.y", "b.u"), ("b.y", "a.u"), ("clock.t", "a.w"), ("a.y", "lag.u")):
-        system.connect(source, target)
-    assert apart(system, "a", "lag", kind="native")[0] is None
+def test_steps_that_vary(apart, varying, refresh):
+    assert apart(varying(step=0.5, refresh=refresh), "a", "last", kind="native")[0] is None
 
 
-def test_steps_that_vary_and_no_solution(apart, mine):
-    system = System(start_time=5.0, stop_time=8.0, step=0.25, algorithm="adaptive", algebraic_loops="solve")
-    system.add("switch", mine("Switch"))
-    system.add("level", mine("Level"), level=4.5, upside_down=True)
-    system.add("bend", mine("Affine"), gain=-1.0)
-    system.add("clock", mine("Clock"))
-    system.add("lag", mine("Lag"))
-    system.connect("clock.t", "bend.u", offset=-12.0)
-    for source, target in (("bend.y", "switch.w"), ("switch.y", "level.u"), ("level.on", "switch.on")):
-        system.connect(source, target)
-    system.connect("switch.y", "lag.u")
-    assert "has no solution" in apart(system, "together", kind="native")[0][0]
+def test_steps_that_vary_and_no_solution(apart, unsolvable):
+    assert "has no solution" in apart(unsolvable, "together", kind="native")[0][0]
 
 
 def test_nobody_waits_long_in_the_loop(apart, bent, coupled, hurried):

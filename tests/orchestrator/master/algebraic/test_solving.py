@@ -176,46 +176,23 @@ def test_arrays(told, looped_arrays):
 
 
 @pytest.mark.parametrize("refresh", [True, False])
-def test_steps_that_vary(told, mine, refresh):
-    """`adaptive` solves where a step ends: y = -3 y + t, and a lag behind it."""
-    system = System(stop_time=2.0, step=0.5, algorithm="adaptive", algebraic_loops="solve", refresh=refresh)
-    system.add("a", mine("Affine"), gain=-3.0)
-    system.add("b", mine("Affine"))
-    system.add("clock", mine("Clock"))
-    system.add("lag", mine("Lag"))
-    for source, target in (("a.y", "b.u"), ("b.y", "a.u"), ("clock.t", "a.w"), ("a.y", "lag.u")):
-        system.connect(source, target)
-    result = told(system, kind="native")
+def test_steps_that_vary(told, varying, refresh):
+    """`adaptive` solves where a step ends."""
+    result = told(varying(step=0.5, refresh=refresh), kind="native")
     assert result["a.y"] == pytest.approx(result.time / 4.0, abs=1e-12)
 
 
-def test_a_state_that_is_not_given_back_after_a_solution(told, mine, able):
+def test_a_state_that_is_not_given_back_after_a_solution(told, varying, able):
     """It ends the run; what was solved in the step that failed of it is counted as in Python."""
-    system = System(start_time=4.0, stop_time=8.0, step=0.25, algorithm="adaptive", algebraic_loops="solve")
-    system.add("a", mine("Affine"), gain=-3.0)
-    system.add("b", mine("Affine"))
-    system.add("clock", mine("Clock"))
-    system.add("odd", able, mode=122)
-    for source, target in (("a.y", "b.u"), ("b.y", "a.u"), ("clock.t", "a.w"), ("a.y", "odd.u")):
-        system.connect(source, target)
+    system = varying(able, start=4.0, stop=8.0, step=0.25)
+    system.instances["last"].start["mode"] = 122
     error = told(system, kind="native").error
-    assert (error.instance, error.status) == ("odd", "discard")
+    assert (error.instance, error.status) == ("last", "discard")
     assert "fmi2FreeFMUstate failed" in str(error)
 
 
-def test_steps_that_vary_and_no_solution(told, mine):
-    """-t + 12, 10 more while that is below 4.5: no answer is right from 7.5 s on."""
-    system = System(start_time=5.0, stop_time=8.0, step=0.25, algorithm="adaptive", algebraic_loops="solve")
-    system.add("switch", mine("Switch"))
-    system.add("level", mine("Level"), level=4.5, upside_down=True)
-    system.add("bend", mine("Affine"), gain=-1.0)
-    system.add("clock", mine("Clock"))
-    system.add("lag", mine("Lag"))
-    system.connect("clock.t", "bend.u", offset=-12.0)
-    for source, target in (("bend.y", "switch.w"), ("switch.y", "level.u"), ("level.on", "switch.on")):
-        system.connect(source, target)
-    system.connect("switch.y", "lag.u")
-    result = told(system, kind="native")
+def test_steps_that_vary_and_no_solution(told, unsolvable):
+    result = told(unsolvable, kind="native")
     assert isinstance(result.error, CouplingError)
 
 
